@@ -33,6 +33,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.number_types import full_precision
 from optics.numerics.precision import padded_for_packets, precision
 from optics.numerics.renamed import warn_once
+from optics.point_spread.coarse_stack import coarse_stack
 from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
 from optics.point_spread.psf_result import OF_CELLS
@@ -98,17 +99,56 @@ def psf(
         light, numbers = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()}), {}
     integrated = flag("pixel_means", pixel_means) and view.get("method") not in OF_CELLS
     pixels = _pixels(light, lambdas, view) if integrated else None
-
-    def images(own: Sequence[Array]) -> Array:
-        changed = with_numbers(light, dict(zip(numbers, own, strict=True)))
-        return changed.images(lambdas, view if pixels is None else {**view, **vars(pixels.samples)})
-
-    found = _Evaluation.apply(images, *numbers.values()).to(place)
+    view = _completed(view if pixels is None else {**view, **vars(pixels.samples)})
+    found = _images(light, numbers, lambdas, view).to(place)
     if pixels is not None:
         rows, columns = (torch.tensor(part).to(found) for part in (pixels.rows, pixels.columns))
         found = rows @ found @ columns.T
+    found = found.unflatten(0, (len(light.pupils), len(light.distances)))
     found = found if is_row(sensor_distance) or is_row(source_distance) else found[:, 0]
     return found[0] if isinstance(pupil, Pupil) else found
+
+
+def _images(
+    light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
+) -> torch.Tensor:
+    """Return the PSFs of all members of a batch, (member, wavelength, y, x).
+
+    At coarse tolerances, PyTorch computes members with the same pupil and sensor's distance as one stack. Dr.Jit
+    computes all others.
+    """
+    images: dict[int, torch.Tensor] = {}
+    if _place() == "cpu" and all(tensor.device.type == "cpu" for tensor in numbers.values()):
+        images = _stacked(light, numbers, wavelengths, view)
+    rest = [place for place in range(len(light.members)) if place not in images]
+    if rest:
+
+        def others(own: Sequence[Array]) -> Array:
+            changed = with_numbers(light, dict(zip(numbers, own, strict=True)))
+            return changed.images(rest, wavelengths, view)
+
+        computed = _Evaluation.apply(others, *numbers.values())
+        if len(rest) == len(light.members):
+            return computed
+        images |= dict(zip(rest, computed, strict=True))
+    return torch.stack([images[place] for place in range(len(images))])
+
+
+def _stacked(
+    light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
+) -> dict[int, torch.Tensor]:
+    """Return the PSFs of those members that a stack computes within the tolerance, (wavelength, y, x), by index."""
+    found: dict[int, torch.Tensor] = {}
+    carrying = with_numbers(light, {name: _Once.apply(tensor) for name, tensor in numbers.items()})
+    fixed = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()})
+    asked = wavelengths, Grid(view["shape"], view["dx"], view["centre"]), view["dtype"]
+    stacks = zip(carrying.stacks(*asked, torch.from_numpy), fixed.stacks(*asked, np.asarray), strict=True)
+    for (places, own), (_, without) in stacks:
+        part = coarse_stack(own if numbers else without, without, view["tolerance"], view["method"])
+        if part is not None:
+            kept = zip(places, torch.as_tensor(part[0]), part[1].all(axis=1), strict=True)
+            found |= {place: image for place, image, met in kept if met}
+    return found
 
 
 def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any = None, **view: Any) -> torch.Tensor:
@@ -136,11 +176,30 @@ def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any
     return _Evaluation.apply(electrons, *numbers.values()).to(place)
 
 
+def _completed(view: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `optics.psf` for window, tolerance and method, with its defaults."""
+    known = {name: value.default for name, value in inspect.signature(drjit_psf).parameters.items()}
+    named = ("dx", "shape", "tolerance", "method", "dtype", "centre")
+    return {name: known[name] for name in named} | dict(view)
+
+
 def _pixels(light: LightBatch, wavelengths: np.ndarray, view: Mapping[str, Any]) -> SensorPixels:
-    asked = {name: value.default for name, value in inspect.signature(drjit_psf).parameters.items()} | dict(view)
+    asked = _completed(view)
     window = Grid(asked["shape"], asked["dx"], asked["centre"])
     tolerance = in_range("tolerance", asked["tolerance"], 1e-12, 0.5)
     return SensorPixels.around(window, light.cutoff(wavelengths), tolerance)
+
+
+class _Once(torch.autograd.Function):
+    """The identity, whose derivative refuses to be differentiated."""
+
+    @staticmethod
+    def forward(ctx: Any, tensor: Any) -> Any:
+        return tensor.view_as(tensor)
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Any) -> Any:
+        return _FirstDerivative.apply(gradient.requires_grad_())[0] if torch.is_grad_enabled() else gradient
 
 
 class _Evaluation(torch.autograd.Function):

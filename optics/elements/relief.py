@@ -198,7 +198,7 @@ class HeightMap(Relief):
         """Return the spline coefficients as an array like `x`. They are linear in the samples, M h Nᵀ."""
         if not is_differentiable(self.samples) or library(x) is np:
             return like(x, self._coefficients)
-        down, across = (_spline_coefficients(np.eye(n)) for n in self._heights.shape)
+        down, across = map(_spline_matrix, self._heights.shape)
         found = matrix_like(x, down) @ matrix_like(x, self.samples) @ matrix_like(x, np.ascontiguousarray(across.T))
         return like(x, found)
 
@@ -287,6 +287,12 @@ def _spline_coefficients(samples: np.ndarray) -> np.ndarray:
     before = core[0] + (core[0] - core[1]) * steps[::-1]
     after = core[-1] + (core[-1] - core[-2]) * steps
     return np.concatenate([before, core, after])
+
+
+@lru_cache(maxsize=16)
+def _spline_matrix(n: int) -> np.ndarray:
+    """Return the matrix of `_spline_coefficients` for n samples, (coefficient, sample)."""
+    return _spline_coefficients(np.eye(n))
 
 
 @lru_cache(maxsize=16)

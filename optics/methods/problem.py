@@ -108,10 +108,11 @@ class Problem:
         if not (derivatives and carries_derivatives(beam)):
             return _problem(plain, window, tolerance, dtype)
         refuse_torch(beam)
-        found = _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
-        found = replace(found, moves=carries_derivative(beam.distance))
-        # A small change of the angle breaks the symmetry of light along the axis.
-        return replace(found, symmetric=False, even=False) if any(map(carries_derivative, beam.source.angle)) else found
+        return _for_derivatives(plain, window, tolerance, dtype, beam)
+
+    def differentiated_by(self, beam: Beam) -> Problem:
+        """Return the problem for derivatives with respect to numbers of the same light, also of PyTorch."""
+        return _for_derivatives(self.light, self.window, self.tolerance, self.dtype, beam)
 
     @cached_property
     def slopes(self) -> Slopes:
@@ -267,6 +268,19 @@ class Problem:
 def _differentiated(beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None) -> Problem:
     part = DETAIL_PART / (1 if knots else FINER_DETAIL)
     return replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
+
+
+def _for_derivatives(plain: Beam, window: Grid, tolerance: float, dtype: str, beam: Beam) -> Problem:
+    """Return the problem of light without derivatives, for derivatives with respect to the numbers of `beam`."""
+    pupil, knots = beam.pupil, derivative_knots(beam.pupil, beam.wavelength)
+    found = _differentiated(plain, window, tolerance, dtype, knots)
+    moves, turns = carries_derivative(beam.distance), any(map(carries_derivative, beam.source.angle))
+    # A small change of the angle breaks the symmetry of light along the axis.
+    symmetric = found.symmetric and not turns and pupil.rotationally_symmetric(beam.wavelength)
+    even = found.even and not turns and pupil.mirror_symmetric(beam.wavelength)
+    if (moves, symmetric, even) == (found.moves, found.symmetric, found.even):
+        return found
+    return replace(found, moves=moves, symmetric=symmetric, even=even)
 
 
 @lru_cache(maxsize=256)

@@ -26,7 +26,7 @@ from optics.methods.problem import Problem
 from optics.methods.pupil_edge import PupilEdge
 from optics.methods.sine_samples import SineSamples, evenly_in_sines
 from optics.methods.slow_factor import Path, axis_factor, fourier_kernel, slow_factor
-from optics.methods.window_check import window_error
+from optics.methods.window_check import window_errors
 from optics.methods.window_rank import window_rank
 from optics.methods.window_sums import WindowSums, intensity_of, recorded_field
 from optics.numerics.autodiff import Array
@@ -90,14 +90,17 @@ class WindowSampling:
         return on_window(replace(u, grid=problem.window), beam, problem)
 
     def _field(self, beam: Beam, problem: Problem) -> np.ndarray:
-        return self._sums(problem).field(self.pupil.light(beam, problem.dtype))
+        sums = self.sums(Path.from_problem(problem), problem.dtype)
+        return sums.field(self.pupil.light(beam, problem.dtype))
 
     def _recorded(self, beam: Beam, problem: Problem) -> Field:
         light = self.pupil.field(beam, precision(problem.dtype))
-        return recorded_field(light, beam.distance, self._sums(problem), problem.window)
+        sums = self.sums(Path.from_problem(problem), problem.dtype)
+        return recorded_field(light, beam.distance, sums, problem.window)
 
-    def _sums(self, problem: Problem) -> WindowSums:
-        return _window_sums(self.pupil, self.rank, self.half_width, Path.from_problem(problem), problem.dtype)
+    def sums(self, path: Path, dtype: str) -> WindowSums:
+        """Return the arrays of the sums. The wavelength may be longer than that for which the samples are made."""
+        return _window_sums(self.pupil, self.rank, self.half_width, path, dtype)
 
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the plane over which rounding errors spread light."""
@@ -108,11 +111,13 @@ class WindowSampling:
         return self.pupil.grid.shape
 
     def error(self, beam: Beam, problem: Problem, image: np.ndarray) -> float | None:
-        """Return the relative L2 error of the intensity over the window, see `window_error`.
+        """Return the relative L2 error of the intensity over the window, see `window_errors`; None without light.
 
         image: |U|² over the window, divided by the area of the pupil, flat.
         """
-        return window_error(self.finer, beam, problem, image)
+        light, seen = self.finer.light(beam, problem.dtype), image.reshape(1, *problem.window.shape)
+        error = window_errors(self.finer, Path.from_problem(problem), light[None], seen * beam.pupil.area)
+        return float(error[0]) if error[0] >= 0 else None
 
 
 def window_sampling(problem: Problem) -> WindowSampling | None:
@@ -121,11 +126,9 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
     if fine or problem.all_light or problem.pixelated is not None:
         return None
     half = max(problem.window.own_half_width, problem.window.dx)
-    density = 2.0 ** (math.ceil(STEPS * math.log2(_density(problem, half)) - 1e-9) / STEPS)
-    pupil, finer = (
-        _samples(problem, half, each, ripple, shift)
-        for each, ripple, shift in zip((density, FINER * density), RIPPLES, (0.0, SHIFT), strict=True)
-    )
+    density, of_check = _densities(problem, half)
+    pupil = _samples(problem, half, density, RIPPLES[0], 0.0)
+    finer = _samples(problem, half, of_check, RIPPLES[1], SHIFT)
     if pupil is None or finer is None:
         return None
     rank = window_rank(problem, pupil, half)
@@ -141,8 +144,11 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
     return WindowSampling(pupil, finer, rank, half, seconds, size)
 
 
-def _density(problem: Problem, half: float) -> float:
-    """Return the number of samples per radius, which is also the number of cycles per radius that they resolve."""
+def _densities(problem: Problem, half: float) -> tuple[float, float]:
+    """Return the numbers of samples per radius, of the PSF and of its check, which does not include derivatives.
+
+    They are also the numbers of cycles per radius that the samples resolve.
+    """
     radius, tolerance = problem.radius, problem.tolerance
     along, outward = problem.sampled_slopes.to_window(problem.distance, problem.window.centre, problem.medium_n)
     cycles = np.sort(along) * radius / (problem.wavelength * problem.medium_n)
@@ -150,16 +156,27 @@ def _density(problem: Problem, half: float) -> float:
     reach = float(cycles[max(0, math.ceil(len(cycles) * (1 - share)) - 1)])
     rim = float(np.median(along[outward > RIM])) * radius / (problem.wavelength * problem.medium_n)
     window = half * radius / (problem.wavelength * problem.distance)
-    cells = 0.0 if problem.knots is None else (len(problem.knots.borders) - 1) * CELL_CYCLES
-    sharp = EDGE_CYCLES + RIM_CYCLES * rim
-    if problem.differentiated:
-        wavefront = problem.light.pupil.wavefront
-        # High modes grow outside the circle, so that their derivatives need a sharper edge.
-        sharp = sharp * DERIVATIVE_PART**EXPONENT + (wavefront.order if isinstance(wavefront, Zernike) else 0)
-    edge = (sharp + cells) * (tolerance / 0.01) ** EXPONENT
     # The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to the stopband.
     widest = SoftEdge(PASSBAND, 1.0, RIPPLES[1]).reach / EDGE_REACH * 2.0 ** (1 / EDGES)
-    return max(window + reach + edge + problem.mask_detail * radius, widest + window / 2)
+
+    def stepped(edge: float) -> float:
+        cycles = window + reach + edge * (tolerance / 0.01) ** EXPONENT + problem.mask_detail * radius
+        return 2.0 ** (math.ceil(STEPS * math.log2(max(cycles, widest + window / 2)) - 1e-9) / STEPS)
+
+    sharp = EDGE_CYCLES + RIM_CYCLES * rim
+    return stepped(_edge_of_derivatives(problem, sharp) if problem.differentiated else sharp), FINER * stepped(sharp)
+
+
+def _edge_of_derivatives(problem: Problem, sharp: float) -> float:
+    """Return the cycles per radius for the edge and for derivatives, at a tolerance of 0.01.
+
+    sharp: those for the edge, without derivatives.
+    """
+    wavefront = problem.light.pupil.wavefront
+    # High modes grow outside the circle, so that their derivatives need a sharper edge.
+    order = wavefront.order if isinstance(wavefront, Zernike) else 0
+    cells = 0.0 if problem.knots is None else (len(problem.knots.borders) - 1) * CELL_CYCLES
+    return sharp * DERIVATIVE_PART**EXPONENT + order + cells
 
 
 def _samples(problem: Problem, half: float, density: float, ripple: float, shift: float) -> SineSamples | None:

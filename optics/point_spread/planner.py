@@ -126,7 +126,9 @@ WEIGHING = {
     "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
     "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
-OTHERS = 4e-3  # choice: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances
+# Choices: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances. Cells between
+# knots, which derivatives with respect to samples of maps need, take longer.
+OTHERS, OTHERS_WITH_CELLS = 4e-3, 15e-3
 
 
 @lru_cache(maxsize=256)
@@ -154,9 +156,10 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     best: Sampling | None = None
     coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None
     first = "" if coarse is None else "low_rank"
+    others = 0.0 if coarse is None else OTHERS if problem.knots is None else OTHERS_WITH_CELLS
     names = sorted({*asked} & {*known}, key=lambda name: (name != first, list(WEIGHING).index(name)))
     for name in names:
-        if best is not None and not WEIGHING[name].pays(best.seconds - (OTHERS if first else 0.0), outputs):
+        if best is not None and not WEIGHING[name].pays(best.seconds - others, outputs):
             continue
         if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
             continue  # Fraunhofer's integral is less accurate than Fresnel's
