@@ -13,6 +13,7 @@ import numpy as np
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples
 from optics.methods.sine_samples import SineSamples
+from optics.numerics.array_library import turned
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
@@ -83,10 +84,13 @@ def slow_factor(
     pupil: tuple[np.ndarray, np.ndarray],
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
+    dtype: str = "float64",
 ) -> np.ndarray:
     """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
 
     s is the direction of ξ in the Fourier kernel e^{-ik s·u}.
+
+    dtype: type in which the phase is rounded, "float32" or "float64".
     """
     (xi, eta), (u, v), (s, t) = pupil, window, directions
     x, y = u + path.window.centre[0], v + path.window.centre[1]
@@ -95,7 +99,8 @@ def slow_factor(
     excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
     distance = np.sqrt(rho2 + excess)
     waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / path.wavelength
-    return z * z / distance**2 * np.exp(2j * np.pi * waves)
+    found: np.ndarray = turned(z * z / distance**2, waves, dtype)
+    return found
 
 
 def axis_factor(path: Path, samples: SineSamples, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -8,7 +8,6 @@ window. The sum has an error of its own, which is at most half of the error that
 
 from __future__ import annotations
 
-import math
 from bisect import bisect
 from functools import lru_cache
 
@@ -67,7 +66,7 @@ def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarra
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v)/G(ξ_a, η_b; 0, 0) Σ_ηξ L_b e^{-ik v t} P G(ξ, η; 0, 0) L_a e^{-ik u s}.
     """
-    nodes, ratio = _ratios(samples, path, u, v)
+    nodes, ratio = _ratios(samples, path, u, v, str(light.real.dtype))
     weight = lagrange_basis(samples.at, nodes).astype(light.real.dtype)
     across, down = (_interpolated_kernel(path, part, samples.at, weight) for part in (u, v))
     sums = down @ (light * _in_middle(samples, path).astype(light.dtype)) @ across.swapaxes(1, 2)
@@ -91,7 +90,9 @@ def _interpolated_kernel(path: Path, place: np.ndarray, sines: np.ndarray, weigh
     return np.asarray((kernel[:, :, None, :] * weight).reshape(len(place), -1, len(sines)))
 
 
-def _ratios(samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _ratios(
+    samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray, dtype: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Return interpolation points in sines, and the slow factor there relative to the middle, (stack, v, u, b, a).
 
     The interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. It
@@ -102,10 +103,10 @@ def _ratios(samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray) -> t
         points = samples.points_at(*directions)
         place = u[:, None, :, None, None], v[:, :, None, None, None]
         middle = slow_factor(path, points, directions, (np.zeros(1), np.zeros(1)))
-        found: np.ndarray = slow_factor(path, points, directions, place) / middle
+        found: np.ndarray = slow_factor(path, points, directions, place, dtype) * (1 / middle).astype(kind)
         return found
 
-    angle = 2 * np.pi * np.arange(12) / 12
+    angle, kind = 2 * np.pi * np.arange(12) / 12, np.result_type(dtype, np.complex64)
     rim = samples.directions(samples.outermost * np.cos(angle), samples.outermost * np.sin(angle))
     ends = [np.array([[part.min(), part.max()]]) for part in (u, v)]
     exact = ratio(rim, *ends)[..., 0, :]

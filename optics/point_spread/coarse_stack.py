@@ -12,6 +12,7 @@ import numpy as np
 
 from optics.elements.beam import Beam
 from optics.elements.torch_numbers import torch_numbers
+from optics.methods.sine_samples import SineSamples
 from optics.methods.window_sampling import TIGHTEST, WindowSampling
 from optics.methods.window_stack import WindowStack
 from optics.numerics.accuracy import AccuracyError
@@ -59,7 +60,10 @@ def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method
             return None
         if not isinstance(found[-1], WindowSampling):
             return None
-    pupil, finer = (
-        max(samples, key=lambda each: each.grid.shape) for samples in zip(*((one.pupil, one.finer) for one in found))
-    )
+    pupil = max((each.pupil for each in found), key=_across)
+    finer = max((each.finer for each in found), key=_across)
     return replace(found[0], pupil=pupil, finer=finer, rank=max(each.rank for each in found))
+
+
+def _across(samples: SineSamples) -> int:
+    return len(samples.at)

@@ -1,0 +1,150 @@
+"""PSFs as tensors of PyTorch, with gradients."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+from optics.elements.pupil import Pupil
+from optics.elements.torch_numbers import torch_numbers, with_numbers
+from optics.eye.sensor_pixels import SensorPixels
+from optics.numerics.arguments import flag, in_range, wavelength_row
+from optics.numerics.autodiff import Array, plain
+from optics.numerics.grid import Grid
+from optics.point_spread.coarse_stack import coarse_stack
+from optics.point_spread.light_batch import LightBatch, is_row
+from optics.point_spread.psf import psf as drjit_psf
+from optics.point_spread.psf_result import OF_CELLS
+from optics.torch.autograd import Evaluation, Once, common_device, torch_place
+from optics.torch.former_calls import FORMER, former_pupil
+
+__all__ = ["psf"]
+
+
+def psf(
+    pupil: Pupil | Sequence[Pupil] | None = None,
+    /,
+    wavelengths: Sequence[float] | float = (550e-9,),
+    sensor_distance: Any = None,
+    source_distance: Any = math.inf,
+    source_angle: Any = (0.0, 0.0),
+    *,
+    pixel_means: bool = False,
+    requires_grad: bool = False,
+    device: torch.device | str | None = None,
+    **view: Any,
+) -> torch.Tensor:
+    """Return `optics.psf` as a tensor, differentiable with respect to tensors in the pupil, distances and angle.
+
+    pupil: a pupil, or a sequence of pupils. Its numbers may be tensors that require gradients: the samples of a
+        `HeightMap`, `PixelRelief`, `WavefrontMap` or `MaskMap`, the control points of a `BSplineRelief`, the
+        coefficients of a `Zernike`, the waist of a `GaussianMask`, the radius, the refractive index and the focal
+        length. Tensors that require no gradients are treated as numbers.
+    wavelengths: one or several wavelengths [m] in vacuum.
+    sensor_distance, source_distance: distances [m] behind and in front of the pupil. Each is a number, or a row of
+        numbers: a sequence, or a tensor with one axis. Two rows must have the same length and are used pairwise.
+    source_angle: direction (x, y) [rad] of the source: two numbers, or a tensor of two elements.
+    pixel_means: True for the mean of the PSF over each square pixel of side dx, as a sensor measures it. False for the
+        PSF at the middle of each pixel.
+    requires_grad: True to raise an error if no tensor requires a gradient.
+    device: device of the result. None: the device of the tensors that require gradients, or the processor.
+    view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.
+
+    Returns a tensor (pupil, distance, wavelength, y, x) [1/m²], float32 unless dtype="float64". It has an axis of
+    pupils only if a sequence of pupils is passed, and an axis of distances only if a distance is a row. Each gradient
+    has the device and the precision of its tensor. Only first derivatives are available.
+
+    A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
+
+    Raises:
+        ValueError: an argument is invalid; the message names it with its value and valid range. See `optics.psf`.
+        AccuracyError: see `optics.psf`.
+        BackendError: RHABDOM_DEVICE requires a GPU that torch cannot use.
+        RuntimeError: second derivatives are requested.
+    """
+    former = {name: view.pop(name) for name in FORMER if name in view}
+    if former or isinstance(pupil, torch.Tensor):
+        device = getattr(former.get("heights", pupil), "device", None) if device is None else device
+        pupil = former_pupil(pupil, former)
+    if view.get("field"):
+        raise ValueError("field: only `optics.psf` returns it; this function returns the intensity")
+    light = LightBatch.from_arguments(pupil, sensor_distance, source_distance, source_angle)
+    lambdas, numbers = wavelength_row(wavelengths), torch_numbers(light)
+    if flag("requires_grad", requires_grad) and not numbers:
+        raise ValueError("no tensor requires a gradient: at least one must have requires_grad=True")
+    place = torch.device(device) if device is not None else common_device(numbers)
+    if not torch.is_grad_enabled():
+        light, numbers = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()}), {}
+    integrated = flag("pixel_means", pixel_means) and view.get("method") not in OF_CELLS
+    pixels = _pixels(light, lambdas, view) if integrated else None
+    view = _completed(view if pixels is None else {**view, **vars(pixels.samples)})
+    found = _images(light, numbers, lambdas, view).to(place)
+    if pixels is not None:
+        rows, columns = (torch.tensor(part).to(found) for part in (pixels.rows, pixels.columns))
+        found = rows @ found @ columns.T
+    found = found.unflatten(0, (len(light.pupils), len(light.distances)))
+    found = found if is_row(sensor_distance) or is_row(source_distance) else found[:, 0]
+    return found[0] if isinstance(pupil, Pupil) else found
+
+
+def _images(
+    light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
+) -> torch.Tensor:
+    """Return the PSFs of all members of a batch, (member, wavelength, y, x).
+
+    At coarse tolerances, PyTorch computes members with the same pupil and sensor's distance as one stack. Dr.Jit
+    computes all others.
+    """
+    images: dict[int, torch.Tensor] = {}
+    if torch_place() == "cpu" and all(tensor.device.type == "cpu" for tensor in numbers.values()):
+        images = _stacked(light, numbers, wavelengths, view)
+    rest = [place for place in range(len(light.members)) if place not in images]
+    if rest:
+
+        def others(own: Sequence[Array]) -> Array:
+            changed = with_numbers(light, dict(zip(numbers, own, strict=True)))
+            return changed.images(rest, wavelengths, view)
+
+        computed = Evaluation.apply(others, *numbers.values())
+        if len(rest) == len(light.members):
+            return computed
+        images |= dict(zip(rest, computed, strict=True))
+    return torch.stack([images[place] for place in range(len(images))])
+
+
+def _stacked(
+    light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
+) -> dict[int, torch.Tensor]:
+    """Return the PSFs of those members that a stack computes within the tolerance, (wavelength, y, x), by index."""
+    found: dict[int, torch.Tensor] = {}
+    fixed = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()})
+    asked = wavelengths, Grid(view["shape"], view["dx"], view["centre"]), view["dtype"]
+    without = carrying = fixed.stacks(*asked, np.asarray)
+    if numbers:
+        once = with_numbers(light, {name: Once.apply(tensor) for name, tensor in numbers.items()})
+        carrying = once.stacks(*asked, torch.from_numpy)
+    for (places, own), (_, plain_stack) in zip(carrying, without, strict=True):
+        part = coarse_stack(own, plain_stack, view["tolerance"], view["method"])
+        if part is not None:
+            kept = zip(places, torch.as_tensor(part[0]), part[1].all(axis=1), strict=True)
+            found |= {place: image for place, image, met in kept if met}
+    return found
+
+
+def _completed(view: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `optics.psf` for window, tolerance and method, with its defaults."""
+    known = {name: value.default for name, value in inspect.signature(drjit_psf).parameters.items()}
+    named = ("dx", "shape", "tolerance", "method", "dtype", "centre")
+    return {name: known[name] for name in named} | dict(view)
+
+
+def _pixels(light: LightBatch, wavelengths: np.ndarray, view: Mapping[str, Any]) -> SensorPixels:
+    asked = _completed(view)
+    window = Grid(asked["shape"], asked["dx"], asked["centre"])
+    tolerance = in_range("tolerance", asked["tolerance"], 1e-12, 0.5)
+    return SensorPixels.around(window, light.cutoff(wavelengths), tolerance)
