@@ -45,8 +45,8 @@ RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
 # light; cycles for the edge; the same, relative to the cycles of the rays at the edge; exponent of the tolerance.
 NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 3.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
-CELL_CYCLES = 0.5  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
-DERIVATIVE_PART = 0.1  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
+CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
+DERIVATIVE_PART = 0.2  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
 # Choices: sampling densities and sharpnesses of the edge per octave; equal ones share arrays and tables.
 STEPS, EDGES = 4, 8
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
@@ -126,9 +126,11 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
     if fine or problem.all_light or problem.pixelated is not None:
         return None
     half = max(problem.window.own_half_width, problem.window.dx)
-    density, of_check = _densities(problem, half)
-    pupil = _samples(problem, half, density, RIPPLES[0], 0.0)
-    finer = _samples(problem, half, of_check, RIPPLES[1], SHIFT)
+    density = 2.0 ** (math.ceil(STEPS * math.log2(_density(problem, half)) - 1e-9) / STEPS)
+    pupil, finer = (
+        _samples(problem, half, each, ripple, shift)
+        for each, ripple, shift in zip((density, FINER * density), RIPPLES, (0.0, SHIFT), strict=True)
+    )
     if pupil is None or finer is None:
         return None
     rank = window_rank(problem, pupil, half)
@@ -144,11 +146,8 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
     return WindowSampling(pupil, finer, rank, half, seconds, size)
 
 
-def _densities(problem: Problem, half: float) -> tuple[float, float]:
-    """Return the numbers of samples per radius, of the PSF and of its check, which does not include derivatives.
-
-    They are also the numbers of cycles per radius that the samples resolve.
-    """
+def _density(problem: Problem, half: float) -> float:
+    """Return the number of samples per radius, which is also the number of cycles per radius that they resolve."""
     radius, tolerance = problem.radius, problem.tolerance
     along, outward = problem.sampled_slopes.to_window(problem.distance, problem.window.centre, problem.medium_n)
     cycles = np.sort(along) * radius / (problem.wavelength * problem.medium_n)
@@ -156,27 +155,16 @@ def _densities(problem: Problem, half: float) -> tuple[float, float]:
     reach = float(cycles[max(0, math.ceil(len(cycles) * (1 - share)) - 1)])
     rim = float(np.median(along[outward > RIM])) * radius / (problem.wavelength * problem.medium_n)
     window = half * radius / (problem.wavelength * problem.distance)
+    cells = 0.0 if problem.knots is None else (len(problem.knots.borders) - 1) * CELL_CYCLES
+    sharp = EDGE_CYCLES + RIM_CYCLES * rim
+    if problem.differentiated:
+        wavefront = problem.light.pupil.wavefront
+        # High modes grow outside the circle, so that their derivatives need a sharper edge.
+        sharp = sharp * DERIVATIVE_PART**EXPONENT + (wavefront.order if isinstance(wavefront, Zernike) else 0)
+    edge = (sharp + cells) * (tolerance / 0.01) ** EXPONENT
     # The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to the stopband.
     widest = SoftEdge(PASSBAND, 1.0, RIPPLES[1]).reach / EDGE_REACH * 2.0 ** (1 / EDGES)
-
-    def stepped(edge: float) -> float:
-        cycles = window + reach + edge * (tolerance / 0.01) ** EXPONENT + problem.mask_detail * radius
-        return 2.0 ** (math.ceil(STEPS * math.log2(max(cycles, widest + window / 2)) - 1e-9) / STEPS)
-
-    sharp = EDGE_CYCLES + RIM_CYCLES * rim
-    return stepped(_edge_of_derivatives(problem, sharp) if problem.differentiated else sharp), FINER * stepped(sharp)
-
-
-def _edge_of_derivatives(problem: Problem, sharp: float) -> float:
-    """Return the cycles per radius for the edge and for derivatives, at a tolerance of 0.01.
-
-    sharp: those for the edge, without derivatives.
-    """
-    wavefront = problem.light.pupil.wavefront
-    # High modes grow outside the circle, so that their derivatives need a sharper edge.
-    order = wavefront.order if isinstance(wavefront, Zernike) else 0
-    cells = 0.0 if problem.knots is None else (len(problem.knots.borders) - 1) * CELL_CYCLES
-    return sharp * DERIVATIVE_PART**EXPONENT + order + cells
+    return max(window + reach + edge + problem.mask_detail * radius, widest + window / 2)
 
 
 def _samples(problem: Problem, half: float, density: float, ripple: float, shift: float) -> SineSamples | None:
