@@ -40,13 +40,13 @@ def coarse_stack(
     if sampling is None:
         return None
     images = stack.intensity(sampling)
-    errors = without.errors(sampling, plain(images))
-    return images, errors <= tolerance  # a dark window has no error, and is left to other methods
+    met: np.ndarray = without.errors(sampling, plain(images)) <= tolerance
+    return images, met  # a dark window has no error, and is left to other methods
 
 
 def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method: str) -> WindowSampling | None:
     """Return samples that are sufficient for the whole stack; None if another method is chosen for a part of it."""
-    wavelength, found = min(without.wavelengths), []
+    wavelength, found = min(without.wavelengths), list[WindowSampling]()
     distances = [source.distance for source in without.sources]
     for place in {int(np.argmin(distances)), int(np.argmax(distances))}:
         setup = Setup(without.distance, without.sources[place], without.window, tolerance, method, without.dtype)
@@ -55,11 +55,12 @@ def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method
             beam = Beam(stack.pupil, stack.sources[place], wavelength, stack.distance)
             request = replace(request, problem=request.problem.differentiated_by(beam))
         try:
-            found.append(request.planned()[1])
+            sampling = request.planned()[1]
         except AccuracyError:
             return None
-        if not isinstance(found[-1], WindowSampling):
+        if not isinstance(sampling, WindowSampling):
             return None
+        found.append(sampling)
     pupil = max((each.pupil for each in found), key=_across)
     finer = max((each.finer for each in found), key=_across)
     return replace(found[0], pupil=pupil, finer=finer, rank=max(each.rank for each in found))

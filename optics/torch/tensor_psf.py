@@ -131,8 +131,8 @@ def _stacked(
     for (places, own), (_, plain_stack) in zip(carrying, without, strict=True):
         part = coarse_stack(own, plain_stack, view["tolerance"], view["method"])
         if part is not None:
-            kept = zip(places, torch.as_tensor(part[0]), part[1].all(axis=1), strict=True)
-            found |= {place: image for place, image, met in kept if met}
+            images, met = torch.as_tensor(part[0]), np.all(part[1], axis=1)
+            found |= {place: image for place, image, right in zip(places, images, met, strict=True) if right}
     return found
 
 
