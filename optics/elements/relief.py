@@ -205,8 +205,7 @@ class HeightMap(Relief):
     def height(self, x: Array, y: Array) -> Array:
         rows, columns = self._heights.shape
         if _open_grid(x, y):
-            found: np.ndarray = _basis(y[:, 0], rows) @ self._coefficients @ _basis(x[0], columns).T
-            return found
+            return _basis(y[:, 0], rows) @ self._coefficients @ _basis(x[0], columns).T
         values = self._values(x)
         (column, across), (row, along) = _cell(x, columns), _cell(y, rows)
         stride = like(row, _width(columns))
@@ -214,8 +213,7 @@ class HeightMap(Relief):
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
         """Return heights (y, x) at positions in units of the radius; NumPy arrays without derivatives."""
-        found: np.ndarray = self.height(at[None, :], at[:, None])
-        return found
+        return np.asarray(self.height(at[None, :], at[:, None]))
 
     def bandwidth(self, level: float) -> float:
         return band_of(self._heights, level)

@@ -91,28 +91,38 @@ class Problem:
 
     @classmethod
     def from_beam(
-        cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32", derivatives: bool = True
+        cls,
+        beam: Beam,
+        window: Grid,
+        tolerance: float,
+        dtype: str = "float32",
+        derivatives: bool = True,
+        fixed: Beam | None = None,
     ) -> Problem:
         """Return the problem for a beam that passes a pupil and arrives at a window.
 
         derivatives: whether the samples must also be suitable for the derivatives that the beam carries.
+        fixed: the same light without derivatives. It is necessary if the beam carries tensors of PyTorch.
 
         Raises:
             ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], the dtype is invalid, or a
-                tensor of PyTorch requires a gradient.
+                tensor of PyTorch requires a gradient without `fixed`.
         """
         distance = positive("sensor_distance", beam.distance, carried=True)
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
         precision(dtype)
-        plain = Beam(beam.pupil, beam.source.plain, beam.wavelength, distance)
-        if not (derivatives and carries_derivatives(beam)):
-            return _problem(plain, window, tolerance, dtype)
-        refuse_torch(beam)
-        return _for_derivatives(plain, window, tolerance, dtype, beam)
-
-    def differentiated_by(self, beam: Beam) -> Problem:
-        """Return the problem for derivatives with respect to numbers of the same light, also of PyTorch."""
-        return _for_derivatives(self.light, self.window, self.tolerance, self.dtype, beam)
+        plain = fixed or Beam(beam.pupil, beam.source.plain, beam.wavelength, distance)
+        if fixed is None:
+            if not (derivatives and carries_derivatives(beam)):
+                return _problem(plain, window, tolerance, dtype)
+            refuse_torch(beam)
+        pupil, wavelength = beam.pupil, beam.wavelength
+        found = _differentiated(plain, window, tolerance, dtype, derivative_knots(pupil, wavelength))
+        # A small change of the angle breaks the symmetry of light along the axis.
+        still = not any(map(carries_derivative, beam.source.angle))
+        symmetric = found.symmetric and still and pupil.rotationally_symmetric(wavelength)
+        even = found.even and still and pupil.mirror_symmetric(wavelength)
+        return replace(found, moves=carries_derivative(beam.distance), symmetric=symmetric, even=even)
 
     @cached_property
     def slopes(self) -> Slopes:
@@ -268,19 +278,6 @@ class Problem:
 def _differentiated(beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None) -> Problem:
     part = DETAIL_PART / (1 if knots else FINER_DETAIL)
     return replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
-
-
-def _for_derivatives(plain: Beam, window: Grid, tolerance: float, dtype: str, beam: Beam) -> Problem:
-    """Return the problem of light without derivatives, for derivatives with respect to the numbers of `beam`."""
-    pupil, knots = beam.pupil, derivative_knots(beam.pupil, beam.wavelength)
-    found = _differentiated(plain, window, tolerance, dtype, knots)
-    moves, turns = carries_derivative(beam.distance), any(map(carries_derivative, beam.source.angle))
-    # A small change of the angle breaks the symmetry of light along the axis.
-    symmetric = found.symmetric and not turns and pupil.rotationally_symmetric(beam.wavelength)
-    even = found.even and not turns and pupil.mirror_symmetric(beam.wavelength)
-    if (moves, symmetric, even) == (found.moves, found.symmetric, found.even):
-        return found
-    return replace(found, moves=moves, symmetric=symmetric, even=even)
 
 
 @lru_cache(maxsize=256)

@@ -12,6 +12,7 @@ import numpy as np
 
 from optics.elements.beam import Beam
 from optics.elements.torch_numbers import torch_numbers
+from optics.methods.problem import Problem
 from optics.methods.sine_samples import SineSamples
 from optics.methods.window_sampling import TIGHTEST, WindowSampling
 from optics.methods.window_stack import WindowStack
@@ -53,7 +54,8 @@ def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method
         request = setup.request(without.pupil, wavelength)
         if torch_numbers((stack.pupil, stack.sources, stack.distance)):
             beam = Beam(stack.pupil, stack.sources[place], wavelength, stack.distance)
-            request = replace(request, problem=request.problem.differentiated_by(beam))
+            problem = Problem.from_beam(beam, without.window, tolerance, without.dtype, fixed=request.beam)
+            request = replace(request, problem=problem)
         try:
             sampling = request.planned()[1]
         except AccuracyError:

@@ -61,7 +61,6 @@ from optics.point_spread.window_cost import check_seconds, check_window, window_
 
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
 
-
 # Each function returns the samplings with which its method meets a problem's tolerance. There may be none or several.
 EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "hankel": hankel,
@@ -126,8 +125,8 @@ WEIGHING = {
     "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
     "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
-# Choices: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances. Cells between
-# knots, which derivatives with respect to samples of maps need, take longer.
+# Choices: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances; without and with
+# cells between knots.
 OTHERS, OTHERS_WITH_CELLS = 4e-3, 15e-3
 
 
@@ -155,9 +154,10 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
     coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None
-    first = "" if coarse is None else "low_rank"
     others = 0.0 if coarse is None else OTHERS if problem.knots is None else OTHERS_WITH_CELLS
-    names = sorted({*asked} & {*known}, key=lambda name: (name != first, list(WEIGHING).index(name)))
+    names = sorted(
+        {*asked} & {*known}, key=lambda name: (name != "low_rank" or coarse is None, list(WEIGHING).index(name))
+    )
     for name in names:
         if best is not None and not WEIGHING[name].pays(best.seconds - others, outputs):
             continue
@@ -242,9 +242,8 @@ def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
         return "; an approximation predicts no error of derivatives"
     if problem.knots is None:
         return "; derivatives exclude approximations"
-    if isinstance(best, WindowSampling):
-        return f"; derivatives with respect to samples of maps need more samples ({problem.knots.maps})"
-    return f"; derivatives with respect to samples of maps need nodes in each cell between knots ({problem.knots.maps})"
+    needed = "more samples" if isinstance(best, WindowSampling) else "nodes in each cell between knots"
+    return f"; derivatives with respect to samples of maps need {needed} ({problem.knots.maps})"
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:

@@ -14,7 +14,7 @@ import optics.torch
 from optics import AccuracyError, BSplineRelief, HeightMap, PixelRelief, Pupil
 from optics.elements.relief import Relief
 from optics.numerics import device, renamed
-from optics.torch.autograd import common_device
+from optics.torch_graph import common_device
 
 R, UM = 15e-6, 1e-6
 VIEW = {"sensor_distance": 150e-6, "dx": 1e-6, "shape": (21, 17)}

@@ -13,7 +13,7 @@ from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, make_ready
 from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["Evaluation", "Once", "common_device", "torch_place"]
+__all__ = ["DrJitOperation", "Once", "common_device", "torch_place"]
 
 
 class Once(torch.autograd.Function):
@@ -28,7 +28,7 @@ class Once(torch.autograd.Function):
         return FirstDerivative.apply(gradient.requires_grad_())[0] if torch.is_grad_enabled() else gradient
 
 
-class Evaluation(torch.autograd.Function):
+class DrJitOperation(torch.autograd.Function):
     """A function of Dr.Jit arrays as an operation of PyTorch. Its graph serves any number of backward passes."""
 
     @staticmethod

@@ -1,29 +1,44 @@
-"""PSFs as tensors of PyTorch, with gradients."""
+"""PSFs and images inside a PyTorch graph. Gradients flow from a loss back to every tensor in the pupil.
+
+psf(pupil, wavelengths, sensor_distance, ...)     PSFs of one or several pupils, as a tensor
+camera_image(scene, pupil, sensor, ...)           electrons in the pixels of a camera
+PointSpread(radius, wavelengths, ...)             module with a learnable relief
+
+heights = torch.zeros(32, 32, dtype=torch.float64, requires_grad=True)    # [m]
+pupil = optics.Pupil(30e-6, optics.HeightMap(heights), thin_lens_focal_length=240e-6)
+psf = optics.torch.psf(pupil, 550e-9, 240e-6, dx=1e-6, shape=(33, 33))    # tensor (wavelength, y, x)
+loss(psf).backward()                                                      # fills heights.grad
+"""
 
 from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import torch
 
 from optics.elements.pupil import Pupil
+from optics.elements.relief import BSplineRelief, HeightMap, Relief
 from optics.elements.torch_numbers import torch_numbers, with_numbers
+from optics.eye import camera
 from optics.eye.sensor_pixels import SensorPixels
-from optics.numerics.arguments import flag, in_range, wavelength_row
+from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths, wavelength_row
 from optics.numerics.autodiff import Array, plain
 from optics.numerics.grid import Grid
+from optics.numerics.number_types import full_precision
+from optics.numerics.renamed import warn_once
 from optics.point_spread.coarse_stack import coarse_stack
 from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
 from optics.point_spread.psf_result import OF_CELLS
-from optics.torch.autograd import Evaluation, Once, common_device, torch_place
-from optics.torch.former_calls import FORMER, former_pupil
+from optics.torch_graph import DrJitOperation, Once, common_device, torch_place
 
-__all__ = ["psf"]
+__all__ = ["PointSpread", "camera_image", "psf"]
+
+FORMER = "heights", "radius", "n", "pupil"  # arguments that `psf` had before it accepted pupils
 
 
 def psf(
@@ -70,7 +85,7 @@ def psf(
     former = {name: view.pop(name) for name in FORMER if name in view}
     if former or isinstance(pupil, torch.Tensor):
         device = getattr(former.get("heights", pupil), "device", None) if device is None else device
-        pupil = former_pupil(pupil, former)
+        pupil = _former_pupil(pupil, former)
     if view.get("field"):
         raise ValueError("field: only `optics.psf` returns it; this function returns the intensity")
     light = LightBatch.from_arguments(pupil, sensor_distance, source_distance, source_angle)
@@ -110,7 +125,7 @@ def _images(
             changed = with_numbers(light, dict(zip(numbers, own, strict=True)))
             return changed.images(rest, wavelengths, view)
 
-        computed = Evaluation.apply(others, *numbers.values())
+        computed = DrJitOperation.apply(others, *numbers.values())
         if len(rest) == len(light.members):
             return computed
         images |= dict(zip(rest, computed, strict=True))
@@ -148,3 +163,104 @@ def _pixels(light: LightBatch, wavelengths: np.ndarray, view: Mapping[str, Any])
     window = Grid(asked["shape"], asked["dx"], asked["centre"])
     tolerance = in_range("tolerance", asked["tolerance"], 1e-12, 0.5)
     return SensorPixels.around(window, light.cutoff(wavelengths), tolerance)
+
+
+def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any = None, **view: Any) -> torch.Tensor:
+    """Return the electrons of `optics.camera_image` as a tensor (channel, y, x) with gradients to the pupil's tensors.
+
+    scene: see `optics.camera_image`. It carries no gradients.
+    pupil: see `psf`.
+    sensor: a sensor with bits=None, because rounded numbers have no derivatives.
+    device: device of the result, see `psf`.
+    view: depth, samples_per_pixel, field_zones, rng, sensor_distance and tolerance, see `optics.camera_image`.
+
+    Raises:
+        ValueError: an argument is invalid; the message names it with its value and valid range.
+        AccuracyError: see `optics.psf`.
+    """
+    numbers = torch_numbers(of_kind("pupil", pupil, Pupil, "optics.Pupil(1e-3)"))
+    place = torch.device(device) if device is not None else common_device(numbers)
+    if not numbers or not torch.is_grad_enabled():
+        fixed = with_numbers(pupil, {name: plain(tensor)[()] for name, tensor in numbers.items()})
+        return torch.from_numpy(np.asarray(camera.camera_image(scene, fixed, sensor, **view))).to(place)
+
+    def electrons(own: Sequence[Array]) -> Array:
+        return camera.camera_image(scene, with_numbers(pupil, dict(zip(numbers, own, strict=True))), sensor, **view)
+
+    return DrJitOperation.apply(electrons, *numbers.values()).to(place)
+
+
+def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
+    """Return the pupil of a call that passes heights and arguments of `Pupil`."""
+    if heights is None and given.keys() == {"pupil"}:
+        return given["pupil"]
+    heights = of_kind("heights", given.get("heights", heights), torch.Tensor, "torch.zeros(4, 4)")
+    if "radius" not in given:
+        raise ValueError("radius is missing: must be that of the pupil [m]; or pass optics.Pupil(radius, heights)")
+    radius, n = (full_precision(name, given.get(name, 1.5)) for name in ("radius", "n"))
+    return Pupil(radius, _guessed(heights, 5), n=n, **(given.get("pupil") or {}))
+
+
+def _guessed(heights: torch.Tensor, stacklevel: int) -> Relief:
+    """Return the relief for a tensor of heights in a former call: 4 x 4 heights are control points.
+
+    stacklevel: number of calls from `warnings.warn` to the user's code.
+    """
+    full_precision("heights", heights)
+    if heights.shape != (4, 4):
+        return HeightMap(heights)
+    warn_once(
+        "heights of optics.torch",
+        "heights of 4 x 4 are taken as control points: pass optics.BSplineRelief(heights) in a Pupil to say so, or "
+        "optics.HeightMap(heights) for samples; the guess will be removed in version 0.3",
+        stacklevel,
+    )
+    return BSplineRelief(heights)
+
+
+class PointSpread(torch.nn.Module):
+    """Module with a learnable relief: forward() returns the pupil's PSF, (wavelength, y, x).
+
+    radius: radius [m] of the pupil.
+    wavelengths, sensor_distance, dx, shape, ...: arguments of `psf`.
+    heights: initial relief, a `BSplineRelief`, `HeightMap` or `PixelRelief`. None: a flat `BSplineRelief`. A tensor of
+        heights [m] is interpreted as control points if it is 4 x 4, and otherwise as samples of a `HeightMap`.
+    n: refractive index of the relief.
+    unit: length [m] of one unit of the learnt parameter. Choose it such that the parameter is near 1, as optimisers
+        expect.
+    pupil: further arguments of `optics.Pupil`, as a dictionary.
+
+    The only learnt parameter is `relief`, which equals heights / unit.
+    """
+
+    def __init__(
+        self,
+        radius: float,
+        wavelengths: Sequence[float] | float = (550e-9,),
+        *,
+        heights: Relief | torch.Tensor | None = None,
+        n: float = 1.5,
+        unit: float = 1e-6,
+        pupil: Mapping[str, Any] | None = None,
+        **view: Any,
+    ) -> None:
+        super().__init__()
+        relief = BSplineRelief(np.zeros((4, 4))) if heights is None else heights
+        if not isinstance(relief, Relief):
+            relief = _guessed(of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)"), 4)
+        start = relief.control_points if isinstance(relief, BSplineRelief) else getattr(relief, "samples", None)
+        if start is None:
+            raise ValueError(f"heights = {shown(relief)}: must be a BSplineRelief, HeightMap or PixelRelief")
+        self.relief = torch.nn.Parameter(torch.tensor(plain(start)) / unit)
+        self._kind: Callable[[torch.Tensor], Relief] = type(relief)
+        self.radius, self.n, self.unit, self.pupil = radius, n, unit, dict(pupil or {})
+        self.view = {"wavelengths": vacuum_wavelengths(wavelengths), **view}
+
+    @property
+    def heights(self) -> torch.Tensor:
+        """Heights [m] of the relief: the learnt parameter times its unit."""
+        return self.relief * self.unit
+
+    def forward(self) -> torch.Tensor:
+        pupil = Pupil(self.radius, self._kind(self.heights), n=self.n, **self.pupil)
+        return psf(pupil, device=self.relief.device, **self.view)
