@@ -116,12 +116,11 @@ class Problem:
             if not (derivatives and carries_derivatives(beam)):
                 return _problem(plain, window, tolerance, dtype)
             refuse_torch(beam)
-        pupil, wavelength = beam.pupil, beam.wavelength
-        found = _differentiated(plain, window, tolerance, dtype, derivative_knots(pupil, wavelength))
+        found = _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
         # A small change of the angle breaks the symmetry of light along the axis.
         still = not any(map(carries_derivative, beam.source.angle))
-        symmetric = found.symmetric and still and pupil.rotationally_symmetric(wavelength)
-        even = found.even and still and pupil.mirror_symmetric(wavelength)
+        symmetric = found.symmetric and still and beam.pupil.rotationally_symmetric(beam.wavelength)
+        even = found.even and still and beam.pupil.mirror_symmetric(beam.wavelength)
         return replace(found, moves=carries_derivative(beam.distance), symmetric=symmetric, even=even)
 
     @cached_property
@@ -183,9 +182,7 @@ class Problem:
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
-        """Return the aperture with nodes in the cells between knots that are suitable for derivatives.
-
-        The result is None if there would be too many cells.
+        """Return the aperture with nodes in the cells between knots, for derivatives; None for too many cells.
 
         band: highest frequency [1/m] in the pupil's plane of the light that must be resolved. None: the light that
             arrives at any point of the window, as in `turning`.
@@ -242,10 +239,7 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Largest phase, in waves, before whole waves are subtracted.
-
-        It is the longest path plus the steepest slope times the radius, both in waves.
-        """
+        """Longest path plus the steepest slope times the radius, in waves. It bounds phases before they are reduced."""
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
         return path + self.radius * self.phase_band_inside

@@ -125,9 +125,7 @@ WEIGHING = {
     "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
     "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
-# Choices: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances; without and with
-# cells between knots.
-OTHERS, OTHERS_WITH_CELLS = 4e-3, 15e-3
+OTHERS, OTHERS_WITH_CELLS = 4e-3, 15e-3  # choices: time [s] of planning other methods after "low_rank", see `choose`
 
 
 @lru_cache(maxsize=256)
@@ -155,9 +153,8 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     best: Sampling | None = None
     coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None
     others = 0.0 if coarse is None else OTHERS if problem.knots is None else OTHERS_WITH_CELLS
-    names = sorted(
-        {*asked} & {*known}, key=lambda name: (name != "low_rank" or coarse is None, list(WEIGHING).index(name))
-    )
+    names = sorted({*asked} & {*known}, key=list(WEIGHING).index)
+    names.sort(key=lambda name: name != "low_rank" or coarse is None)
     for name in names:
         if best is not None and not WEIGHING[name].pays(best.seconds - others, outputs):
             continue
