@@ -84,7 +84,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
     rows = [[name, *values] for name, values in columns.items()]
     rows += [[name, *(_shown(v) for v in row)] for name, row in differing_settings(runs).items()]
     curves = {str(run.path): generation_statistics(run.candidates) for run in runs}
-    caption = html("<b>Best fitness so far</b> over the generations, a line per run.")
+    caption = html("<b>Best fitness so far</b> over the generations, one line for each run.")
     drawn = figure(comparison_figure({name: rows for name, rows in curves.items() if rows}), caption)
     found = table(["", *names], rows, "comparison")
     body = html("<header><h1>{} runs</h1></header>\n", len(runs)) + section(
@@ -97,7 +97,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
 def _rows(runs: Sequence[Run]) -> dict[str, list[str]]:
     """Return the values of the runs' summaries as text, by name of the table's row.
 
-    Rows in which no run differs from a simpler one are omitted: the parts of fitness if no run has costs, and the
+    Rows that would repeat a simpler row in all runs are omitted: the parts of fitness if no run has costs, and the
     vertical acuity if it equals the horizontal one.
     """
     columns = [_column(run_summary(run)) for run in runs]

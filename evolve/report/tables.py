@@ -67,7 +67,7 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
         (
             html("Its {}", hint("acuity")),
             f"{_acuities(best.phenotype)} cpd",
-            f"cycles per degree{_directions([best])}, by sampling alone",
+            f"cycles per degree{_directions([best])}; limit by receptor spacing alone",
         ),
     ]
 
@@ -163,7 +163,7 @@ def _acuities(animal: Phenotype) -> str:
 
 
 def _directions(candidates: Sequence[Candidate]) -> str:
-    """Return the order of the two acuities for a heading; "" if they are equal in all candidates."""
+    """Return ", horizontal × vertical" for the heading of acuities; "" if the two are equal in all candidates."""
     differ = any(len(set(_both_acuities(candidate.phenotype))) > 1 for candidate in candidates)
     return ", horizontal × vertical" if differ else ""
 

@@ -96,8 +96,9 @@ class Connection:
         self._pass_time(2 * LISTEN_S)
 
     def ask(self, call: Callable[[], Awaitable[Any]], timeout: float = math.inf) -> Any:
-        """Return the result of a call of Dask. By default, its duration is unlimited while the connection shows signs
-        of life.
+        """Return the result of a call of Dask.
+
+        By default, its duration is unlimited while the connection shows signs of life.
 
         Raises:
             ConnectionLost: the connection was lost during the call.

@@ -1,7 +1,7 @@
 """Compound eyes of insects and of a crustacean.
 
-All rhabdoms and rhabdomeres have the refractive index 1.363 in a medium of 1.340, as in flies (Stavenga, J. Comp.
-Physiol. A 190, 115, 2004). The indices have not been measured in the other animals.
+All rhabdoms and rhabdomeres have the refractive index 1.363 in a medium of index 1.340. These are values for flies
+(Stavenga, J. Comp. Physiol. A 190, 115, 2004). The indices of the other animals have not been measured.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
     rings: rings of ommatidia around the central one.
 
     Raises:
-        ValueError: an unknown species, or rings outside 0 to 60.
+        ValueError: the species is unknown, or the number of rings is outside 0 to 60.
     """
     return AppositionEye(HONEYBEES[one_of("species", species, HONEYBEES)].ommatidium(), rings, 2.1)
 

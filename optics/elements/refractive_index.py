@@ -96,7 +96,7 @@ class Sellmeier(Dispersion):
     poles_um2: C [µm²], one for each of the strengths.
 
     Raises:
-        ValueError: no terms, different numbers of strengths and poles, or numbers that are not finite.
+        ValueError: there are no terms, the numbers of strengths and poles differ, or a number is not finite.
     """
 
     strengths: tuple[float, ...]

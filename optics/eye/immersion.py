@@ -26,7 +26,7 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
     medium: None: air
 
     Raises:
-        ValueError: an argument of another type.
+        ValueError: an argument has the wrong type.
     """
     of_kind("eye", eye, EyeSpec, "optics.Eye()")
     if medium is not None:

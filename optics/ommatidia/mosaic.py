@@ -101,7 +101,7 @@ class AppositionEye:
         1/(√3 Δφ).
 
         Raises:
-            ValueError: a negative frequency, or numbers that are not finite.
+            ValueError: a frequency is negative, or a number is not finite.
         """
         in_range("cycles_per_degree", cycles_per_degree, 0.0, 1e9)
         turn = math.radians(finite("azimuth_deg", azimuth_deg))

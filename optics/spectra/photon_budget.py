@@ -87,6 +87,6 @@ def light_level(name: str) -> float:
         of civil twilight), "sunset" (clear sky), "overcast" (midday) or "sunlight".
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: the name is unknown.
     """
     return LIGHT_LEVELS[one_of("light level", name, LIGHT_LEVELS)]

@@ -78,7 +78,7 @@ class Receptors:
         return replace(self, mosaic=None if mosaic is None else _mosaic(mosaic, len(self.types)))
 
     def layout(self, resolution: tuple[int, int]) -> np.ndarray | None:
-        """Type of every receptor, (h, w) int; None without a mosaic."""
+        """Return the type of every receptor, (h, w) int; None without a mosaic."""
         readable("resolution", resolution)
         if self.mosaic is None:
             return None
@@ -185,7 +185,7 @@ def receptors_of(receptors: Any) -> Receptors:
     receptors: `Receptors`, a name such as "rgb" or "lms" (the keys of RECEPTORS), or a sequence of receptor types.
 
     Raises:
-        ValueError: an unknown name (the message suggests the most similar one), no types, or invalid types.
+        ValueError: a name is unknown (the message suggests a similar one), or there are no types or invalid ones.
     """
     if isinstance(receptors, Receptors):
         return receptors

@@ -25,7 +25,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         least_return, episode_steps, spectra, medium, render_mode: see `sim.make_vec_env`
 
     Raises:
-        ValueError: a bad argument.
+        ValueError: an argument is invalid.
     """
 
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
@@ -45,8 +45,10 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     @property
     def state(self) -> Any:
-        """Current state of the world as a batch of one, as its physics represents it: `WorldState` for the built-in
-        tasks."""
+        """Current state of the world as a batch of one, in its physics' own type.
+
+        This is `WorldState` for the built-in tasks.
+        """
         return self._batch.state
 
     def reset(

@@ -24,14 +24,14 @@ from sim.tasks.simulation import LEAST_RETURN, Simulation
 
 
 class EyesVecEnv(OneEnvironment):
-    """Many worlds of one task: a built-in one, a `sim.BatchTask`, a `sim.Task`, or a `sim.Encounter` whose animals are
-    alike and learn a single policy.
+    """Many worlds of one task.
 
-    Observations, rewards, endings and `info` are documented in docs/tasks.md. When an episode ends, its world starts
-    the next one automatically. The returned observation is then the first of the new episode, and
-    info["terminal_observation"] is the last of the old one. `reset_infos` contains the info of each episode's first
-    observation. A world's episodes depend only on the seed and on the world's index, not on the number of worlds. In an
-    encounter, the rows of the first animal in all worlds come first, followed by the rows of the second animal.
+    In a `sim.Encounter`, all animals must be alike and learn a single policy. The rows of the first animal in all
+    worlds come first, followed by the rows of the second animal. Observations, rewards, endings and `info` are
+    documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
+    observation is then the first observation of the new episode, and info["terminal_observation"] is the last
+    observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
+    episodes depend only on the seed and on the world's index, not on the number of worlds.
 
     simulation: the worlds
     renderers: renderers of every agent's eyes
@@ -110,11 +110,12 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations)
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
-        """Seed each world with its own number at the next reset. Its episodes are then those of a single environment
-        with this seed. None: the world continues its own random numbers.
+        """Seed each world with its own number at the next reset; None: the world continues its random numbers.
+
+        An episode is then the same as in a single environment with this seed.
 
         Raises:
-            ValueError: another number of seeds, or a seed that is not a whole number from 0 on.
+            ValueError: there is not one seed per world, or a seed is not a whole number above or equal to 0.
         """
         self._calls.require_open()
         own = self.simulation.streams.episodes

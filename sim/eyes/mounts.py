@@ -81,8 +81,9 @@ class Mount:
         raise ValueError(f"Mount: no {what} {self.on!r} in the model{did_you_mean(self.on, names)}")
 
     def local(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the position of the pupil [m] (3,) and the eye's frame (3, 3), in the frame of the object that carries
-        the eye.
+        """Return the position of the pupil [m] (3,) and the eye's frame (3, 3).
+
+        Both are given in the frame of the object that carries the eye.
 
         The columns of the eye's frame are (right, up, ahead).
         """

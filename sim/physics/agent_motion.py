@@ -63,8 +63,9 @@ class AgentPhysics:
 
     threads: threads of MuJoCo's batched step, see `sim.physics.mujoco_batch`
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
-        obstacles are simulated in models of these obstacles alone (`local_contacts`). Either attribute is None if the
-        model does not allow the method. If False, MuJoCo simulates all agents in the whole world.
+        obstacles are simulated in models of these obstacles alone (`local_contacts`). The attribute `free_motion` or
+        `local_contacts` is None if the model does not support the method. If False, MuJoCo simulates all agents in the
+        whole world.
 
     Raises:
         ValueError: the model lacks the agent's joints, actuators or touch sensor, or an object could collide.
@@ -92,7 +93,7 @@ class AgentPhysics:
         path, speed = self.free_motion(agents.velocity, velocity)
         met = self.free_motion.obstacles_in_reach(agents.position, path)
         free = ~met.any(axis=1) & self.free_motion.obeys(velocity)
-        # Also false for NaN, so that MuJoCo handles these agents.
+        # The comparison is also false for NaN, so that MuJoCo simulates these agents.
         free &= (np.abs(agents.velocity) < UNSTABLE_SPEED).all(axis=-1)
         n = len(velocity)
         motion = Motion(agents.position[:, None] + path, speed, np.zeros(n, bool), np.zeros(n, bool))
@@ -123,8 +124,10 @@ class AgentPhysics:
         return self._motion(agents.position, *self._step_batch(models, *self._start_of(agents, velocity)))
 
     def _start_of(self, agents: Agents | WorldState, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's states (n, ...), and controls (n, substep, nu) for a constant commanded velocity [m/s] (n,
-        2)."""
+        """Return MuJoCo's states (n, ...), and its controls (n, substep, nu).
+
+        The commanded velocity [m/s] (n, 2) is constant.
+        """
         initial = self._initial(len(velocity))
         initial[:, self._columns.position] = agents.position - self._columns.origin
         initial[:, self._columns.heading] = agents.heading
@@ -142,8 +145,10 @@ class AgentPhysics:
     def _untouched(
         self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's path and velocity for these speeds and commands (n, 2) with contacts disabled; see
-        sim.physics.free_motion.FreeSteps."""
+        """Return MuJoCo's path and velocity with contacts disabled, for these speeds and commands (n, 2).
+
+        See `sim.physics.free_motion.FreeSteps`.
+        """
         model = copy.copy(self._model)
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         initial = self._initial(len(speed))

@@ -133,8 +133,7 @@ class EyeRenderer:
     # --- signals and labels
 
     def signals(self, poses: Placed, light: np.ndarray | None = None) -> np.ndarray:
-        """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32: a² sum_b
-        weights[channel, b] radiance_b.
+        """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
         poses: poses of every world: a list of their MjData after mj_forward or mj_step, or `sim.Poses`, arrays stacked
             over worlds. The MjData of a single world need not be in a list. For built-in worlds, a state is also
@@ -142,8 +141,9 @@ class EyeRenderer:
         light: factors of all lights of each world, (env, band); None: lights as in the model
 
         Raises:
-            ValueError: another number of worlds, another model's poses, poses that are not finite or not computed yet,
-                a difference from the model that is not in `varied`, or light of another shape.
+            ValueError: the number of worlds or the shape of `light` is wrong; the poses belong to another model, are
+                not finite or have not been computed yet; or the worlds differ from the model in a part that is not in
+                `varied`.
         """
         return self.launch(poses, light).wait()
 

@@ -82,7 +82,7 @@ def choose_model_fidelity(
         at these moments, over receptors that bounced light reaches
 
     Raises:
-        ValueError: a tolerance that is not positive, another light, or an argument that ModelRenderer refuses.
+        ValueError: the tolerance is not positive, `light` is unknown, or ModelRenderer refuses an argument.
     """
     if light not in (*FOLLOWED, AUTO):
         raise ValueError(f"light = {light!r}: must be 'direct', 'bounce' or 'auto'")

@@ -1,5 +1,7 @@
-"""Snapshot of a model when its renderer is built. It refuses worlds that differ in ways that the renderer cannot
-show."""
+"""Snapshot of a model when its renderer is built.
+
+It refuses worlds that differ in ways that the renderer cannot show.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,7 @@ class ModelSnapshot:
 
     geoms: visible geoms
     hidden: geoms that are invisible only because their alpha is 0
-    moving: geoms that rays can hit at any pose
+    moving: geoms that the renderer can show in any pose
     resizable: geoms whose sizes may differ
     varied: geoms that may differ, with the ids of the materials that each may have (`appearances.varied_geoms`)
     """

@@ -37,8 +37,8 @@ class Course:
 
     Raises:
         ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
-            start; a start lies in the goal, has no path to it, or has only paths on which the distance from the start
-            decreases by more than MOST_FALL; or episode_steps is not a whole number above 0.
+            start; a start lies in the goal or has no suitable path to it; or episode_steps is not a whole number above
+            0. On a suitable path, the distance from the start never decreases by more than MOST_FALL.
     """
 
     drawing: str
@@ -129,7 +129,7 @@ class Course:
     def fall(self, start: Cell) -> tuple[float, Cell]:
         """Return the largest necessary decrease of the distance from a start [m], and the cell before this decrease.
 
-        An agent may be in any cell ahead of the start. From each such cell, it takes the path to the goal on which the
+        Every cell ahead of the start is considered. From each, the agent takes the path to the goal on which the
         distance from the start decreases least. The result is the largest of these decreases.
         """
         ease = self._ease(start)

@@ -1,9 +1,10 @@
 """Real eyes: published values of animals' eyes and computed ones
 
 Do the models reproduce what biologists measured and calculated for real eyes? The table compares published with
-computed values. Each row states the range in which the ratio computed/published must lie, and the command fails if a
-row leaves its range. Some ranges are wide, because the values differ for the reasons given below. These ranges only
-detect a change of the computed value; they do not claim agreement. The inputs come from `optics.animals`.
+computed values. Each row states the range in which the ratio computed/published must lie. If a ratio is outside its
+range, the command fails. Some ranges are wide, because the values differ for the reasons given below. A wide range does
+not mean that the values agree. Its only purpose is to detect a change of the computed value. The inputs come from
+`optics.animals`.
 
 **Method.** Land's sensitivity S is `optics.optical_sensitivity` in white light with k = 0.0067 per µm. Acceptance
 angles Δρ are full widths at half maximum of `optics.Ommatidium.sensitivity`, which is computed by wave optics with
@@ -11,23 +12,23 @@ waveguide modes. All rhabdoms have the refractive index 1.363 in a medium of 1.3
 Acuity is that of a hexagonal lattice.
 
 **Sources.** The last column states which part of the source was read: the article, a table, an appendix, the caption of
-a figure, the abstract, or a press release ("press"). The source of a "quoted" value was not accessible: the value comes
-from a later article, or was proposed for this page. Rows with "closed form" are compared with a formula.
+a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible, and that the
+value comes from a later article or was proposed for this page. "Closed form" means that the value comes from a formula.
 
-- Honeybees: Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1. Its Δρ is d/f. This ratio ignores diffraction,
-  so computed angles are larger, by 20 to 65 %. Electrophysiology supports them: 2.6° on average in dark-adapted eyes,
-  and less than 1.9° in the acute zone of light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017).
-  A closed pupil removes the higher modes (Stavenga 2004), so the light-adapted angle is computed from the first mode.
-  *Apis cerana* has V = 2.55 at 540 nm, just above the cut-off of the second mode at 2.405. Its angle is therefore
-  sensitive to the refractive indices. For *Apis dorsata*, S and the other columns of the table (D, f, Δρ and l) agree
-  only to within 9 %.
+- Honeybees: Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1. The published Δρ is d/f, which ignores
+  diffraction. The computed angles are therefore larger, by 20 to 65 %. Angles measured by electrophysiology agree
+  better with the computed ones: 2.6° on average in dark-adapted eyes, and less than 1.9° in the acute zone of
+  light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017). A closed pupil removes the higher modes
+  (Stavenga 2004), so the light-adapted angle is computed from the first mode. *Apis cerana* has V = 2.55 at 540 nm,
+  just above the cut-off of the second mode at 2.405. Its angle is therefore sensitive to the refractive indices. For
+  *Apis dorsata*, S and the other columns of the table (D, f, Δρ and l) agree only to within 9 %.
 - *Drosophila*: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1.
 - Blowfly: Stavenga, J. Exp. Biol. 207, 1703, 2004, caption of fig. 4. Dark-adapted angles approach d/f, and
   light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves could not be
   read. They apply to tapered rhabdomeres, whereas the model has straight ones.
 - *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The inputs are quoted.
-- *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. The receptor accepts 45° by geometrical
-  optics. The row shows by how much the PSF of the lens widens this angle.
+- *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. According to geometrical optics, the
+  acceptance angle of the receptor is 45°. The row shows by how much the PSF of the lens increases this angle.
 - Humans: Curcio et al., J. Comp. Neurol. 292, 497, 1990, abstract (199,000 cones per mm², 100,000 to 324,000 in
   individuals); Land, in Neurobiology of Arachnids, p. 53, 1985, abstract (0.42 minutes of arc between cones); Caves,
   Brandley & Johnsen, Trends Ecol. Evol. 33, 358, 2018, press release (60 cycles/degree).
@@ -53,8 +54,9 @@ uses another MTF. Duration, window and criterion are quoted.
   receptors, but only its abstract was accessible.
 - The owlfly's Δρ of 1.8°. Its eye is a superposition eye.
 - Values for tapered rhabdomeres.
-- The acuity of the wedge-tailed eagle, 140 cycles/degree, the 13 minutes of arc of the goldfish and the 0.24° of
-  dragonflies. They were read in abstracts, and are inputs of `optics.animals`, so a comparison would prove nothing.
+- The acuity of the wedge-tailed eagle (140 cycles/degree), and the angles between receptors of the goldfish (13 minutes
+  of arc) and of dragonflies (0.24°). They are inputs of `optics.animals`, so a comparison would show nothing. We read
+  them in abstracts.
 
 The command computes the table:
 
@@ -108,12 +110,12 @@ class Row:
 
 
 def land(facet: Facet) -> float:
-    """Land's sensitivity [µm² sr] in white light."""
+    """Return Land's sensitivity [µm² sr] in white light."""
     return 1e12 * optics.optical_sensitivity(facet.diameter, facet.focal_length, facet.rhabdom, facet.length)
 
 
 def first_mode_angle(eye: optics.Ommatidium, wavelength: float) -> float:
-    """Full width at half maximum [degrees] of the light in the first mode."""
+    """Return the full width at half maximum [degrees] of the light in the first mode."""
     at = np.linspace(0, 4, 801)
     power = eye.mode_power(np.radians(at), np.zeros(len(at)), wavelength)[0]
     return 2 * float(np.interp(-power[0] / 2, -power[: power.argmin()], at[: power.argmin()]))
@@ -208,7 +210,7 @@ def limits() -> list[Row]:
 
 
 def geisler_photons() -> float:
-    """Photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
+    """Return photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
 
     The budget's light is daylight. The ratio of its luminance to that of its light at 555 nm converts it.
     """
@@ -223,7 +225,7 @@ def geisler_photons() -> float:
 
 
 def ideal_sensitivities() -> np.ndarray:
-    """Contrast sensitivities of the ideal observer, (luminance, frequency)."""
+    """Return the contrast sensitivities of the ideal observer, (luminance, frequency)."""
     contrast = optics.mean_human_mtf(FREQUENCIES, 2 * math.sqrt(PUPIL_AREA / math.pi))
     area = (CYCLES / FREQUENCIES) ** 2 / 4  # the squared window has the mean 1/4
     bands = optics.SpectralBands.uniform(16, "lms")
@@ -237,7 +239,7 @@ def ideal_sensitivities() -> np.ndarray:
 
 
 def broken_bounds(rows: list[Row], ideal: np.ndarray) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = [
         f"{row.name}: {row.ratio:.4g} times the published value, must be {row.low:g} to {row.high:g} times"
         for row in rows
@@ -259,7 +261,7 @@ def table(rows: list[Row], ideal: np.ndarray) -> str:
 
 
 def draw(rows: list[Row], ideal: np.ndarray, path: Path) -> None:
-    """Computed over published values, and the ideal observer's contrast sensitivity."""
+    """Draw the computed values over the published ones, and the ideal observer's contrast sensitivity."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 6.5), layout="constrained")
