@@ -30,7 +30,7 @@ class Rings(Aperture):
         open centre.
 
     Raises:
-        ValueError: radii that do not ascend, an odd number of radii, more than 500 radii, or a radius outside [0, 1].
+        ValueError: the radii do not ascend, their number is odd or above 500, or one is outside [0, 1].
     """
 
     radii: Any

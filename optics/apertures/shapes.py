@@ -100,7 +100,7 @@ class Spider:
     rotation_deg: angle of the first vane from the x axis.
 
     Raises:
-        ValueError: vanes outside 1 to 64, or a width outside (0, 1].
+        ValueError: vanes is outside 1 to 64, or width is outside (0, 1].
     """
 
     vanes: int

@@ -28,7 +28,7 @@ Shape: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 def parabola(u: np.ndarray) -> np.ndarray:
-    """Return 1 - u², Matthiessen's profile."""
+    """Return Matthiessen's profile 1 - u² at u = r/R."""
     return 1 - u * u
 
 
@@ -75,7 +75,7 @@ class BallLens:
         lenses of fish (Matthiessen, Pflügers Archiv 27, 510, 1882).
 
         Raises:
-            ValueError: focal_ratio outside [1, 20].
+            ValueError: focal_ratio is outside [1, 20].
         """
         relative = generalized_luneburg(focal_ratio)
         core, medium = float(relative(np.zeros(1))[0]), float(index_of("medium_n", medium_n).at(MIDDLE))

@@ -28,7 +28,7 @@ class PixelRelief(Relief):
     A Dr.Jit or PyTorch tensor may carry derivatives. For smooth surfaces use `HeightMap`, which interpolates.
 
     Raises:
-        ValueError: not square, empty, or not finite.
+        ValueError: the array is not square, is empty, or contains a number that is not finite.
     """
 
     samples: np.ndarray | Array

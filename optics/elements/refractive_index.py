@@ -162,7 +162,7 @@ def medium(name: str) -> Dispersion:
     name: "water", "cornea", "aqueous", "vitreous", or "chromatic_eye", the single medium of Thibos' reduced human eye.
 
     Raises:
-        ValueError: unknown medium.
+        ValueError: the medium is unknown.
     """
     return MEDIA[one_of("medium", name, MEDIA)]
 

@@ -129,9 +129,9 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
     from above, equally from all directions of the upper hemisphere.
 
     Sources: Gordon & Morel (1983), Remote Assessment of Ocean Color; Morel (1974); Mobley (1994), Light and Water,
-    equations 3.27 and 3.40. For absorption: `water_absorption`, `phytoplankton_absorption`. Below 400 nm, A is assumed
-    to be constant, which is uncertain. With 0.15 and 1 mg/m³, c at 514 nm is 0.15 and 0.40 per metre, as Petzold (1972)
-    measured in clear ocean water and in coastal water.
+    equations 3.27 and 3.40. The sources of the absorption are in `water_absorption` and `phytoplankton_absorption`.
+    Below 400 nm, A is assumed to be constant, which is uncertain. With 0.15 and 1 mg/m³, c at 514 nm is 0.15 and 0.40
+    per metre, as Petzold (1972) measured in clear ocean water and in coastal water.
 
     Raises:
         ValueError: the concentration is outside its range.
@@ -150,7 +150,7 @@ def fog(visibility: float) -> TurbidMedium:
 
     The coefficient c = ln(50) / visibility is the same at all wavelengths, because droplets are large compared with
     wavelengths. At the distance `visibility`, a black object has a contrast of 2 % with the horizon (Koschmieder 1924).
-    They absorb almost no light, so the veiling light is as bright as a white surface in daylight.
+    Droplets absorb almost no light, so the veiling light is as bright as a white surface in daylight.
 
     Raises:
         ValueError: the visibility is outside its range.

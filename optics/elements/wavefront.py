@@ -89,7 +89,7 @@ class Zernike(Aberration):
     radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: the pupil's
         radius.
 
-    A vector of Dr.Jit or PyTorch, or their numbers in a dictionary, carry derivatives.
+    A Dr.Jit or PyTorch vector, or a dictionary of such numbers, may carry derivatives.
 
     Raises:
         ValueError: a mode is unknown, its order is above 30, or a coefficient is not finite.
@@ -215,7 +215,7 @@ class WavefrontMap(Aberration):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: not of two dimensions, empty, or not finite.
+        ValueError: the array is not two-dimensional, is empty, or contains a number that is not finite.
     """
 
     samples: np.ndarray | Array

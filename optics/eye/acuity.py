@@ -108,7 +108,7 @@ def ideal_contrast_sensitivity(
     d_prime: detectability d' at the threshold. 0.954 corresponds to 75 % correct choices between two intervals.
 
     Raises:
-        ValueError: numbers outside their ranges, or arrays of different shapes.
+        ValueError: a number is outside its range, or arrays have different shapes.
     """
     u, transferred = reals("cycles_per_degree", cycles_per_degree), reals("contrast", contrast)
     sizes = reals("area", area)

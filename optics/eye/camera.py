@@ -96,7 +96,7 @@ def camera_image(
     depth: distance [m] of the scene along the axis: a number, or a map with one distance per cell (Y, X).
     samples_per_pixel: cells of the scene per pixel along each axis. Defocused edges need more than one.
     field_zones: number of PSFs across the width of the field, or "auto", see `Eye.sight`. 1 uses the PSF on the axis.
-    rng: random generator of the noise. None: no noise; electrons are their mean numbers.
+    rng: random generator of the noise. None: no noise; the result contains mean numbers of electrons.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         focuses an infinitely distant point.
     tolerance: relative error of the PSF, see `Eye`.

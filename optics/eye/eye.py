@@ -79,7 +79,7 @@ class Eye(EyeSpec):
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
-        AccuracyError: microvilli behind a pupil whose rays are too steep for the tolerance.
+        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance.
     """
 
     @property
@@ -224,8 +224,8 @@ class Eye(EyeSpec):
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or a map with one per cell (Y, X). In a map, near surfaces
             hide far ones at jumps of depth (see `optics.eye.occlusion`). Behind them, far surfaces continue with their
-            nearest visible cell. Up to 17 different distances have a kernel each, more share kernels within the
-            tolerance.
+            nearest visible cell. Up to 17 different distances have one kernel each. If there are more, distances share
+            kernels within the tolerance.
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its
             range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
             last call are kept. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.

@@ -23,7 +23,7 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
     and the field of view does not change. A perfect lens is perfect in every medium. Air and fog have no effect.
 
     eye: an `optics.Eye`
-    medium: None: air
+    medium: the medium in front of the pupil; None: air
 
     Raises:
         ValueError: an argument has the wrong type.

@@ -270,7 +270,7 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Return the nearness of sides and corners, and the part of the probabilities that does not depend on the PSF.
 
-    Both are flat. This part is the sum of three terms.
+    Both are flat arrays, and the second one is the sum of three terms.
 
     centre: position (x, y) of the window, in samples.
     """

@@ -42,7 +42,7 @@ Point = tuple[float, float]
 class Misaligned:
     """A pupil of a system that is decentred, and tilted about its centre.
 
-    decentre: position (x, y) [m] of the pupil's centre beside the axis.
+    decentre: position (x, y) [m] of the pupil's centre relative to the axis.
     tilt: angles (x, y) [rad]. A positive angle moves the pupil's +x (or +y) side in the direction of the light.
 
     Raises:

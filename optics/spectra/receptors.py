@@ -92,7 +92,7 @@ class Receptors:
         receptors count photons, while radiance is energy.
 
         Raises:
-            ValueError: invalid wavelengths.
+            ValueError: a wavelength is invalid.
         """
         nm = reals("nm", nm)
         light = daylight(nm * 1e-9)

@@ -68,7 +68,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
         Raises:
             ValueError: the action is not real, finite numbers of the right shape, or it is masked.
-            RuntimeError: before the first reset, or after `close`.
+            RuntimeError: there has been no reset yet, or `close` has been called.
         """
         observation, reward, terminated, truncated, info = self._batch.step_once(action)
         info[0].pop("episode", None)  # entry of Stable-Baselines3; Gymnasium reserves this name for its wrappers
@@ -78,7 +78,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         """Return an image (y, x, 3) uint8 as set by `render_mode`; None without a mode.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         return None if self.render_mode is None else self._batch.get_images()[0]
 

@@ -68,7 +68,7 @@ class EyesVecEnv(OneEnvironment):
         """Current state of all worlds, as their physics represents it: `WorldState` for the built-in tasks.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         return self.simulation.state
 
@@ -130,7 +130,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the actions are not real numbers, are masked, or have another shape.
-            RuntimeError: before the first reset, after `close`, or after another `step_async`.
+            RuntimeError: there has been no reset yet, `close` has been called, or another `step_async` is pending.
         """
         self._calls.require_begun()
         self._commanded = actions_of("actions", actions, self._commanded.shape)
@@ -143,7 +143,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the action is not finite, or `step_async` would refuse it.
-            RuntimeError: before the first reset, or after `close`.
+            RuntimeError: there has been no reset yet, or `close` has been called.
         """
         self._calls.require_begun()
         self.step_async(one_worlds_action("action", action, self.action_space.shape)[None])
@@ -181,7 +181,7 @@ class EyesVecEnv(OneEnvironment):
         The state does not contain such values.
 
         Raises:
-            RuntimeError: before the first reset, after `close`, or if the model enables MuJoCo's sleeping bodies.
+            RuntimeError: the worlds are not reset or are closed, or the model enables MuJoCo's sleeping bodies.
         """
         self._calls.require_begun()
         return self.animals.get_state()
@@ -191,7 +191,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
-            RuntimeError: before the first reset, after `close`, or if the model enables MuJoCo's sleeping bodies.
+            RuntimeError: the worlds are not reset or are closed, or the model enables MuJoCo's sleeping bodies.
         """
         held_state.checked(state, self.get_state())
         chosen = held_state.chosen_worlds(worlds, len(self._everyone))
@@ -208,7 +208,7 @@ class EyesVecEnv(OneEnvironment):
         """Return images (y, x, 3) uint8 of every world, as set by `render_mode`; an empty list without a mode.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         self._calls.require_begun()
         return self._pictures.taken()

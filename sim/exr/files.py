@@ -100,7 +100,7 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can state any size
 
     Raises:
-        ExrError: the file is truncated, damaged, altered, too large, or has no spectral channels. One line.
+        ExrError: the file is truncated, damaged, altered, too large, or has no spectral channels.
         FileNotFoundError: the file does not exist.
     """
     import OpenEXR

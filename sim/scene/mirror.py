@@ -113,7 +113,7 @@ class Mirror:
         A scene in which nothing moved is not rebuilt.
 
         Raises:
-            ValueError: the data of another model, or positions that are not finite.
+            ValueError: the data belong to another model, or a position is not finite.
         """
         self._places = PoseSnapshot.from_data(_checked(self.model, data))
         with in_variant(self.variant):

@@ -102,8 +102,8 @@ def build_world(
     """Build the world of a task.
 
     task: one of `sim.TASKS`
-    seed: seed of the mazes and of the stripes on walls in mazes and courses; the world of the other tasks does not
-        depend on it
+    seed: seed of the mazes and of the stripes on walls in mazes and courses; the worlds of other tasks do not depend on
+        it
     mazes: number of different mazes in the task "maze"; an episode starts in any of them
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
     layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
