@@ -74,8 +74,8 @@ def psf(
     pupils only if a sequence of pupils is passed, and an axis of distances only if a distance is a row. Each gradient
     has the device and the precision of its tensor. Only first derivatives are available.
 
-    At tolerances of 3e-4 or more, the source distances and wavelengths of a pupil share a plan and samples, which is much
-    faster than one call for each.
+    At tolerances of 3e-4 or more, the source distances and wavelengths of a pupil share a plan and samples. One call is
+    then much faster than a call for each.
 
     A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
 
