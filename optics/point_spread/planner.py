@@ -137,7 +137,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         error of an approximation may exceed it.
 
     Raises:
-        ValueError: unknown method.
+        ValueError: the method is unknown.
         AccuracyError: no sampling within the limits on memory and time meets the tolerance.
     """
     # Approximations predict the error of the intensity, and not that of its derivatives.
