@@ -61,6 +61,7 @@ class Problem:
         their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: whether the PSF carries derivatives.
+    moves: whether derivatives with respect to the distance are requested.
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
@@ -85,6 +86,7 @@ class Problem:
     spread: float = ROUND
     even: bool = False
     differentiated: bool = False
+    moves: bool = False
     knots: DerivativeKnots | None = None
     mask_detail: float = 0.0
     detail_part: float = DETAIL_PART
@@ -93,26 +95,37 @@ class Problem:
 
     @classmethod
     def from_beam(
-        cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32", derivatives: bool = True
+        cls,
+        beam: Beam,
+        window: Grid,
+        tolerance: float,
+        dtype: str = "float32",
+        derivatives: bool = True,
+        fixed: Beam | None = None,
     ) -> Problem:
         """Return the problem for a beam that passes a pupil and arrives at a window.
 
         derivatives: whether the samples must also be suitable for the derivatives that the beam carries.
+        fixed: the same light without derivatives. It is necessary if the beam carries tensors of PyTorch.
 
         Raises:
             ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], the dtype is invalid, or a
-                tensor of PyTorch requires a gradient.
+                tensor of PyTorch requires a gradient without `fixed`.
         """
         distance = positive("sensor_distance", beam.distance, carried=True)
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
         precision(dtype)
-        plain = Beam(beam.pupil, beam.source.plain, beam.wavelength, distance)
-        if not (derivatives and carries_derivatives(beam)):
-            return _problem(plain, window, tolerance, dtype)
-        refuse_torch(beam)
+        plain = fixed or Beam(beam.pupil, beam.source.plain, beam.wavelength, distance)
+        if fixed is None:
+            if not (derivatives and carries_derivatives(beam)):
+                return _problem(plain, window, tolerance, dtype)
+            refuse_torch(beam)
         found = _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
         # A small change of the angle breaks the symmetry of light along the axis.
-        return replace(found, symmetric=False, even=False) if any(map(carries_derivative, beam.source.angle)) else found
+        still = not any(map(carries_derivative, beam.source.angle))
+        symmetric = found.symmetric and still and beam.pupil.rotationally_symmetric(beam.wavelength)
+        even = found.even and still and beam.pupil.mirror_symmetric(beam.wavelength)
+        return replace(found, moves=carries_derivative(beam.distance), symmetric=symmetric, even=even)
 
     @cached_property
     def slopes(self) -> Slopes:
@@ -173,9 +186,7 @@ class Problem:
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
-        """Return the aperture with nodes in the cells between knots that are suitable for derivatives.
-
-        The result is None if there would be too many cells.
+        """Return the aperture with nodes in the cells between knots, for derivatives; None for too many cells.
 
         band: highest frequency [1/m] in the pupil's plane of the light that must be resolved. None: the light that
             arrives at any point of the window, as in `turning`.
@@ -234,10 +245,7 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Largest phase, in waves, before whole waves are subtracted.
-
-        It is the longest path plus the steepest slope times the radius, both in waves.
-        """
+        """Longest path plus the steepest slope times the radius, in waves. It bounds phases before they are reduced."""
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
         return path + self.radius * self.phase_band_inside

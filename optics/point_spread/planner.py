@@ -46,13 +46,13 @@ from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
 from optics.methods.smooth_spectrum import smooth_spectrum
-from optics.methods.window_sampling import DERIVATIVE_ERROR, WindowSampling, window_sampling
+from optics.methods.window_rank import DERIVATIVE_ERROR
+from optics.methods.window_sampling import WindowSampling, window_sampling
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_BYTES, MOST_SECONDS, AccuracyError, Option, Plan, size_of
 from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
 from optics.point_spread.window_cost import check_seconds, check_window, window_bytes, window_seconds
 
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
-
 
 # Each function returns the samplings with which its method meets a problem's tolerance. There may be none or several.
 EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
@@ -120,7 +120,7 @@ WEIGHING = {
     "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
     "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
-OTHERS = 4e-3  # choice: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances
+OTHERS, OTHERS_WITH_CELLS = 4e-3, 15e-3  # choices: time [s] of planning other methods after "low_rank", see `choose`
 
 
 @lru_cache(maxsize=256)
@@ -147,10 +147,11 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
     coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None
-    first = "" if coarse is None else "low_rank"
-    names = sorted({*asked} & {*known}, key=lambda name: (name != first, list(WEIGHING).index(name)))
+    others = 0.0 if coarse is None else OTHERS if problem.knots is None else OTHERS_WITH_CELLS
+    names = sorted({*asked} & {*known}, key=list(WEIGHING).index)
+    names.sort(key=lambda name: name != "low_rank" or coarse is None)
     for name in names:
-        if best is not None and not WEIGHING[name].pays(best.seconds - (OTHERS if first else 0.0), outputs):
+        if best is not None and not WEIGHING[name].pays(best.seconds - others, outputs):
             continue
         if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
             continue  # Fraunhofer's integral is less accurate than Fresnel's
@@ -233,9 +234,8 @@ def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
         return "; an approximation predicts no error of derivatives"
     if problem.knots is None:
         return "; derivatives exclude approximations"
-    if isinstance(best, WindowSampling):
-        return f"; derivatives with respect to samples of maps need more samples ({problem.knots.maps})"
-    return f"; derivatives with respect to samples of maps need nodes in each cell between knots ({problem.knots.maps})"
+    needed = "more samples" if isinstance(best, WindowSampling) else "nodes in each cell between knots"
+    return f"; derivatives with respect to samples of maps need {needed} ({problem.knots.maps})"
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:

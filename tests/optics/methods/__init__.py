@@ -11,7 +11,9 @@ hankel: test_textbook.py, test_oracles_circular.py
 pupil_edge: test_sine_samples.py
 slow_factor: test_low_rank.py
 window_check: test_window_sampling.py
+window_rank: test_window_sampling.py, test_torch_stacks.py
 window_sampling: test_window_sampling.py
+window_stack: test_torch_stacks.py
 window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py
 pixelated_spectrum: elements/test_pixel_relief.py
