@@ -5,7 +5,7 @@ from __future__ import annotations
 from optics.numerics.arguments import of_kind, shown
 from sim.eyes.compound_eye import CompoundEye, WorldEye, world_eye
 from sim.render.edge_rays import FIRST
-from sim.render.fidelity import EDGES, RAYS, Fidelity
+from sim.render.fidelity import AREAS, EDGES, RAYS, Fidelity
 from sim.tracing import lighting
 
 
@@ -14,7 +14,7 @@ def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
 
     Raises:
         ValueError: an eye with an eccentricity, another number of bands than the eye's, adaptive edge sampling that is
-            not possible, or a compound eye with areas or depth layers.
+            not possible, areas for receptors with a density, or a compound eye with areas or depth layers.
     """
     world_eye("eye", eye)
     if not isinstance(eye, CompoundEye) and any(eye.eccentricity_deg):
@@ -28,6 +28,11 @@ def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
     if isinstance(eye, CompoundEye):
         _check_ommatidia(fidelity)
         return
+    if fidelity.samples == AREAS and eye.lattice is not None:
+        raise ValueError(
+            "fidelity: samples = 'areas': divides the field into equal rectangles, but the eye's receptors have a "
+            "density and different sizes: must be 'rays', which follow the density"
+        )
     if fidelity.samples != EDGES:
         return
     if fidelity.light == lighting.BOUNCE:
