@@ -72,9 +72,9 @@ class Eye(EyeSpec):
     dynamics: responses of the receptors over time, which environments compute. The methods of `Eye` return signals of
         constant light (None: an observation is the signal at one time).
     density: receptors per area of the retina, of which only ratios matter: a function of the angles (right, up)
-        [degrees] from the eye's axis, such as `Fovea` and `VisualStreak`, or an array (row, column) over the whole
-        field, with the top left first. Receptors are rectangles in rows (see `optics.eye.receptor_lattice`). A signal
-        is the mean over a receptor, and large receptors have less shot noise (None: all receptors are alike).
+        [degrees] from the eye's axis, such as `Fovea` and `VisualStreak`, an array (row, column) over the whole field,
+        with the top left first, or the `lattice` of an eye. Receptors are rectangles in rows. A signal is the mean over
+        a receptor, and large receptors have less shot noise (None: all receptors are alike).
     tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
         receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.

@@ -90,7 +90,8 @@ class EyeSpec:
         if self.dynamics is not None:
             of_kind("dynamics", self.dynamics, ReceptorDynamics, "ReceptorDynamics(time_constant_ms=20)")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
-        object.__setattr__(self, "density", density_of(self.density))
+        if not isinstance(self.density, ReceptorLattice):
+            object.__setattr__(self, "density", density_of(self.density))
         self._check_density()
         auto = str(self.bands) == "auto"
         spectral = self.chosen_bands() if auto else SpectralBands.uniform(self.bands, self.receptors)
@@ -110,7 +111,8 @@ class EyeSpec:
                 "density and waveguide are given: one of them must be None, since the field of a waveguide depends on "
                 "its diameter, which varies with the density; sim.CompoundEye has an Ommatidium for each direction"
             )
-        _ = self.lattice  # refuses densities without a lattice
+        if (lattice := self.lattice) is not None and lattice.areas.shape != self.resolution:
+            raise ValueError(f"density is a lattice of {lattice.areas.shape} receptors: must be of {self.resolution}")
 
     @property
     def sensor_distance(self) -> Scalar:
@@ -146,8 +148,8 @@ class EyeSpec:
     @property
     def lattice(self) -> ReceptorLattice | None:
         """Rectangles of receptors with a `density`, in units of `receptor_size`. None: all receptors are alike."""
-        if self.density is None:
-            return None
+        if self.density is None or isinstance(self.density, ReceptorLattice):
+            return self.density
         (width, height), middle = self._on_tangent_plane
         halves = self.resolution[0] * height / 2, self.resolution[1] * width / 2
         return receptor_lattice(self.density, self.resolution, halves, middle)

@@ -19,6 +19,9 @@ MIN_CELLS = 32
 # Chosen: smallest number of cells across a waveguide's diameter, and largest number of cells along a receptor's side.
 # If both cannot hold, the second applies.
 CELLS_ACROSS, MOST_CELLS = 4, 64
+# Chosen: smallest number of cells along the smallest side of receptors with a `density`, within MOST_CELLS. Fields of
+# these receptors are evaluated at the rays themselves, so twice as many cells hardly reduce the error.
+CELLS_OF_SMALLEST = 2
 
 
 class NoRaysError(ValueError):
@@ -163,9 +166,9 @@ def cells_for(eye: optics.Eye) -> int:
 
     A narrow waveguide, or receptors much smaller than the average, require a larger number.
     """
-    fewest = math.ceil(cells_per_receptor(eye.resolution) / eye.smallest_share)
+    fewest = cells_per_receptor(eye.resolution)
     if eye.lattice is not None:
-        return min(fewest, MOST_CELLS)
+        return min(max(fewest, math.ceil(CELLS_OF_SMALLEST / eye.smallest_share)), MOST_CELLS)
     if eye.waveguide is None:
         return fewest
     return min(max(fewest, math.ceil(CELLS_ACROSS * max(eye.receptor_size) / eye.waveguide.diameter)), MOST_CELLS)

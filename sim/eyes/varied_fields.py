@@ -46,7 +46,7 @@ class VariedFields(ReceptiveFields):
         return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the value of some receptors' fields in the cells of rays, (plane, receptor, ray)."""
+        """Return the value of some receptors' fields at rays, (plane, receptor, ray)."""
         rows, columns = np.divmod(receptors, self.resolution[1])
         found = np.zeros((len(self.field), len(receptors), len(draw)))
         for row in np.unique(rows):
@@ -60,17 +60,17 @@ class VariedFields(ReceptiveFields):
         upper, lower = _edges(self.lattice.rows, self.resolution[0], self.cells)[row : row + 2]
         edges = _edges(self.lattice.columns[row], self.resolution[1], self.cells)
         found = np.zeros((planes, len(columns), len(draw)))
-        # A ray in cell c receives the power of the PSF's cells from c + 1 - lower to c + 1 - upper.
-        near = np.flatnonzero((draw.rows + 1 > upper) & (draw.rows - height < lower))
+        # In cells from the corner of the mixture. A ray at y gets the PSF from y + 1/2 - lower to y + 1/2 - upper.
+        x, y = (draw.points * self.cells + np.array(self.density.shape[::-1]) / 2 + 0.5).T
+        near = np.flatnonzero((y > upper) & (y < lower + height))
         if not near.size:
             return found
         before = np.concatenate([np.zeros((planes, 1, width)), np.cumsum(self.field, axis=1)], axis=1)
-        in_row = _at(before, draw.rows[near] + 1 - upper) - _at(before, draw.rows[near] + 1 - lower)
+        in_row = _at(before, y[near] - upper) - _at(before, y[near] - lower)
         before = np.concatenate([np.zeros((planes, len(near), 1)), np.cumsum(in_row, axis=2)], axis=2)
         area = (lower - upper) * np.diff(edges)[columns]
         left, right = (edges[columns + side][:, None] for side in (0, 1))
-        x = draw.columns[near] + 1
-        values = _across(before, x - left) - _across(before, x - right)
+        values = _across(before, x[near] - left) - _across(before, x[near] - right)
         found[:, :, near] = np.maximum(values / area[:, None], 0)
         return found
 
