@@ -14,6 +14,12 @@ from optics.eye.receptor_lattice import ReceptorLattice, overlaps
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.receptive_fields import Draw, ReceptiveFields, kernels_of
 
+NEAR = (
+    0.25,
+    0.5,
+    0.25,
+)  # weights of a cell and its two neighbours; fields at rays are then at most four times as large
+
 
 @dataclass(frozen=True)
 class VariedFields(ReceptiveFields):
@@ -98,7 +104,13 @@ def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _mixture(field: np.ndarray, lattice: ReceptorLattice, cells: int, receptors: np.ndarray) -> np.ndarray:
-    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields."""
+    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
+
+    A ray may be up to half a cell from the middle of its cell, at which the mixture is computed. The mixture is
+    therefore averaged over neighbouring cells. Otherwise a ray just beyond the rim, where the mixture is almost 0,
+    could get a huge weight.
+    """
+    from scipy.ndimage import convolve1d
     from scipy.signal import fftconvolve
 
     height, width = lattice.areas.shape
@@ -110,5 +122,7 @@ def _mixture(field: np.ndarray, lattice: ReceptorLattice, cells: int, receptors:
         light += np.outer(down[row] / down[row].sum(), (across / across.sum(axis=1, keepdims=True)).sum(axis=0))
     one = (field / field.sum(axis=(1, 2), keepdims=True)).mean(axis=0)
     total = np.maximum(fftconvolve(light, one), 0)
+    for axis in (0, 1):
+        total = convolve1d(total, NEAR, axis, mode="constant")
     found: np.ndarray = total / total.sum()
     return found
