@@ -25,11 +25,13 @@ HUMAN_E2_DEG = 1.04  # mean of r_2k on the four meridians: 1.058, 1.035, 1.084 a
 
 @dataclass(frozen=True)
 class Fovea:
-    """Receptors whose density falls with the angle E from the fovea, as (1 + E/E₂)⁻² per solid angle.
+    """Receptors whose acuity falls with the angle E from the fovea, as 1/(1 + E/E₂).
 
-    The number of receptors per degree, and with it the acuity, falls as 1/(1 + E/E₂). The default is that of midget
-    ganglion cells, which limit human acuity. Source: the first term of equation 8 of Watson, J. Vision 14(7):15, 2014,
-    without the smaller second term; its density at the centre is that of cones after Curcio et al. 1990.
+    The law holds for the horizontal angle between the columns of receptors, and for the vertical angle between the
+    rows. The density is the product of both, so the receptors at the fovea have the shape of the average receptor. The
+    default E₂ is that of midget ganglion cells, which limit human acuity. Source: the first term of equation 8 of
+    Watson, J. Vision 14(7):15, 2014, whose density is (1 + E/E₂)⁻² in all directions. Its second, smaller term is left
+    out.
 
     e2_deg: angle E₂ [degrees] at which acuity is half of that at the fovea, 1e-3 to 1e3.
     center_deg: angles (right, up) [degrees] of the fovea from the eye's axis.
@@ -46,18 +48,19 @@ class Fovea:
         object.__setattr__(self, "center_deg", direction("Fovea: center_deg", self.center_deg))
 
     def __call__(self, right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
-        """Return the density per area of the flat retina, relative to that at the fovea."""
-        towards, center = _unit(right_deg, up_deg), _unit(*map(np.asarray, self.center_deg))
-        apart = 2 * np.arcsin(np.clip(np.linalg.norm(towards - center, axis=-1) / 2, 0, 1))
-        return _on_flat_retina(towards, np.degrees(apart) / self.e2_deg)
+        """Return the density per area of the flat retina, for angles [degrees] from the axis."""
+        right, up = self.center_deg
+        return _per_length(right_deg, right, self.e2_deg) * _per_length(up_deg, up, self.e2_deg)
 
 
 @dataclass(frozen=True)
 class VisualStreak:
-    """Receptors whose density falls above and below the horizon, as (1 + E/E₂)⁻² per solid angle, with the elevation E.
+    """Receptors whose vertical acuity falls with the angle E above and below a horizontal streak, as 1/(1 + E/E₂).
 
-    e2_deg: elevation E₂ [degrees] from the streak at which the density is a quarter, 1e-3 to 1e3.
-    elevation_deg: elevation [degrees] of the streak above the eye's axis, -80 to 80.
+    The horizontal angle between the columns of receptors is the same everywhere.
+
+    e2_deg: angle E₂ [degrees] at which vertical acuity is half of that in the streak, 1e-3 to 1e3.
+    elevation_deg: angle [degrees] of the streak above the eye's axis, -80 to 80.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -71,10 +74,8 @@ class VisualStreak:
         in_range("VisualStreak: elevation_deg", self.elevation_deg, -WIDEST_DEG, WIDEST_DEG)
 
     def __call__(self, right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
-        """Return the density per area of the flat retina, relative to that at the streak."""
-        towards = _unit(right_deg, up_deg)
-        above = np.degrees(np.arcsin(towards[..., 1])) - self.elevation_deg
-        return _on_flat_retina(towards, np.abs(above) / self.e2_deg)
+        """Return the density per area of the flat retina, for angles [degrees] from the axis."""
+        return _per_length(right_deg, 0.0, np.inf) * _per_length(up_deg, self.elevation_deg, self.e2_deg)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,8 @@ def density_of(value: Any) -> Density | DensityMap | None:
     """
     if value is None or isinstance(value, DensityMap):
         return value
-    if callable(value) and isinstance(value, Hashable) and not isinstance(value, type):
+    hashable = isinstance(value, Hashable)  # lattices are stored by their densities
+    if callable(value) and hashable and not isinstance(value, type):
         found: Density = value
         return found
     wanted = "a function of (right_deg, up_deg) such as optics.Fovea(2.0), or a map (row, column) of positive numbers"
@@ -155,16 +157,10 @@ def _checked(name: str, values: np.ndarray) -> np.ndarray:
     return values
 
 
-def _unit(right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
-    """Return unit vectors (..., 3) to the right, up and ahead."""
-    right, up = np.tan(np.radians(right_deg)), np.tan(np.radians(up_deg))
-    vectors = np.stack([right, up, np.ones_like(right)], axis=-1)
-    found: np.ndarray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return found
+def _per_length(angle_deg: np.ndarray, middle_deg: float, e2_deg: float) -> np.ndarray:
+    """Return the receptors per length of the flat retina along an axis, if 1/(1 + E/E₂) of them share an angle.
 
-
-def _on_flat_retina(towards: np.ndarray, eccentricity: np.ndarray) -> np.ndarray:
-    """Return (1 + eccentricity)⁻² per solid angle as a density per area. An area of the retina subtends cos³θ as much
-    at the angle θ as on the axis."""
-    found: np.ndarray = towards[..., 2] ** 3 / (1 + eccentricity) ** 2
+    The angle dα on the retina at the distance f has the length f dα/cos²α.
+    """
+    found: np.ndarray = np.cos(np.radians(angle_deg)) ** 2 / (1 + np.abs(angle_deg - middle_deg) / e2_deg)
     return found
