@@ -70,7 +70,7 @@ class Eye(EyeSpec):
         None: receptors are square, and the height of the retina follows from the number of rows.
     most_seconds: largest predicted time [s] of the PSF of a band. Pupils that need more are refused.
     dynamics: responses of the receptors over time, which environments compute. The methods of `Eye` return signals of
-        constant light (None: an observation is the signal at one time).
+        constant light. None: receptors respond without delay.
     density: receptors per area of the retina, of which only ratios matter: a function of the angles (right, up)
         [degrees] from the eye's axis, such as `Fovea` and `VisualStreak`, an array (row, column) over the whole field,
         with the top left first, or the `lattice` of an eye. Receptors are rectangles in rows. A signal is the mean over
