@@ -96,7 +96,7 @@ class Sellmeier(Dispersion):
     poles_um2: C [µm²], one for each of the strengths.
 
     Raises:
-        ValueError: no terms, different numbers of strengths and poles, or numbers that are not finite.
+        ValueError: there are no terms, the numbers of strengths and poles differ, or a number is not finite.
     """
 
     strengths: tuple[float, ...]
@@ -162,7 +162,7 @@ def medium(name: str) -> Dispersion:
     name: "water", "cornea", "aqueous", "vitreous", or "chromatic_eye", the single medium of Thibos' reduced human eye.
 
     Raises:
-        ValueError: unknown medium.
+        ValueError: the medium is unknown.
     """
     return MEDIA[one_of("medium", name, MEDIA)]
 
@@ -171,7 +171,7 @@ def index_of(name: str, value: Any) -> Dispersion:
     """Convert a number or a curve to a curve; numbers must lie in [1, 10] and carry no derivatives.
 
     Raises:
-        ValueError: neither a number nor a curve.
+        ValueError: the index is neither a number nor a curve.
     """
     if isinstance(value, Dispersion):
         if value.is_differentiable:

@@ -24,10 +24,10 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
     effect.
 
     eye: an `optics.Eye`
-    medium: None: air
+    medium: the medium in front of the pupil; None: air
 
     Raises:
-        ValueError: an argument of another type.
+        ValueError: an argument has the wrong type.
     """
     of_kind("eye", eye, EyeSpec, "optics.Eye()")
     if medium is not None:

@@ -54,8 +54,9 @@ def microvilli_of(given: Any) -> Tile | None:
 
 
 def polarised_error(pupil: Pupil, distance: float) -> float:
-    """Return an upper bound on the error in polarised signals due to oblique rays, relative to a white surface's
-    signal.
+    """Return an upper bound on the error in polarised signals due to oblique rays.
+
+    It is relative to the signal of a white surface.
 
     distance: distance [m] of the retina from the pupil.
     """
@@ -85,7 +86,7 @@ def taken_by(
     polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
 
     Raises:
-        ValueError: invalid polarization, a degree outside [0, 1], or receptors without microvilli.
+        ValueError: polarization is invalid, a degree is outside [0, 1], or the receptors have no microvilli.
     """
     if polarization is None:
         return [(radiance, 1.0)]

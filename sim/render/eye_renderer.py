@@ -57,7 +57,7 @@ class EyeRenderer:
     with spectral lines for which the eye has too few bands.
 
     Raises:
-        ValueError: n_envs below 1, more rays than fit into memory, or a fidelity that the scene does not support.
+        ValueError: n_envs is below 1, the rays do not fit into memory, or the scene does not support the fidelity.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
@@ -141,8 +141,9 @@ class EyeRenderer:
         light: factors of all lights of each world, (env, band); None: lights as in the model
 
         Raises:
-            ValueError: another number of worlds, another model's poses, poses that are not finite or not computed yet,
-                a difference from the model that is not in `varied`, or light of another shape.
+            ValueError: the number of worlds or the shape of `light` is wrong; the poses belong to another model, are
+                not finite or have not been computed yet; or the worlds differ from the model in a part that is not in
+                `varied`.
         """
         return self.launch(poses, light).wait()
 

@@ -59,8 +59,8 @@ class Fidelity:
     levels: chosen level of each stage, with its reason
 
     Raises:
-        ValueError: bands, rays_per_receptor or a tolerance that are not numbers or out of range, unknown light or
-            samples, or light = "all" without areas.
+        ValueError: bands, rays_per_receptor or tolerance is not a number or is out of range, light or samples is
+            unknown, or light = "all" is combined with another kind of samples than areas.
     """
 
     rays_per_receptor: float
@@ -118,7 +118,7 @@ def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity |
     """Return the fidelity with this number of rays in direct light, or None for "auto", which is chosen later.
 
     Raises:
-        ValueError: neither a positive number nor "auto".
+        ValueError: the value is neither a positive number nor "auto".
     """
     if not isinstance(rays_per_receptor, str):
         return Fidelity(rays_per_receptor, eyes.bands)

@@ -22,7 +22,7 @@ def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarr
     """Return the noise-free signals of one world of a state, (eye, channel, height, width).
 
     Raises:
-        ValueError: a world with a medium, or receptors with a density.
+        ValueError: the world has a medium, or the receptors have a density.
     """
     if eyes.density is not None:
         raise ValueError("eyes: their density must be None, this renderer has receptors of one size only")

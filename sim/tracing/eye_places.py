@@ -77,7 +77,7 @@ class EyePlaces:
     mounts: one for each eye
 
     Raises:
-        ValueError: no mount, or a mount on a part that the model lacks.
+        ValueError: there is no mount, or the model lacks the part on which an eye is mounted.
     """
 
     def __init__(self, model: mujoco.MjModel, mounts: Sequence[Mount]) -> None:
@@ -103,7 +103,7 @@ class EyePlaces:
         """Return the body that the eyes are fixed to, with the eyes' positions on it.
 
         Raises:
-            NotLevelError: eyes on several bodies, or on a body that may tilt or change its height.
+            NotLevelError: the eyes are on several bodies, or on a body that may tilt or change its height.
         """
         bodies = {self._body_of(kind, index) for kind, index in self._things}
         if len(bodies) > 1:

@@ -106,7 +106,7 @@ OF_EYES = {
         {
             "sensor": With(optics.Sensor((2, 4), 5e-6), {"sensor": optics.Sensor((2, 4), 4e-6)}),
             "depth": With(0.02, {"sensor": optics.Sensor((2, 4), 4e-6)}),
-            "field_zones": With(3, {"sensor": optics.Sensor((2, 4), 4e-4, full_well=1e9, bits=None)}),
+            "field_zones": With(3, {"sensor": optics.Sensor((2, 4), 1e-4, full_well=1e9, bits=None)}),
             "samples_per_pixel": With(2, {"sensor": optics.Sensor((2, 4), 4e-6)}),
             "rng": With(np.random.default_rng(0), {"sensor": optics.Sensor((2, 4), 4e-6)}),
             "sensor_distance": With(2.1e-3, {"sensor": optics.Sensor((2, 4), 4e-6)}),
