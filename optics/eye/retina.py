@@ -20,7 +20,7 @@ class Retina:
     """Properties of the retina that define the PSF: distance [m], wavelengths [m], cells, tolerance, dtype.
 
     cell: height and width of a cell [m].
-    resolution: number of receptors (height, width).
+    size: height and width [m] of the retina.
     samples: number of cells along a receptor's side.
     pupil_turned: True if the pupil is rotated by 180° about the axis.
     most_seconds: largest predicted time [s] of the PSF of a band.
@@ -30,17 +30,11 @@ class Retina:
     wavelengths: np.ndarray
     cell: tuple[float, float]
     tolerance: float
-    resolution: tuple[int, int]
+    size: tuple[float, float]
     samples: int
     dtype: str = "float32"
     pupil_turned: bool = False
     most_seconds: float = 3.0  # choice
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Height and width [m]."""
-        height, width = (n * self.samples * side for n, side in zip(self.resolution, self.cell, strict=True))
-        return height, width
 
     def across_pupil(self, direction: tuple[float, float]) -> tuple[float, float]:
         """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.

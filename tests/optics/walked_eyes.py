@@ -82,6 +82,7 @@ OF_EYES = {
             "microvilli": optics.Microvilli(),
             "pupil_turned": With(True, {"pupil": Pupil(**LENS, wavefront=Zernike({(3, 1): 0.2}))}),
             "vertical_fov_deg": 30.0,
+            "density": optics.Fovea(5.0),
             "dynamics": NoEffect("it needs time, which environments have: tests/sim/envs/test_receptors_in_time.py"),
         },
     ),
@@ -131,7 +132,7 @@ OF_EYES = {
         lambda **given: repr(optics.immersed(EYE, optics.TurbidMedium(TINT, TINT, **given)).pupil),
         {"refractive_index": optics.medium("water")},
     ),
-    "Eye.describe": Walk(lambda **asked: str(EYE.describe(**asked)), {"z": 1e-3}),
+    "Eye.describe": Walk(lambda **asked: str(EYE.describe(**asked)), {"z": 1e-3, "direction_deg": (10.0, 5.0)}),
     "Eye.kernel": Walk(lambda **asked: EYE.kernel(2, **asked), {"z": 1e-3, "direction_deg": (10.0, 0.0)}),
     "Eye.psf": Walk(lambda **asked: EYE.psf(**asked).psf, {"z": 1e-3}),
     "Eye.see": Walk(

@@ -22,5 +22,8 @@ retina: test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
 retinal_image: test_retinal_image.py
 sensor_pixels: test_torch.py
 camera: test_camera.py
+receptor_density: test_receptor_density.py
+receptor_lattice: test_receptor_density.py
+patch: test_receptor_density.py
 summary: test_summary.py
 """
