@@ -72,7 +72,7 @@ def controls() -> tuple[Control, ...]:
         Control("both over 45°", coarse, CAMERA),
         Control("both over 135°", COMPOUND, fine),
         Control("30 features in total", replace(COMPOUND, features=3), replace(CAMERA, features=15)),
-        Control("160 features in total", replace(COMPOUND, features=16), replace(CAMERA, features=80)),
+        Control("160 features in total", COMPOUND, replace(CAMERA, features=80)),
         Control("one encoder for all eyes", *_both("wiring.shared_encoder=true")),
         Control("fine eyes blurred to 4 x 4, same inputs", COMPOUND, replace(CAMERA, own=blurred)),
         Control("fine eyes pooled to 4 x 4 inputs", COMPOUND, replace(CAMERA, own="wiring.pool_side=4")),
