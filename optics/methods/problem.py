@@ -54,11 +54,9 @@ class Problem:
     even: True if it is even in x and in y.
     widest_band: frequency [1/m] beyond which light may be omitted (infinite: all light that reaches the window counts).
     reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
-        beyond it may be wrong, and edge-diffracted light may be less accurate (None: the whole window must be
-        accurate).
+        beyond it may be wrong, and edge-diffracted light less accurate (None: the whole window must be accurate).
     medium_n: refractive index behind the pupil.
-    masked: True if a mask scatters light to places that rays do not predict, so that approximations cannot predict
-        their error.
+    masked: True if a mask scatters light where no rays arrive. Approximations then cannot predict their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: whether the PSF carries derivatives.
     moves: whether derivatives with respect to the distance are requested.
@@ -66,8 +64,7 @@ class Problem:
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
-    steep: True if much light of a steep relief misses the window. Samples of its light convolved with a Gaussian are
-        then used (`smooth_spectrum`), and light beyond `reach` is removed.
+    steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Light beyond `reach` is removed.
     """
 
     light: Beam
@@ -161,10 +158,7 @@ class Problem:
 
     @cached_property
     def turning(self) -> float:
-        """Highest frequency [1/m] in the combined phase of the pupil and of the path to any point of the window.
-
-        For a lens in focus, it is far below the sum of the two separate frequencies.
-        """
+        """Highest frequency [1/m] in the combined phase of pupil and path. For a lens in focus, both nearly cancel."""
         return self._turning[0]
 
     @cached_property
