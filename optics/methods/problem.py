@@ -64,7 +64,7 @@ class Problem:
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
-    steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Light beyond `reach` is removed.
+    steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Light beyond `reach` is lost.
     """
 
     light: Beam
