@@ -102,6 +102,8 @@ SENSOR = {
 }
 CAMERA = {"lens": LENS, "sensor": optics.Sensor(**SENSOR), "sensor_distance": 240e-6, "tolerance": 0.1}
 EYES = {
+    "Fovea": {"e2_deg": 1.0, "center_deg": (0.0, 0.0)},
+    "VisualStreak": {"e2_deg": 5.0, "elevation_deg": 0.0},
     "Sensor": SENSOR,
     "camera_eye": CAMERA,
     "camera_image": {
@@ -249,6 +251,7 @@ def test_nothing_of_the_face_is_forgotten():
     """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
     made = {
         "AcceptanceFunction",
+        "DensityMap",  # an `Eye` makes it from an array
         "AccuracyError",
         "BackendError",
         "MTF",

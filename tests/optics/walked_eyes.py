@@ -128,6 +128,14 @@ OF_EYES = {
             "frames": NoEffect("environments render them: tests/sim/envs/test_receptors_in_time.py"),
         },
     ),
+    "Fovea": Walk(
+        lambda **given: optics.Fovea(**given)(np.array([1.0, 9.0]), np.array([2.0, -5.0])),
+        {"e2_deg": 3.0, "center_deg": (1.0, 0.0)},
+    ),
+    "VisualStreak": Walk(
+        lambda **given: optics.VisualStreak(**given)(np.array([1.0, 9.0]), np.array([2.0, -5.0])),
+        {"e2_deg": 3.0, "elevation_deg": 1.0},
+    ),
     "TurbidMedium": Walk(
         lambda **given: repr(optics.immersed(EYE, optics.TurbidMedium(TINT, TINT, **given)).pupil),
         {"refractive_index": optics.medium("water")},
