@@ -32,7 +32,6 @@ _CONTENTS = {
     "Circle": "apertures.circular",
     "Combined": "apertures.combined",
     "Cornu": "elements.refractive_index",
-    "DensityMap": "eye.receptor_density",
     "Disk": "apertures.shapes",
     "ExitPupil": "elements.exit_pupil",
     "ExitPupils": "elements.exit_pupils",

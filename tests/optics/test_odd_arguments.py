@@ -251,7 +251,6 @@ def test_nothing_of_the_face_is_forgotten():
     """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
     made = {
         "AcceptanceFunction",
-        "DensityMap",  # an `Eye` makes it from an array
         "AccuracyError",
         "BackendError",
         "MTF",
