@@ -9,9 +9,10 @@ import math
 import multiprocessing
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import cycle, islice
 from pathlib import Path
@@ -22,6 +23,7 @@ from evolve.genome.phenotype import Phenotype
 from evolve.learning.schedule import mean_passes, schedule
 from evolve.runs.begin import check_task
 from evolve.search.job import ExecutorError
+from evolve.search.local_executor import interrupts_held
 from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
@@ -81,24 +83,41 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
             the reason.
         ExecutorError: a worker process died.
     """
-    context = multiprocessing.get_context("spawn")
     tried = list(islice(cycle(animals), max(workers, len(animals))))
     paces: dict[str, list[Pace]] = {name: [] for name in animals}
     try:
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
+        with _pool(workers) as pool:
             if config.choice.named_code is not None:
-                for warning in pool.submit(check_task, config).result():
+                with interrupts_held():
+                    check = pool.submit(check_task, config)
+                for warning in check.result():
                     warnings.warn(warning, stacklevel=2)
-            lives = [pool.submit(_short_life, config, animals[name], seed) for seed, name in enumerate(tried)]
+            with interrupts_held():
+                lives = [pool.submit(_short_life, config, animals[name], seed) for seed, name in enumerate(tried)]
             for name, life in zip(tried, lives, strict=True):
                 try:
                     paces[name].append(life.result())
                 except ValueError as error:
-                    pool.shutdown(cancel_futures=True)
                     raise ConfigError(f"an animal like the {name} one cannot be evaluated here: {error}") from error
     except BrokenProcessPool as error:
         raise ExecutorError(DIED) from error
     return {name: _slowest(found) for name, found in paces.items()}
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of processes. If an exception leaves the context, they are terminated instead of awaited.
+
+    Jobs must be submitted while interrupts are held, so that only the parent receives Ctrl-C.
+    """
+    context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
+        try:
+            yield pool
+        except BaseException:
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
+            raise
 
 
 def _slowest(paces: list[Pace]) -> Pace:
