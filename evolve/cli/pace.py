@@ -86,14 +86,17 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
     tried = list(islice(cycle(animals), max(workers, len(animals))))
     paces: dict[str, list[Pace]] = {name: [] for name in animals}
     try:
-        with _pool(workers) as pool:
+        with TemporaryDirectory() as folder, _pool(workers) as pool:
             if config.choice.named_code is not None:
                 with interrupts_held():
                     check = pool.submit(check_task, config)
                 for warning in check.result():
                     warnings.warn(warning, stacklevel=2)
             with interrupts_held():
-                lives = [pool.submit(_short_life, config, animals[name], seed) for seed, name in enumerate(tried)]
+                lives = [
+                    pool.submit(_short_life, config, animals[name], seed, Path(folder) / str(seed))
+                    for seed, name in enumerate(tried)
+                ]
             for name, life in zip(tried, lives, strict=True):
                 try:
                     paces[name].append(life.result())
@@ -130,8 +133,10 @@ def _slowest(paces: list[Pace]) -> Pace:
     )
 
 
-def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
+def _short_life(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
+
+    policy: path for the trained policy. Its folder belongs to the parent, which removes it after Ctrl-C, too.
 
     The first update has the full number of passes over the samples, and the second may have only half of it. The time
     of a pass follows from the difference between the times of the two updates.
@@ -143,17 +148,15 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
     # The training run is not divided into rungs, because they would be shorter than a rollout.
     once = replace(config, learning=short, search=replace(config.search, rungs=1))
     marks: list[float] = []
-    with TemporaryDirectory() as folder:
-        policy = Path(folder) / "policy"
-        began = time.perf_counter()
-        outcome = evaluate_candidate(
-            *(animal, once, seed, policy),
-            progress=lambda steps, planned: marks.append(time.perf_counter()),
-        )
-        ended = time.perf_counter()
-        if outcome.failure is not None:
-            raise ValueError(outcome.failure)
-        size = policy.stat().st_size
+    began = time.perf_counter()
+    outcome = evaluate_candidate(
+        *(animal, once, seed, policy),
+        progress=lambda steps, planned: marks.append(time.perf_counter()),
+    )
+    ended = time.perf_counter()
+    if outcome.failure is not None:
+        raise ValueError(outcome.failure)
+    size = policy.stat().st_size
     first, second, third = marks
     all_passes, few, last = (schedule(short, number * rollout)[0] for number in (1, 2, 3))
     step_s, late_step_s = (second - first) / rollout, (third - second) / rollout
