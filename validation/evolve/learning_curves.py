@@ -16,10 +16,11 @@ fraction in the last evaluation. "return" is the undiscounted return per trainin
 receptor often reaches no object. If it reaches one, this object is the goal in one of three cases, as expected by
 chance.
 
-**Second table.** For the maze, the table states the distance from the start at which an episode ends, and the return of
-the episode. The return is 0.25 per metre of this distance, minus 1 for every action in contact with a wall. The fitness
-is 1.5 per metre, minus 2 for every such action. Means have 95 % confidence intervals. The stated interval of the
-fitness may be wider than the actual one, because only an upper bound of its width is known.
+**Second table.** This table is for the maze, where the distance travelled measures success. It states the distance from
+the start at which an episode ends, and the return of the episode. The return is 0.25 per metre of this distance, minus
+1 for every action in contact with a wall. The fitness is 1.5 per metre, minus 2 for every such action. Means have 95 %
+confidence intervals. For the interval of the fitness, only an upper bound of the width is known, and the table states
+this bound.
 
 An animal that stands still has a return of 0, and an animal with one eye learns little more than to stand still.
 Animals with ten eyes learn to travel through the maze. For comparison, a hand-written controller receives the true

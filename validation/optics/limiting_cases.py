@@ -18,7 +18,7 @@ instead. The inputs are:
   light behind an aperture without a lens;
 - a window of one sample, compared with the closed form; a window far off the axis, compared with quadrature; and a
   source at grazing incidence, compared with a result in float64;
-- `optics.propagate` over a distance of 0, for an evanescent wave, and for a field of zeros.
+- `optics.propagate` over a distance of 0 and of 1e6 m, for an evanescent wave, and for a field of zeros.
 
 **Refused inputs.** These inputs raise an error:
 

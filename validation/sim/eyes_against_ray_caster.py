@@ -9,8 +9,8 @@ worlds with random poses are rendered at once. For the centre of every receptor,
 compared with the depth from MuJoCo's ray caster.
 
 **Table.** The columns state the number of moving geoms, the fraction of receptors with the same depth, and this
-fraction for the worst eye of any world. The last column states steps per CPU second. It was measured with 64 worlds of
-two eyes of 15 x 15 receptors and 4 rays per receptor, without physics.
+fraction for the eye and world in which it is smallest. The last column states steps per CPU second. It was measured
+with 64 worlds of two eyes of 15 x 15 receptors and 4 rays per receptor, without physics.
 
 **Bounds.** In every model, at least 99.5 % of the receptors have the same depth to 1e-3, or both see nothing.
 

@@ -24,11 +24,13 @@ They are in units of the receptor noise σ = 0.01, where white gives a signal of
 
 The perfect lens uses 24 states, because its errors differ much between views. The other pupils use 4 states.
 
-**Table.** Retinas are given as width x height. The last column shows the choice of `rays_per_receptor = "auto"`, which
-is a number of rays or of areas, and its error. No slope is given if fewer than three errors are above 0.01 σ.
+**Table.** Retinas are given as width x height. The slope is the exponent of n in the error. The last column shows the
+choice of `rays_per_receptor = "auto"` and its error. The choice is a number of rays or areas, and the light: direct
+light or all light. No slope is given if fewer than three errors are above 0.01 σ.
 
-**Bounds.** The error of the automatic choice is at most half of the noise. Down to 0.01 σ, errors fall at least like
-n^-0.5, as they do with independent rays. Below 0.01 σ, differences can come from the two different grids.
+**Bounds.** The error of the automatic choice is at most half of the noise. Errors above 0.01 σ fall at least like
+n^-0.5, as they do with independent rays. Errors below 0.01 σ can come from the two different grids, so they have no
+bound.
 
     python -m validation.sim.receptive_field_sampling [--out DIR] [--docs DIR]
 """

@@ -34,13 +34,14 @@ All settings use float32, because Mitsuba's spectral variants are built for floa
 
 **Table.** "auto" is the choice of `choose_fidelity`, bands included. "front" marks settings on the Pareto front of
 speed against error: no other setting is both faster and more accurate. For this comparison, the error of a setting is
-the greater of the two populations' errors. "vs same light" is the error over all receptors relative to very many rays
-in the same light, so it contains only the effects of samples and bands.
+the greater of the two populations' errors. "vs same light" is the error over all receptors relative to a rendering with
+very many rays in the same light, so it contains only the effects of samples and bands. The lines above each table state
+how much direct light and "bounce" light differ from path-traced light, even with very many samples ("converged").
 
 **Bounds.** Compared with path-traced light, the error of "auto" must not exceed the promised σ/2 (plus the noise of the
 reference) in either population, unless a `FidelityWarning` was raised. If the promise is broken, the table states by
 how much. "auto" must also be on the Pareto front, or at most 20 % slower than settings of the front with the same
-error. "auto" was not tuned on any of these views.
+error. None of these views was used to tune "auto".
 
     python -m validation.sim.speed_accuracy [--out DIR] [--docs DIR] [--scenes N]
 """
