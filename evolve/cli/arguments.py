@@ -201,9 +201,7 @@ def _add_watching(commands: Commands) -> None:
     compare.add_argument("--json", action="store_true", help="print JSON")
     compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with the fitness curves")
     drift = _command(commands, "drift", "drift.drift", "test which genes changed by more than chance would explain")
-    drift.add_argument(
-        "directories", type=Path, nargs="+", metavar="DIR", help="directories of runs that differ only in their seeds"
-    )
+    drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="runs that differ only in their seeds")
     many = "number of searches with random fitness, with which the runs are compared (default: 200)"
     _add_damage(drift)
     drift.add_argument("--searches", type=searches, default=200, metavar="N", help=many)
@@ -226,9 +224,7 @@ def _add_products(commands: Commands) -> None:
             said = f"{shown} every N actions (default: 8)"
             product.add_argument("--every", type=every, default=usual, metavar="N", help=said)
         if name == "replay":
-            product.add_argument(
-                "--test", action="store_true", help="play in a layout of the test set (only families of layouts)"
-            )
+            product.add_argument("--test", action="store_true", help="play in a layout of the family's test set")
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
             product.add_argument("--mp4", action="store_true", help="also write a video with one frame per action")
@@ -274,9 +270,7 @@ def _add_tables(commands: Commands) -> None:
     config = _command(commands, "config", "show_config.config", "show all settings of a run, or their schema")
     config.add_argument("what", choices=("show", "schema"), help="show: as TOML, for --config; schema: as JSON schema")
     _add_settings(config)
-    completion = _command(
-        commands, "completion", "completion.completion", "print a script with which a shell completes arguments"
-    )
+    completion = _command(commands, "completion", "completion.completion", "print a completion script for a shell")
     completion.add_argument("shell", choices=SHELLS, help="the shell")
 
 

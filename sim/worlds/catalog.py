@@ -12,8 +12,8 @@ from types import MappingProxyType
 TASKS: Mapping[str, str] = MappingProxyType(
     {
         "navigation": "follow a course between striped walls to its end",
-        "detection": "reach the goal sphere and avoid two adversaries, which differ only in the orientation of stripes",
-        "tracking": "reach a moving goal sphere and avoid two moving adversaries, which differ only in the orientation of stripes",
+        "detection": "reach the goal sphere and avoid two adversaries, whose stripes have another orientation",
+        "tracking": "reach a moving goal sphere and avoid moving adversaries, whose stripes have another orientation",
         "maze": "get as far as possible through a maze of striped corridors",
         "foraging": "reach the goal sphere and avoid two adversaries, which differ only below 400 nm",
     }
