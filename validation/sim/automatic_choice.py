@@ -1,4 +1,4 @@
-"""Cost of the automatic choice of samples over resolution, field of view and number of eyes
+"""Cost of the automatic choice of samples for different resolutions, fields of view and numbers of eyes
 
 Are there eyes for which a slight change makes the automatic choice ("auto") use many more samples? No. In every setting
 it chooses area sampling, in which each sample is the mean light on a receptor or a part of it (an area). One to six
