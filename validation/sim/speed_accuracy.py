@@ -10,8 +10,8 @@ one receptor. (If many receptors have the same error, an agent could still learn
 two populations of receptors:
 
 - all receptors, in 4 states that agents reached;
-- the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead. With a perfect lens there are 8 views,
-  because the path-traced renderings take long. Mazes have no objects, so this population is empty there.
+- the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead (8 views with a perfect lens, because
+  the path-traced renderings take long). Mazes have no objects, so this population is empty there.
 
 The reference is Mitsuba's path tracer in 8 bands. Behind a lens, its image is convolved with the kernel of the eye
 (`Eye.see`).
