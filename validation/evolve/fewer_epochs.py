@@ -5,10 +5,10 @@ in tracking and 16 % in navigation. The mean returns in these tasks change by +4
 respectively.
 
 **Method.** An epoch is one pass over the samples of an update. After `decay_after` training steps, learning slows down:
-the change of the weights per update has to fall in inverse proportion to the number of steps. There are two ways to
-achieve this: smaller optimiser steps in the same number of epochs, or optimiser steps of the same size in fewer epochs.
-The second way moves the weights about as far in less time. Both ways first reduce the optimiser step. After 150,000
-training steps, the optimiser step is half as large as at the start, and until then both ways give bit-identical
+the change of the weights per update has to fall in inverse proportion to the number of steps so far. There are two ways
+to achieve this: smaller optimiser steps in the same number of epochs, or optimiser steps of the same size in fewer
+epochs. The second way moves the weights about as far in less time. Both ways first reduce the optimiser step. After
+150,000 training steps, the optimiser step is half as large as at the start, and until then both ways give bit-identical
 results. From then on, the first way reduces the optimiser step further. The second way reduces the number of epochs
 instead, from 10 to 3 (`least_epochs`).
 

@@ -44,9 +44,9 @@ based, is above 0.
 the maze, animals with ten eyes have a higher fitness and travel farther than animals with one eye.
 
 **Limits.** Some rows have few steps because the training run was stopped early, and not because learning was finished.
-In the rows "with tanh" for tracking and the maze, the learner did not limit the means of actions. In the maze row "with
-tanh", contact had its full cost only after 500,000 steps. `docs/measurements/learning.md` lists other settings that
-were tried.
+In the rows "with tanh" for tracking and the maze, the learner did not limit the mean of the policy's distribution of
+actions. In the maze row "with tanh", contact had its full cost only after 500,000 steps.
+`docs/measurements/learning.md` lists other settings that were tried.
 
 Training runs take minutes each, so their results are stored (`docs/validation/data/learning_curves.csv`). The page is
 written from the stored results.
