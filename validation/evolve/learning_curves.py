@@ -11,16 +11,17 @@ finds the goal first in a third of the episodes. Eyes with many receptors use on
 the single receptor uses 96 rays.
 
 **First table.** "CPU s" is the CPU time of one thread, for rollouts and updates but without the evaluations. "update"
-is the fraction of this time that the updates take. Brackets contain the 95 % confidence interval (Wilson) of the
-fraction in the last evaluation. "return" is the undiscounted return per training episode. The animal with a single
-receptor often reaches no object. If it reaches one, this object is the goal in one of three cases, as expected by
-chance.
+is the fraction of this time that the updates take. "80 % after" is the number of steps after which the agent first
+reaches the goal first in 80 % of the episodes. "goal first" and "adversary" are the fractions of episodes of the last
+evaluation in which the goal or an adversary is reached first. Brackets contain the 95 % confidence interval (Wilson).
+"return" is the undiscounted return per training episode. The animal with a single receptor often reaches no object. If
+it reaches one, this object is the goal in one of three cases, as expected by chance.
 
 **Second table.** This table is for the maze, where the distance travelled measures success. It states the distance from
-the start at which an episode ends, and the return of the episode. The return is 0.25 per metre of this distance, minus
-1 for every action in contact with a wall. The fitness is 1.5 per metre, minus 2 for every such action. Means have 95 %
-confidence intervals. For the interval of the fitness, only an upper bound of the width is known, and the table states
-this bound.
+the start at which an episode ends, the number of actions in contact with a wall, and the return of the episode. The
+return is 0.25 per metre of this distance, minus 1 for every action in contact with a wall. The fitness is 1.5 per
+metre, minus 2 for every such action. Means have 95 % confidence intervals. For the interval of the fitness, only an
+upper bound of the width is known, and the table states this bound.
 
 An animal that stands still has a return of 0, and an animal with one eye learns little more than to stand still.
 Animals with ten eyes learn to travel through the maze. For comparison, a hand-written controller receives the true

@@ -16,10 +16,11 @@ below one wave, is converted to float32. Long distances alone therefore do not r
 **Second table.** In `optics`, float32 is not accurate enough for dark windows. The rounding error is a fixed fraction
 of the pupil's light, and a window far from the focus receives so little of that light that the error is large in
 comparison. Here the source in front of an ideal lens (R = 50 µm, f = 0.5 mm) moves off the axis while the window stays
-on the axis. Every PSF is compared with the direct sum at a few of its points. If the error at these points exceeds the
-tolerance, the PSF is computed again with a smaller tolerance or by an exact method. If the error is still too large, an
-`AccuracyError` is raised, whose message recommends another dtype ("refused" in the table). With float64, the tolerance
-is still reached in these windows.
+on the axis. "window / focus" is the brightness in the window relative to that in the focus (root mean squares). Every
+PSF is compared with the direct sum at a few of its points. If the error at these points exceeds the tolerance, the PSF
+is computed again with a smaller tolerance or by an exact method. If the error is still too large, an `AccuracyError` is
+raised, whose message recommends another dtype ("refused" in the table). With float64, the tolerance is still reached in
+these windows.
 
     python -m validation.optics.float32_precision [--out DIR] [--docs DIR]
 """

@@ -15,13 +15,13 @@ nodes, which is accurate to 1e-5. The table states the median and the largest er
 pupil. The second table is for the design of lenses. The pupils have a radius of 1 mm, a focal length of 10 mm, and a
 map of heights or Zernike modes. A map of heights is smooth, plus random deviations with the stated standard deviation
 ("noise"). The table states CPU times of single PSFs, without and with the gradient with respect to all heights or
-coefficients. The last two columns state the time and the error of a matrix Fourier transform in NumPy. Unlike `optics`,
-it does not predict its error.
+coefficients, and the predicted and the actual error of the PSF. The last two columns state the time and the error of a
+matrix Fourier transform in NumPy. Unlike `optics`, it does not predict its error.
 
 **Limits.** The other codes cannot share a plan between the eyes of a population. Unlike `optics.psf`, they also have no
 exact propagator whose output grid can be chosen freely. Their matrix Fourier transform from the pupil to the focal
-plane is used instead. It equals Fresnel's integral if the phase kr²/2z is added to the field in the pupil. The errors
-of these codes therefore come from the paraxial model, and from the hard or grey edge of the sampled pupil.
+plane is used instead. This transform equals Fresnel's integral if the phase kr²/2z is added to the field in the pupil.
+The errors of these codes therefore come from the paraxial model, and from the hard or grey edge of the sampled pupil.
 
     python -m validation.peers.population_speed [--eyes N] [--without-peers] [--out DIR] [--docs DIR]
 """
