@@ -10,12 +10,13 @@ the agent reaches the goal first in 80 % of the episodes. An agent that reaches 
 finds the goal first in a third of the episodes. Eyes with many receptors use one ray per receptor (four in mazes), and
 the single receptor uses 96 rays.
 
-**First table.** "CPU s" is the CPU time of one thread, for rollouts and updates but without the evaluations. "update"
-is the fraction of this time that the updates take. "80 % after" is the number of steps after which the agent first
-reaches the goal first in 80 % of the episodes. "goal first" and "adversary" are the fractions of episodes of the last
-evaluation in which the goal or an adversary is reached first. Brackets contain the 95 % confidence interval (Wilson).
-"return" is the undiscounted return per training episode. The animal with a single receptor often reaches no object. If
-it reaches one, this object is the goal in one of three cases, as expected by chance.
+**First table.** "80 % after" is the number of steps after which the task counts as solved, and "CPU s" is the CPU time
+of one thread until then, for rollouts and updates but without the evaluations. "update" is the fraction of the CPU time
+that the updates take. "steps" is the length of the whole training run. "goal first" and "adversary" are the fractions
+of episodes of the last evaluation in which the goal or an adversary is reached first. Brackets contain the 95 %
+confidence interval (Wilson). "return" is the undiscounted return per training episode. The animal with a single
+receptor often reaches no object. If it reaches one, this object is the goal in one of three cases, as expected by
+chance.
 
 **Second table.** This table is for the maze, where the distance travelled measures success. It states the distance from
 the start at which an episode ends, the number of actions in contact with a wall, and the return of the episode. The
