@@ -133,7 +133,7 @@ class BSplineRelief(Relief):
         return float(np.ptp(plain(self.control_points)))
 
     def bandwidth(self, level: float) -> float:
-        return 1.0  # twice the half cycle per half width of a cubic polynomial
+        return 1.0  # a cubic polynomial has about half a cycle per half width; a factor of 2 is added
 
     def detail(self, level: float) -> float:
         return 0.0

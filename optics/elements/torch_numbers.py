@@ -13,7 +13,7 @@ __all__ = ["refuse_torch", "torch_numbers", "with_numbers"]
 
 
 def torch_numbers(element: Any) -> dict[str, Any]:
-    """Return the tensors that require a gradient, with their places as keys, such as {"height.samples": tensor}.
+    """Return the tensors that require a gradient, with paths of attributes as keys: {"height.samples": tensor}.
 
     element: a pupil, or another dataclass, dictionary or tuple, which is searched with all its entries.
     """

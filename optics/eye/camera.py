@@ -141,7 +141,7 @@ def camera_eye(
 
 @lru_cache(maxsize=4)
 def _camera_eye(pupil: Pupil, sensor: Sensor, distance: float, tolerance: float) -> Eye:
-    """Return the eye of a camera. Recent eyes are kept, because they keep their kernels."""
+    """Return the eye of a camera. Recent eyes are cached, because they contain their kernels."""
     width = sensor.pixels[1] * sensor.pitch
     focal = distance / number(behind_pupil(pupil, 1.0))
     return Eye(

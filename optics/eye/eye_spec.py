@@ -217,7 +217,7 @@ class EyeSpec:
 
     @property
     def parallax(self) -> float:
-        """Shift [average receptors m] of the image across the pupil's diameter, per difference of inverse distance."""
+        """Shift of the image [average receptors] between opposite edges of the pupil, per unit of 1/distance [1/m]."""
         if self.pupil is None:
             return 0.0
         return 2 * number(self.pupil.aperture_radius) * number(self.sensor_distance) / min(self.receptor_size)

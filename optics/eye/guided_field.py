@@ -80,7 +80,7 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
     Raises:
         ValueError: the waveguide has no guided mode at one of the wavelengths, or an argument carries a derivative.
-        AccuracyError: the field E needs too many samples.
+        AccuracyError: the receptor's field needs too many samples.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     spot = spot_of(beams, retina)
@@ -95,9 +95,10 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """Return E over the cells of a window that contains all of E, except for a fraction of at most the tolerance.
+    """Return the accepted fraction of a source's light, E, over the cells of a window.
 
-    The window is widened until this holds. It is never wider than the light of `spot` and the waveguide together.
+    The window is widened until it contains all of E except for a fraction of at most the tolerance. It is never wider
+    than the light of `spot` and the waveguide together.
     """
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
@@ -117,7 +118,7 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Number of cells in a row, their side, and the sampling distance that resolves E. Lengths are tangents."""
+    """Number of cells in a row, their side, and the sampling distance that resolves a receptor's field, as tangents."""
 
     count: int
     side: float
@@ -148,7 +149,10 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return E integrated over each cell, in terms of tangents, and the fraction of E that the cells contain."""
+    """Return the accepted fraction of a source's light, E, over cells, and the part of all of E that they contain.
+
+    E is integrated over each cell, in units of tangents.
+    """
     from scipy.ndimage import map_coordinates
 
     middle = [math.tan(angle) for angle in beam.source.angle]

@@ -32,7 +32,7 @@ MOST_LAYERS = 64  # choice, limited by time: largest number of layers
 class Layer:
     """Cells of a scene in one range of distances.
 
-    source: (Y, X) int, flat index of the cell whose radiance and distance each cell has.
+    source: (Y, X) int, flat index of the cell from which each cell takes its radiance and distance.
     cells: (Y, X) bool, the cells of the layer, including cells behind nearer layers.
     hiding: (Y, X) bool, those cells that hide farther layers.
     """

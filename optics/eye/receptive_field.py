@@ -226,8 +226,8 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 
     The fraction of the light that the window loses may equal the tolerance. Half of it is for diffraction at the
     pupil's edge, and half for rays that hit the retina outside the window. If masks, pixels or fine detail scatter
-    light, they use half of the rays' half. A spatial frequency is a sine divided by λ. Diffraction therefore increases
-    the sine of a ray's angle θ by λ times the added frequency, and the ray hits the retina at z tan θ.
+    light, rays and this light share the second half equally. A spatial frequency is a sine divided by λ. Diffraction
+    thus increases the sine of a ray's angle θ by λ times the added frequency. The ray hits the retina at z tan θ.
 
     centre: geometric image (x, y) [m].
     """

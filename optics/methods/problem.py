@@ -38,7 +38,7 @@ DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the to
 # can be a small difference to which the detail contributes most, as for the focal length of a lens in focus.
 FINER_DETAIL = 10.0
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
-FADE_RIPPLE_PER_TOLERANCE = 3.0  # choice: the same for light that fades out where a steep pupil sends little of it
+FADE_RIPPLE_PER_TOLERANCE = 3.0  # choice: the same for the fade of a steep pupil's light beyond the band
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ class Problem:
         """Allowed amplitude error of light beyond the band."""
         if self.steep:
             return min(FADE_RIPPLE_PER_TOLERANCE * self.tolerance, 0.1)
-        return self.ripple if self.reach is None else 0.1  # choice: there is hardly any light beyond it
+        return self.ripple if self.reach is None else 0.1  # choice: there is hardly any light beyond the band
 
     @property
     def outermost(self) -> float:

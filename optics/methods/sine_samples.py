@@ -72,7 +72,7 @@ class SineSamples:
         return _middle(self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return s - s₀ of points of the pupil [m]."""
+        """Return sines of rays from points (x, y) [m] to the window's centre, minus those of the central ray."""
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
 
@@ -99,13 +99,13 @@ class SineSamples:
         return found
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points ξ (x, y) [m] of the pupil in the directions s - s₀."""
+        """Return the points (x, y) [m] of the pupil for sines (s, t) relative to those of the pupil's centre."""
         sx, sy = s + self._middle[0], t + self._middle[1]
         slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, max(self.steepest**2, MOST_SQUARE)))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
 
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
-        """Return ξ = c + z s/√(1 - s²) [m] of sample i along x and j along y, which are float64 indices."""
+        """Return the points (x, y) [m] of samples. i and j are their float64 indices along x and along y."""
         import drjit as dr
 
         at = types.Float64(padded_for_packets(self.at))
@@ -126,7 +126,10 @@ class SineSamples:
         return dr.sqrt(1 - dr.minimum(sx * sx + sy * sy, opaque(types, self.steepest**2)))
 
     def field(self, beam: Beam, types: Precision) -> Field:
-        """Return the field behind the pupil times the areas of the samples dξ dη = z²/cos⁴θ ds dt [m²]."""
+        """Return the field behind the pupil times the areas of the samples [m²].
+
+        The area is dξ dη = z²/cos⁴θ ds dt for a ray at the angle θ, with the sines (s, t).
+        """
         import drjit as dr
 
         column, row = self.grid.coordinates(types)
@@ -176,8 +179,8 @@ def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: flo
     The result is None if samples that are evenly spaced in sines are too uneven in the pupil, or if the grid would be
     too large.
 
-    The distance of two points in the pupil is at most z/cos³θ times the distance of their sines. The number of cycles
-    per unit of sine is therefore the number of cycles per metre times this factor.
+    The distance between two points in the pupil is at most z/cos³θ times the distance between their sines. The number
+    of cycles per unit of sine is therefore the number of cycles per metre times this factor.
 
     shift: distance by which the grid is shifted along both axes, in units of its pitch, at most 1.
     """

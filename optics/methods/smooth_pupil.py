@@ -174,8 +174,8 @@ class SmoothPupil:
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the integral of the Gaussian over the aperture, at points in radii.
 
-        The factors of all near sides are multiplied. If the light of one side is diffracted by a steep slope, it comes
-        from the side itself. All other factors then refer to the Gaussian along this side.
+        The factors of all near sides are multiplied. If light is diffracted by one side and the slope there is steep,
+        the light comes from this side itself. All other factors then refer to the Gaussian along this side.
         """
         depth, across, down = np.stack([np.broadcast_arrays(*side.depth(x, y)) for side in self.sides], axis=1)
         mean, variance = inner.along(across, down)
