@@ -25,7 +25,7 @@ CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_s
 ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
 SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
 INTERPOLATED = 2e-4  # choice: error of the interpolated kernel of the check
-# Choices: numbers of interpolation points across the pupil, and phases [rad] above which each but the last is too small.
+# Choices: numbers of interpolation points across the pupil, and phases [rad] from which on each is too small.
 ORDERS, PHASES = (3, 5, 7, 9, 12, 16), (0.1, 0.6, 1.5, 3.0, 6.0)
 
 

@@ -23,7 +23,7 @@ def readable(name: str, value: Any) -> Any:
     masked elements (numpy.ma) as data. Entries of lists and tuples are treated in the same way.
 
     Raises:
-        ValueError: masked elements, or a tensor on the device "meta", which contains no numbers.
+        ValueError: elements are masked, or a tensor is on the device "meta", which contains no numbers.
     """
     if type(value) is np.ndarray:
         return value

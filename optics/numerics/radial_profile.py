@@ -20,7 +20,8 @@ __all__ = ["DistinctRadii", "RadialProfile"]
 # Choice: entries of the matrix that maps points to the table; 128 MB in float64. If the matrix would be larger, the
 # image is computed at the positions of the table.
 LARGEST_MATRIX = 2**24
-# Choice, limited by memory: radii of 8 windows are cached up to this number of samples, and of one above it.
+# Choice, limited by memory: the radii of 8 windows are cached if they have at most this number of samples, else those
+# of one window.
 LARGE_WINDOW = 2**18
 BESIDE = TAPS // 2 - 1  # number of positions of the table beyond the axis; there is one more beyond the rim
 

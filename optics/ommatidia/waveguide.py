@@ -66,7 +66,7 @@ class Mode:
         return here * here / (below * above)
 
     def _square(self) -> float:
-        """Return the integral of the squared field, scaled to 1 at the core's edge, in closed form with κ."""
+        """Return the integral of the squared field, scaled to 1 at the core's edge, in closed form."""
         azimuth = math.pi * (2 if self.l == 0 else 1)
         outside = self.radius**2 / 2 * (1 / self._kappa() - 1)
         return azimuth * outside / (1 - self.core_share)

@@ -184,6 +184,9 @@ class _Sum:
     def fraction(self, beam: Beam, wavelength: float) -> Array:
         """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ and the waves W of the beam.
 
+        The outer sum is over the frequencies (sx, sy) of weight w, the inner sum over the pupil's nodes with amplitudes
+        u.
+
         Derivatives come from the adjoint of the sum, which consists of three sums of the same size. It is computed only
         if a number of the beam carries a derivative.
         """

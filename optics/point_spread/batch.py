@@ -43,7 +43,7 @@ class PSFBatch(OnWindow):
     tensor: PSFs [1/m²] as a Dr.Jit tensor (eye, depth, wavelength, y, x) with derivatives.
     psf: the same as a NumPy array.
     plans: one plan per PSF, in the same order, as a flat tuple.
-    members: parameters of each PSF, in the same order.
+    members: parameters of each PSF, in the order of `plans`.
     setup: parameters that all PSFs share.
 
     See PSFResult for conventions.

@@ -191,7 +191,7 @@ def exact_psf(
 
 
 def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarray) -> np.ndarray:
-    """Return the exact PSF at the drawn points, by the direct sum in float64."""
+    """Return the exact PSF at the points with the flat indices `drawn`, by the direct sum in float64."""
     row, column = np.divmod(drawn, problem.window.shape[1])
     return _at_points(beam, problem, reference, problem.window.x[column], problem.window.y[row])
 

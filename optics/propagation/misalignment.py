@@ -107,7 +107,9 @@ class Alignment:
         )
 
     def weights(self, nodes: np.ndarray, grid: Grid, turns: float) -> list[np.ndarray]:
-        """Return L_j(ζ) exp(2πi ζ turns) at the samples of a grid about the centre, (y, x) each.
+        """Return L_j(ζ) exp(2πi ζ turns) for each node j at the samples of a grid about the centre, (y, x) each.
+
+        L_j are the Lagrange polynomials of the nodes, and ζ is the depth of the tilted plane.
 
         turns: waves per depth [1/m].
         """
@@ -118,7 +120,7 @@ class Alignment:
         return [weight * np.exp(2j * np.pi * turns * depth) for weight in found]
 
     def depth(self, grid: Grid) -> np.ndarray:
-        """Return ζ [m] at the samples of a grid about the centre, (y, x)."""
+        """Return the depth ζ [m] of the tilted plane at the samples of a grid about the centre, (y, x)."""
         rows, columns = (np.arange(n) - n // 2 for n in grid.shape)
         found: np.ndarray = grid.dx * np.add.outer(self.slope[1] * rows, self.slope[0] * columns)
         return found
@@ -155,12 +157,12 @@ ALIGNED = Alignment()
 
 
 def slowness(sine: float) -> float:
-    """Return 1 - c = (1 - cos θ)/2."""
+    """Return 1 - c = (1 - cos θ)/2 from sin θ, where exp(ikcζ) is the carrier of light at the angle θ."""
     return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 
 def path_to_tilted_plane(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:
-    """Return the path [m] of a source's light from the plane of a pupil's centre to its tilted plane, minus ζ.
+    """Return the path [m] of a source's light from the plane of a pupil's centre to its tilted plane, minus its depth.
 
     The result is for the samples of a grid about the centre, (y, x).
     """

@@ -258,7 +258,9 @@ def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> n
 
 
 def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:
-    """Return the displacements [m] of light along x and y, for x z tan θ fx/|f| = z λ fx / cos θ.
+    """Return the displacements [m] along x and y of light with the frequencies (fx, fy).
+
+    Along x, it is z tan θ fx/|f| = z λ fx / cos θ.
 
     They are infinite for light that is too near grazing incidence.
     """

@@ -97,7 +97,7 @@ class SpectralBands(ReadOnlyArrays):
 
 
 def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> np.ndarray:
-    """Return x >= 0 with weights @ x closest to the catches. Among several such x, it is the closest to the means."""
+    """Return x >= 0 with weights @ x closest to the catches; among several such x, the one closest to the means."""
     from scipy.optimize import lsq_linear
 
     equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
