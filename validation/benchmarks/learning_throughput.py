@@ -30,7 +30,7 @@ from validation.benchmarks.sim_throughput import (  # sets OpenGL before MuJoCo 
 )
 
 NEURONS = 64
-BARS = {"detection": 12.0, "maze": 50.0}  # ratios to mujoco.Renderer
+BARS = {"detection": 12.0, "maze": 50.0}  # smallest ratios of the training rate to that of mujoco.Renderer
 
 
 @dataclass(frozen=True)

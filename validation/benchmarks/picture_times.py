@@ -17,7 +17,7 @@ import sim
 from sim.envs.follow_camera import FollowCamera
 from sim.worlds.state import WorldState
 
-QUICK, SLOW, WARM_UP = 15, 3, 2  # images
+QUICK, SLOW, WARM_UP = 15, 3, 2  # numbers of fast, slow and uncounted images
 SAMPLES = 12  # of slow renderings
 EYES = {"maze": sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_range_deg=300)}
 

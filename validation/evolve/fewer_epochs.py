@@ -135,7 +135,13 @@ def pairs(lives: Sequence[Life], task: str) -> list[tuple[Life, Life]]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Results of a task's training runs in both ways: returns, difference with standard error, goals first, CPU."""
+    """Results of a task's training runs with constant and with fewer epochs.
+
+    returns: mean returns.
+    gain, error: mean difference of the returns, and its standard error.
+    goals: fractions of episodes in which the goal was reached first.
+    cpu: CPU times [s].
+    """
 
     returns: tuple[float, float]
     gain: float
@@ -145,7 +151,7 @@ class Comparison:
 
 
 def compared(both: Sequence[tuple[Life, Life]]) -> Comparison:
-    """Compare two or more pairs."""
+    """Compare two or more pairs of training runs."""
     areas = np.array([[np.mean(life.curve) for life in pair] for pair in both])
     gains = areas[:, 1] - areas[:, 0]
     goals, cpu = (

@@ -239,7 +239,7 @@ class _Finder:
         return self._site("axes", start, end, swapped)
 
     def _between(self, kind: str, left: ast.AST, right: ast.AST, before: str, after: str) -> Iterator[Site]:
-        """Yield the operator between two operands."""
+        """Yield the site of the operator between two operands."""
         low, high = self._end(left), self._start(right)
         pattern = r"\b" + before.replace(" ", r"\s+") + r"\b" if before[0].isalpha() else re.escape(before)
         match = re.search(pattern, self.source[low:high].decode())

@@ -102,7 +102,7 @@ def _lens(aperture: float, focal_length: float = FOCAL_LENGTH) -> RealLens:
 
 
 def limits() -> dict[str, float]:
-    """Return the limits of the mask: given errors of its deviation, and effects that it omits."""
+    """Return the limits of the mask: slopes with given errors of the deviation, and onsets of omitted effects."""
 
     def off(angle: float, by: float) -> float:
         return 1 - thin_deviation(angle, N) / deviation_glass_first(angle, N) - by

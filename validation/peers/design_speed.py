@@ -42,7 +42,7 @@ class Design:
 
 @dataclass(frozen=True)
 class DesignRow:
-    """Milliseconds of CPU time for a PSF, and with its gradient; predicted and actual error; the same of the yardstick.
+    """CPU times [ms] of a PSF without and with its gradient, its errors, and time and error of the yardstick.
 
     All values are medians over new pupils.
     """

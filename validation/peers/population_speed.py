@@ -56,7 +56,11 @@ GOAL = 3000.0  # PSFs per CPU second, at a tolerance of 1e-2
 
 @dataclass(frozen=True)
 class Row:
-    """code, with its setting; PSFs per CPU second; median and largest error over some of the eyes."""
+    """Results of a code with one setting.
+
+    rate: PSFs per CPU second.
+    median, worst: median and largest error over some of the eyes.
+    """
 
     code: str
     asked: str
@@ -146,7 +150,7 @@ def pupil_field(pupil: optics.Pupil, n: int, parts: int = 1) -> tuple[np.ndarray
 
 
 def finished(amplitude: np.ndarray, pupil: optics.Pupil) -> np.ndarray:
-    """PSF from an amplitude in the code's own scale: Fresnel's |U|² has the power of the pupil's spectrum."""
+    """Return the PSF [1/m²] for Fresnel's amplitude U on the window."""
     image = np.abs(amplitude) ** 2
     found: np.ndarray = image / pupil.area
     return found
@@ -165,7 +169,7 @@ def prysm_picture(n: int) -> Picture:
 
 
 def _scale(field: np.ndarray, pitch: float, out: np.ndarray) -> float:
-    """Return the factor that gives the axis |Σ u| dξ²/λz, for any convention of a code."""
+    """Return the factor that gives a code's output `out` Fresnel's amplitude on the axis, |Σ u| dξ²/λz."""
     axis = abs(out[N // 2, N // 2])
     return float(abs(field.sum()) * pitch**2 / (WAVE * Z) / axis)
 

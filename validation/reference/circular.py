@@ -30,7 +30,10 @@ def airy_psf(r: np.ndarray, wavelength: float, radius: float, focal_length: floa
 
 
 def airy_encircled_energy(r: np.ndarray, wavelength: float, radius: float, focal_length: float) -> np.ndarray:
-    """Return 1 - J0(v)² - J1(v)² (Born & Wolf §8.5.2, eq. 18)."""
+    """Return the fraction of the power within the radius r, 1 - J0(v)² - J1(v)² (Born & Wolf §8.5.2, eq. 18).
+
+    v is that of `airy_psf`.
+    """
     v = 2 * np.pi * radius * np.asarray(r, dtype=np.float64) / (wavelength * focal_length)
     return 1 - j0(v) ** 2 - j1(v) ** 2
 

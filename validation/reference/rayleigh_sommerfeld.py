@@ -56,10 +56,11 @@ def ideal_lens_field(
 def ideal_lens_profile(
     r_max: float, wavelength: float, radius: float, focal_length: float = math.inf, distance: float | None = None
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """`ideal_lens_field` as a function of r in [0, r_max]: its Chebyshev interpolant in r², error 1e-11 of the peak.
+    """Return `ideal_lens_field` as a function of r in [0, r_max], interpolated with an error of 1e-11 of the peak.
 
-    The field is even and analytic in r, and band-limited by the steepest ray (Trefethen, Approximation Theory and
-    Approximation Practice, ch. 8). It saves time for windows with more than a few hundred radii.
+    The function is a Chebyshev series in r², because the field is even and analytic in r, and band-limited by the
+    steepest ray (Trefethen, Approximation Theory and Approximation Practice, ch. 8). It saves time for windows with
+    more than a few hundred radii.
     """
     z = focal_length if distance is None else distance
     steepest = (radius + r_max) / math.hypot(radius + r_max, z)
@@ -89,7 +90,7 @@ def _nodes(r: float, k: float, radius: float, focal_length: float, z: float, sou
     They follow from the largest gradient of the phase, and from the nearest complex singularity of the kernel. n
     Gauss-Legendre nodes integrate exp(iωx) on [-1, 1] as soon as 2n exceeds ω. A singularity on the Bernstein ellipse
     with the parameter ρ adds an error of ρ^-2n. 2m points around the circle integrate harmonics below 2m, and a
-    singularity at φ = is adds an error of e^{-2ms}.
+    singularity at φ = i s adds an error of e^{-2ms}.
     """
     rho = np.linspace(0, radius, 33)[:, None]
     angle = np.linspace(0, np.pi, 17)

@@ -29,7 +29,7 @@ SPARE = 60  # choice: nodes beyond π per cycle, above which Gauss-Legendre quad
 class Light:
     """Light on the pupil.
 
-    at: θ to a(θ) e^{ikW(θ)}.
+    at: function that returns a(θ) e^{ikW(θ)} for angles θ.
     cycles: upper bound on the cycles of W between the rims.
     """
 

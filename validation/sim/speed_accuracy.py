@@ -67,10 +67,10 @@ from validation.sim.speed_accuracy_points import Chart, Errors, Point, Setting, 
 
 BANDS = 8  # of the references: error 0.7 % of a signal, since their weights are exact
 SPP = {"perfect lens": 96**2, "lens": 64}  # of each half of a reference: per receptor, and per cell of its image
-TO_THE_END = {"perfect lens": 4096, "lens": 64}  # rays per receptor
+TO_THE_END = {"perfect lens": 4096, "lens": 64}  # rays per receptor of converged renderings
 FEW, MANY = 8, 64  # worlds rendered at once: few for many rays
 # States that agents reached, and states with an object ahead. Over 8 of the latter, the standard deviation of the error
-# from chance is 0.06 σ behind a # lens with a = 0.25, where the error of "auto" is closest to its bound.
+# from chance is 0.06 σ behind a lens with a = 0.25, where the error of "auto" is closest to its bound.
 STATES = {"perfect lens": (4, 8), "lens": (4, 24)}
 SLACK = 0.8  # smallest speed relative to the front's
 REFERENCE_ERROR = 0.15  # [σ] largest standard error of the reference
@@ -103,7 +103,11 @@ BEHIND_LENS = (
 
 @dataclass(frozen=True)
 class Population:
-    """Receptors over which errors are computed: a mask (env, eye, height, width) for the crowd's first states."""
+    """Receptors over which errors are computed.
+
+    crowd: states of all worlds.
+    counted: mask (env, eye, height, width) of the receptors in the first of these states.
+    """
 
     crowd: WorldState
     counted: np.ndarray

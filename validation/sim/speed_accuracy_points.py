@@ -45,12 +45,15 @@ class Errors:
 
     @classmethod
     def between(cls, found: Sequence[np.ndarray], true: Sequence[np.ndarray], unit: float) -> Errors:
-        """Return differences between signals and true signals, one array for each population."""
+        """Return the errors of signals, given as one array for each population.
+
+        unit: σ, in the unit of the signals.
+        """
         return cls(*(rms(a - b) / unit for a, b in zip(found, true, strict=True)))
 
     @property
     def worst(self) -> float:
-        """Larger of both errors, on which "auto" has a bound."""
+        """Larger of both errors, for which "auto" promises a bound."""
         return max(self.everywhere, self.on_objects or 0)
 
     def __str__(self) -> str:
