@@ -121,7 +121,7 @@ class Pupil:
 
     @property
     def transmission(self) -> Scalar:
-        """Fraction of the light on the open aperture that the mask transmits (1 without a mask), with derivatives."""
+        """Fraction of the light on the open aperture that the mask transmits, with derivatives; 1 without a mask."""
         # Nothing is cached: a graph allows one backward pass, and gradients of Dr.Jit numbers may be enabled later.
         if is_differentiable(self.aperture_radius) or not (self.mask is None or self.mask.plain):
             import drjit as dr

@@ -21,7 +21,7 @@ def torch_numbers(element: Any) -> dict[str, Any]:
 
 
 def with_numbers(element: Any, numbers: Mapping[str, Any]) -> Any:
-    """Return the element with other numbers at the places that `torch_numbers` found."""
+    """Return the element with the given numbers at the attributes that are their keys; see `torch_numbers`."""
     return _replaced(element, "", numbers)
 
 

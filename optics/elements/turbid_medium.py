@@ -122,7 +122,7 @@ class TurbidMedium:
 
 
 def sea_water(chlorophyll: float) -> TurbidMedium:
-    """Return sea water with this concentration of chlorophyll [mg/m³], in [0, 30].
+    """Return sea water with the concentration C of chlorophyll [mg/m³], in [0, 30].
 
     Absorption and scattering follow the classic model of case 1 waters, with λ in nm. Absorption is a = a_w + a_p + 0.2
     a_p(440) exp(-0.014 (λ - 440)) with a_p = 0.06 A(λ) C^0.65. Scattering is b = b_w + 0.30 C^0.62 (550/λ). Pure sea

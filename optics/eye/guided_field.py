@@ -3,8 +3,8 @@
 A point source is imaged at the position v [m] relative to a waveguide. Let E(v) be the fraction of its light on the
 pupil that the waveguide accepts and absorbs. If a receptor occupies the area A of the retina, its kernel is E(v)/A,
 integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area. The
-waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. The kernel of a
-source at the position u, for a receptor at r, has the argument r - u = -v, so that it is E rotated by 180°.
+waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. For a source
+imaged at u and a receptor at r, the kernel is a function of r - u = -v. It is therefore E rotated by 180°.
 """
 
 from __future__ import annotations

@@ -141,7 +141,7 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
     """Return the result of a function of the area that the light reaches.
 
-    If it is refused for a steep relief, the area is limited to the longer or else to the shorter side of the retina.
+    If the function refuses a steep relief, the area is limited to the longer or else to the shorter side of the retina.
     """
     errors: list[AccuracyError] = []
     for most in (math.inf, max(retina.size), min(retina.size)):

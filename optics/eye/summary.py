@@ -128,7 +128,7 @@ class Description:
         return {"acuity, vertical": f"{bound}{_cycles(self._vertical_limit)}, {apart}"}
 
     def _range_rows(self) -> dict[str, str]:
-        """Rows on receptors in other directions, unless all are alike."""
+        """Return rows on receptors in other directions, unless all receptors are alike."""
         if self.interommatidial_range_deg is None:
             return {}
         names = "spacing, horizontal", "spacing, vertical"

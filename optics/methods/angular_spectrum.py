@@ -38,7 +38,10 @@ __all__ = [
 
 @dataclass(frozen=True)
 class GridSampling(SpectrumSampling):
-    """Spectrum of a pupil with a soft edge on a grid. pupil_period: number of the pupil's samples per period."""
+    """Spectrum of a pupil with a soft edge on a grid.
+
+    pupil_period: number of the pupil's samples per period.
+    """
 
     method: str
     edge: PupilEdge

@@ -63,7 +63,7 @@ class FarFieldSampling:
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property

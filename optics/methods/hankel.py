@@ -66,7 +66,7 @@ class HankelSampling:
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return 2 * (self.line.radius + problem.radius)
 
     @property

@@ -58,7 +58,7 @@ class LowRankSampling:
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
 
     @property

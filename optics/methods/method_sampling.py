@@ -51,7 +51,7 @@ class Sampling(Protocol):
         """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light.
+        """Return the width [m] of the plane over which the light of rounding errors is spread.
 
         An error with the power of the pupil's light, spread evenly over this width, has the intensity 1/width². The
         wider the plane, the smaller are the rounding errors within the window.

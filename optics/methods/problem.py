@@ -239,7 +239,7 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Longest path plus the steepest slope times the radius, in waves. It bounds phases before they are reduced."""
+        """Longest path plus the steepest slope times the radius, in waves; it bounds phases including whole waves."""
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
         return path + self.radius * self.phase_band_inside

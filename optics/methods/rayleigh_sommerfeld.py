@@ -84,7 +84,7 @@ class NodeSampling:
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light.
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`.
 
         It is the width of the focus times the square root of the number of nodes, because the rounding errors of the
         summands are independent.

@@ -40,7 +40,8 @@ RIM = 64  # number of points on the rim from which the range of the sines is det
 class SineSamples:
     """A soft aperture on a grid of sines. The grid lies around the sines of the pupil's centre.
 
-    grid: grid of s - s₀, where s₀ are the sines of the pupil's centre.
+    grid: grid of s - s₀, where s are the sines of rays to the window's centre, and s₀ those of the ray from the pupil's
+        centre.
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.

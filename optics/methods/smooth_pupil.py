@@ -50,7 +50,7 @@ class Side:
     offset: float = 0.0
 
     def depth(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return how far points lie inside the opening [radii], and the outward normal (x, y) of the side there."""
+        """Return the depth of points inside the opening [radii], and the outward normal (x, y) of the side there."""
         if self.radius == 0:
             depth = self.offset - self.normal[0] * x - self.normal[1] * y
             return depth, np.full_like(depth, self.normal[0]), np.full_like(depth, self.normal[1])
@@ -159,7 +159,9 @@ class SmoothPupil:
     ) -> _Gaussian:
         """Return ∫ e^{-u²/2δ²} e^{2πi (W + ∇W·u + uᵀHu/2)} du / 2πδ².
 
-        waves: W, without whole waves. slope: its gradient [1/m]. bends: H, its second derivatives xx, xy, yy [1/m²].
+        waves: W, without whole waves.
+        slope: gradient of W [1/m].
+        bends: H, the second derivatives of W along xx, xy and yy [1/m²].
         """
         square = self.width**2
         xx, xy, yy = (-2j * math.pi * square * bend for bend in bends)

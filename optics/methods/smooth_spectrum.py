@@ -187,7 +187,7 @@ def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
 
 
 def _pitch(band: float, width: float, tolerance: float) -> float:
-    """Return the pitch [m] of light that is convolved with a Gaussian of this width [m], for a band [1/m].
+    """Return the sampling pitch [m] for a band [1/m] of light that is convolved with a Gaussian of this width [m].
 
     The Gaussian attenuates light that is aliased onto the band more than light in the band.
     """

@@ -96,8 +96,8 @@ def _ratios(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return interpolation points in sines, and the slow factor there relative to the middle, (stack, v, u, b, a).
 
-    The interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. It
-    starts with a number of points that is usually sufficient for the phase there.
+    The interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. The
+    search starts with a number of points that is usually sufficient for the phase there.
     """
 
     def ratio(directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray) -> np.ndarray:

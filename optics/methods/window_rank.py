@@ -24,8 +24,8 @@ RANK_OF_DISTANCE = 3  # least rank for derivatives by the distance, which are qu
 def window_rank(problem: Problem, samples: SineSamples, half: float) -> int | None:
     """Return the necessary rank; None if it is too large.
 
-    It is sufficient for the end points of rays, around which the light is. Derivatives may move light anywhere, so the
-    rank is then also sufficient on average over the whole window.
+    The rank suffices at the end points of rays, around which the light arrives. If derivatives are requested, light may
+    move anywhere. The rank then also suffices on average over the whole window.
 
     half: distance [m] from the middle of the window within which the interpolation points lie.
     """

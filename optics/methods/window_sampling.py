@@ -104,7 +104,7 @@ class WindowSampling:
         return _window_sums(self.pupil, self.rank, self.half_width, path, dtype)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return problem.wavelength / self.pupil.grid.dx
 
     @property

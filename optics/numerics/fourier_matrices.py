@@ -37,7 +37,7 @@ def halves_pay(shape_in: Shape, shape_out: Shape) -> bool:
 
 
 def _products(shape_in: Shape, shape_out: Shape) -> tuple[int, int]:
-    """Return the number of products of the sum along x, and of the sum along y that follows."""
+    """Return the numbers of multiplications in the sum along x, and in the sum along y that follows."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return ny * nx * mx, ny * mx * my
 

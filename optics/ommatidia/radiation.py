@@ -119,7 +119,7 @@ def _in_guide_frame(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float
 
 
 def _scaled(at: np.ndarray, ends: Ends) -> np.ndarray:
-    """Map a range to [-1, 1]."""
+    """Map positions from the range `ends` to [-1, 1]."""
     found: np.ndarray = (2 * at - ends[0] - ends[1]) / (ends[1] - ends[0])
     return found
 

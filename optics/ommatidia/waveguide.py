@@ -138,6 +138,8 @@ class Waveguide:
 def _roots(l: int, v: float) -> tuple[float, ...]:
     """Return U of all guided modes of azimuthal order l: the roots of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W).
 
+    Here W² = v² - U².
+
     Each mode above its cut-off has one root, between a zero of J_{l-1} and the next zero of J_l.
     """
     from scipy.optimize import brentq

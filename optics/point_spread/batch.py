@@ -175,7 +175,10 @@ def _members(
 def _joined(
     known: dict[int, tuple[np.ndarray, Plan]], rest: dict[int, tuple[Array, Plan]], types: Precision
 ) -> tuple[Array, list[Plan]]:
-    """Return all PSFs in one array, and their plans."""
+    """Return all PSFs in one array, and their plans.
+
+    known, rest: PSFs of the shared plan, and all other PSFs, by index.
+    """
     import drjit as dr
 
     both = {**known, **rest}

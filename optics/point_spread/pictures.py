@@ -1,6 +1,6 @@
 """Computation of requested PSFs.
 
-Each PSF is planned, computed and compared with the direct sum; if it fails, it is repeated.
+Each PSF is planned, computed and compared with the direct sum. If the comparison fails, the PSF is computed again.
 """
 
 from __future__ import annotations

@@ -272,7 +272,7 @@ def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple
 
     Both are flat arrays, and the second one is the sum of three terms.
 
-    centre: position (x, y) of the window, in samples.
+    centre: position (x, y) of the window's centre, in samples.
     """
     height, width = shape
     y, x = (np.square(np.linspace(-1, 1, n)) if n > 1 else np.ones(1) for n in shape)

@@ -236,7 +236,7 @@ class PupilSampling:
         return cls(pupil, source, Grid.square(across, pitch), soft, band, rays, kept, stop.alignment, path)
 
     def transmitted(self, u: np.ndarray | None, settings: StepSettings) -> PlaneField:
-        """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate.
+        """Return the field u on the grid times the pupil's transmittance, or its conjugate in backward propagation.
 
         u: None for light from the source.
         """

@@ -97,7 +97,7 @@ class SeparableSampling:
 
     @property
     def why(self) -> str:
-        """Reason for the sampling, for plans."""
+        """Reason for the sampling, as text for plans."""
         paraxial = "; paraxial, as requested" if self.passage.paraxial else ""
         return f"distant window: the kernel is a sum of {self.terms.count} products of functions of x and y{paraxial}"
 

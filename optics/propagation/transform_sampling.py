@@ -260,9 +260,9 @@ def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> n
 def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:
     """Return the displacements [m] along x and y of light with the frequencies (fx, fy).
 
-    Along x, it is z tan θ fx/|f| = z λ fx / cos θ.
+    The displacement along x is z tan θ fx/|f| = z λ fx / cos θ, and that along y correspondingly.
 
-    They are infinite for light that is too near grazing incidence.
+    Both are infinite for light that is too near grazing incidence.
     """
     wavelength, z = how.passage.wavelength, abs(how.passage.z)
     sine2 = 0 * fy if how.passage.paraxial else (fx**2 + fy**2) * wavelength**2

@@ -125,7 +125,7 @@ def _fourier(n: int, types: Precision) -> None:
 
 
 def _fft_sample(n: int) -> float:
-    """Return the predicted seconds per sample of n x n, as in `fourier.predicted_seconds`."""
+    """Return the predicted seconds per sample of an FFT of n x n samples, as in `fourier.predicted_seconds`."""
     return 2 * (5 * np.log2(n + 1) / cost.FFT_FLOPS + cost.FFT_LINE_SAMPLE) + 2 * cost.FFT_COPY
 
 

@@ -58,7 +58,7 @@ def _humanoid() -> Any:
 
 
 def cases() -> dict[str, Callable[[], Any]]:
-    """Return environments to step, by name."""
+    """Return functions that make the environments to step, by name."""
     import optics
     import sim
 

@@ -69,7 +69,10 @@ LEAST_SAVED = 0.05  # share of the CPU time
 
 @dataclass(frozen=True)
 class Life:
-    """A training run; curve: mean returns of its evaluations, one every INTERVAL steps."""
+    """A training run.
+
+    curve: mean returns of its evaluations, one every INTERVAL steps.
+    """
 
     task: str
     seed: int

@@ -57,7 +57,9 @@ ORDERED = ("arctan2", "atan2", "cross", "divmod", "meshgrid", "where", "searchso
 class Site:
     """A change to one place of a file: bytes from `start` to `end`, which read `before`, become `after`.
 
-    line: counted from 1; kind: kind of mistake; same: number of earlier sites with an equal change of an equal line
+    line: number of the line, counted from 1.
+    kind: kind of mistake.
+    same: number of earlier sites with an equal change of an equal line.
     """
 
     path: str

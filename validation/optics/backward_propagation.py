@@ -63,7 +63,7 @@ class Row:
 class Spot:
     """A Gaussian spot.
 
-    waist: [wavelengths].
+    waist: radius [wavelengths] at which the amplitude has fallen to 1/e.
     share: exact evanescent share.
     said: share reported by optics.propagate.
     error: error of the recovered field.

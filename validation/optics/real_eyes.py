@@ -214,7 +214,7 @@ def limits() -> list[Row]:
 def geisler_photons() -> float:
     """Return photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
 
-    The budget's light is daylight. The ratio of its luminance to that of its light at 555 nm converts it.
+    The photons of daylight near 555 nm are divided by the luminance of daylight in a band 1 nm wide.
     """
     narrow = optics.Receptors((optics.Spectrum((554.0, 555.0, 556.0), (0.0, 1.0, 0.0)),), range_nm=(550.0, 560.0))
     budget = optics.PhotonBudget(math.pi, integration_time=1.0, quantum_efficiency=1.0)

@@ -1,4 +1,7 @@
-"""Rays through a real surface z = h(x), glass below, vacuum above, light along +z: effects beyond a thin element."""
+"""Rays through a real surface z = h(x), which show effects that a thin element omits.
+
+Glass lies below the surface and vacuum above it. Light travels along +z.
+"""
 
 from __future__ import annotations
 

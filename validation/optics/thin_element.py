@@ -63,7 +63,13 @@ PRISM_RADIUS, PRISM_DISTANCE = 20e-6, 1e-3
 
 @dataclass(frozen=True)
 class Prism:
-    """Deviations [rad] at one angle; psf: from the peak of optics.psf (NaN: not computed)."""
+    """Deviations [rad] of a prism with one angle.
+
+    real, reversed: by the real prism, with light through the glass first or through the slope first.
+    thin: by the mask.
+    transmitted: transmitted fraction of the power.
+    psf: position of the peak of optics.psf; NaN if it was not computed.
+    """
 
     angle_deg: float
     real: float

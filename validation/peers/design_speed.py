@@ -42,7 +42,7 @@ class Design:
 
 @dataclass(frozen=True)
 class DesignRow:
-    """CPU times [ms] of a PSF without and with its gradient, its errors, and time and error of the yardstick.
+    """CPU times [ms] and errors of a PSF, without and with its gradient, and of the yardstick.
 
     All values are medians over new pupils.
     """

@@ -74,7 +74,7 @@ def our_points(case: Case, machine: str) -> Iterator[Point]:
 
 
 def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator[Point]:
-    """Yield every method of these peers (with their versions), on every grid, in every precision."""
+    """Yield points of every method of these peers (with their versions), on every grid and in every precision."""
     for peer, version in peers.items():
         done = set()  # some grids are equal for methods that choose their own pitch
         for grid in grids(case):

@@ -116,7 +116,7 @@ def one(pupil: optics.Pupil, **asked: object) -> np.ndarray:
 
 
 def timed(code: str, asked: str, population: list[optics.Pupil], known: dict[int, np.ndarray], picture: Picture) -> Row:
-    """Compute the eyes that are compared, then time the code on new eyes."""
+    """Return the errors of a code for the eyes in `known`, and its speed for new eyes."""
     errors = [relative_l2(picture(population[i]), image) for i, image in known.items()]
     seconds = []
     for again in range(AGAIN):
@@ -130,9 +130,9 @@ def timed(code: str, asked: str, population: list[optics.Pupil], known: dict[int
 
 
 def pupil_field(pupil: optics.Pupil, n: int, parts: int = 1) -> tuple[np.ndarray, float]:
-    """Return samples (n, n) of the pupil's field with the phase r²/2z that a focus lacks, and their pitch [m].
+    """Return samples (n, n) of the pupil's field with Fresnel's phase kr²/2z, and their pitch [m].
 
-    For even n the axis is at n//2.
+    Transforms to a focus lack this phase. For even n, the axis is at n//2.
 
     parts: subsamples of a cell at the edge along an axis.
     """

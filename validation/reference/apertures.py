@@ -1,6 +1,6 @@
 """Fourier transforms of apertures in closed form: ∫∫ exp(-2πi (fx x + fy y)) dx dy over the opening.
 
-Lengths in any unit, frequencies in cycles per that unit.
+Lengths may have any unit. Frequencies are in cycles per this unit.
 """
 
 import numpy as np

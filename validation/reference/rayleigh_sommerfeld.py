@@ -28,12 +28,15 @@ def ideal_lens_field(
     """Return the field of an ideal lens exp(-ik(√(ρ² + f²) - f)) in a unit wave at radii r of the plane z = distance.
 
     The wave is plane, or exp(ik(√(ρ² + s²) - s)) of a point source at s = source_distance. An infinite focal length is
-    the bare aperture. First Rayleigh-Sommerfeld integral (Goodman §3.5), with D the distance from the aperture's point:
+    the bare aperture. The field is the first Rayleigh-Sommerfeld integral (Goodman §3.5), where D is the distance from
+    a point of the aperture:
 
         U = ∫∫ P z/(2πD²) (1/D - ik) e^{ik(D - z)} ρ dρ dφ
 
-    Gauss-Legendre in ρ, trapezoid in φ (half the circle by symmetry). nodes: (radial, angular); by default enough for
-    float64, from the gradient of the total phase of lens and path.
+    The quadrature is Gauss-Legendre's in ρ and the trapezoid rule in φ, over half the circle by symmetry.
+
+    nodes: numbers of nodes (radial, angular). None: enough for float64, from the gradient of the phase of lens and
+        path.
     """
     z = focal_length if distance is None else distance
     if not math.isfinite(z):

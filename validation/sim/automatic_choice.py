@@ -70,7 +70,7 @@ class Choice:
 
     @property
     def value(self) -> float:
-        """Value of the property that differs."""
+        """Value of the property `sweep`."""
         return {RECEPTORS: self.receptors, FIELD: self.fov_deg, EYES: self.eyes}[self.sweep]
 
 

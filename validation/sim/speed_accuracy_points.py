@@ -84,7 +84,7 @@ class Point:
 
     @property
     def kind(self) -> str:
-        """Method; for auto the method that it chose."""
+        """Name of the method; for "auto", that of the chosen method."""
         f = self.fidelity
         return (
             self.setting.back_end
@@ -139,7 +139,7 @@ class Chart:
 
     @property
     def rival(self) -> Point:
-        """The fastest point at least as accurate as auto."""
+        """Fastest point that is at least as accurate as "auto"."""
         return max((p for p in self.points if p.error.worst <= self.auto.error.worst), key=lambda p: p.speed)
 
     @property

@@ -98,7 +98,7 @@ def of_openings() -> Iterator[Case]:
 
 
 def on_the_axis() -> Iterator[Case]:
-    """Yield light behind apertures, with exact closed forms."""
+    """Yield claims on the light on the axis behind apertures, which has exact closed forms."""
     for z in (15e-6, 40e-6, 100e-6):
 
         def light(z: float = z) -> float:
