@@ -76,9 +76,10 @@ def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, 
 
 
 class _Line:
-    """Contribution W(d, s) of a piece of a line, from the foot of the perpendicular to a distance s along the line.
+    """Contribution W(d, s) of a piece of a line to the transmittance at a point.
 
-    d is the signed length of the perpendicular from the point.
+    The piece extends from the foot of the perpendicular from the point to a distance s along the line. d is the signed
+    length of the perpendicular.
 
     Parts of the line beyond the kernel's reach contribute the angle that they subtend. If the line passes through the
     reach, the whole chord contributes a value tabulated for a half-plane. A piece that ends within the reach

@@ -55,7 +55,7 @@ class DerivativeKnots:
 
 
 def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
-    """Return the cells that derivatives with respect to samples of maps require; None if no map is concerned.
+    """Return the cells that derivatives with respect to samples of maps require; None if no derivative requires any.
 
     A derivative with respect to the refractive index is proportional to the height, so it requires the cells of the
     relief, too.

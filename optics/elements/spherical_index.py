@@ -67,7 +67,7 @@ class SphericalIndex:
         return np.asarray(2 * np.arcsin(end) - 2 * h * end * (bend @ gauss_legendre(NODES)[1]))
 
     def path(self, h: np.ndarray) -> np.ndarray:
-        """Return the optical path inside the sphere, relative to R and the medium's index, for relative heights h."""
+        """Return the optical paths inside the sphere of rays at heights h, in units of R times the medium's index."""
         y, end, n, _, radial = self._along(h)
         return np.asarray(2 * end * ((n * n * y / radial) @ gauss_legendre(NODES)[1]))
 

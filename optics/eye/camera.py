@@ -185,7 +185,7 @@ def _radiance(scene: Any, eye: Eye, samples_per_pixel: int) -> np.ndarray:
 
 
 def _distances(depth: Any, shape: tuple[int, ...]) -> Any:
-    """Return a checked distance, or a map of distances."""
+    """Return the distance, or the map of distances, after checks."""
     if is_differentiable(depth) or np.ndim(found := reals("depth", depth)) == 0:
         positive("depth", depth, infinite=True, carried=True)
         return depth

@@ -136,7 +136,7 @@ class _Cells:
 
     @property
     def step(self) -> float:
-        """Sampling distance, as a sine."""
+        """Pitch of samples of the receptor's field, as a sine."""
         return self.pitch * samples_per_cycle(self.tolerance) / samples_per_cycle(self.tolerance / FINER)
 
 

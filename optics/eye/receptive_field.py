@@ -139,9 +139,9 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
 
 
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
-    """Return the result of a function of the area that the light reaches.
+    """Return the result of `compute` for the area that the light reaches.
 
-    If the function refuses a steep relief, the area is limited to the longer or else to the shorter side of the retina.
+    If `compute` refuses a steep relief, the area is limited to the longer or else to the shorter side of the retina.
     """
     errors: list[AccuracyError] = []
     for most in (math.inf, max(retina.size), min(retina.size)):

@@ -158,7 +158,7 @@ def overlaps(edges: np.ndarray, cells: int) -> np.ndarray:
 
 
 def _edges(densities: np.ndarray, count: int) -> np.ndarray:
-    """Return edges (row, count + 1) from -count/2 to count/2, between which each density (row, cell) has equal sums."""
+    """Return edges (row, count + 1) from -count/2 to count/2 that divide each row of densities into equal sums."""
     cells = densities.shape[1]
     sums = np.concatenate([np.zeros((len(densities), 1)), np.cumsum(densities, axis=1)], axis=1)
     at, shares = np.arange(cells + 1) / cells - 0.5, np.arange(1, count) / count

@@ -1,9 +1,9 @@
 """Quadrature nodes in the cells between the knots of maps, for derivatives with respect to the samples of the maps.
 
-In a cell, the integrand of a derivative is a cubic polynomial times a wave, the light behind the pupil. With t in
-[-1, 1] across the cell, the wave is e^{izt} or slower, with the Chebyshev coefficients 2 J_k(z). n Gauss-Legendre nodes
-are exact up to degree 2n - 1. Cells that the edge of the aperture cuts have the same nodes, with weights that are exact
-up to degree n - 1 over the open part.
+In a cell, the integrand of a derivative is a cubic polynomial times a wave, the light behind the pupil. With t in [-1,
+1] across the cell, and z the largest phase of the wave from the middle to a border, the wave is e^{izt} or slower. Its
+Chebyshev coefficients are 2 J_k(z). n Gauss-Legendre nodes are exact up to degree 2n - 1. Cells that the edge of the
+aperture cuts have the same nodes, with weights that are exact up to degree n - 1 over the open part.
 """
 
 from __future__ import annotations

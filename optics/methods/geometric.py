@@ -92,7 +92,7 @@ class PinholeSampling:
         """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
-            ValueError: derivatives are required, but the cell of the light does not change smoothly.
+            ValueError: derivatives are requested, but light jumps from cell to cell.
         """
         import drjit as dr
 

@@ -87,7 +87,7 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
 
 
 def _mean(result: PSFResult, values: Sequence[Array]) -> Array:
-    """Return one value per wavelength from one per request: the same, or their mean if the PSF is a mean."""
+    """Return values, one for each request of a PSF, as one array; or their weighted mean if the PSF is a mean."""
     import drjit as dr
 
     types = precision("float64")
@@ -212,7 +212,7 @@ class _Sum:
 
     @staticmethod
     def _slopes(at: Sequence[Array], places: Sequence[Array], back: Sequence[Array], total: Array) -> tuple[Array, ...]:
-        """Return the derivatives of the sum by h, by the waves and by the amplitudes of the nodes.
+        """Return the derivatives of `fraction` by h, by the waves and by the amplitudes of the nodes.
 
         at: h, waves and amplitudes
         places: x, y of the nodes, and sx, sy of the frequencies

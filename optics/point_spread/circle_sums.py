@@ -108,11 +108,11 @@ def soft_sums(circles: SoftCircles, values: Array) -> Array:
 
 
 def sums_of_cells(values: Array, distance: np.ndarray, radii: np.ndarray, dx: float) -> Array:
-    """Return sums of means over cells of side dx within circles, flat (row, radius), with derivatives.
+    """Return sums within circles of values that are means over cells, flat (row, radius), with derivatives.
 
-    A cell at the distance ρ has the weight (R - ρ)/dx + 1/2, limited to [0, 1]. The sum is the difference between two
-    values of the function t ↦ Σ v max(t - ρ, 0)/dx. This function follows from the sums of v and of vρ over all cells
-    nearer than t.
+    Cells have the side dx. A cell at the distance ρ has the weight (R - ρ)/dx + 1/2, limited to [0, 1]. The sum is the
+    difference between two values of the function t ↦ Σ v max(t - ρ, 0)/dx. This function follows from the sums of v and
+    of vρ over all cells nearer than t.
 
     values: flat Dr.Jit Float64 array (row, sample).
     """

@@ -135,7 +135,7 @@ class _Attempt:
 
 
 def _area(beam: Beam, problem: Problem) -> Array:
-    """Return the area of the open pupil [m²] with the derivative of its radius."""
+    """Return the area of the open pupil [m²], with derivatives with respect to its radius."""
     types = precision(problem.dtype)
     radius = opaque(types, beam.radius)
     return types.Float(beam.pupil.aperture.area * radius * radius)

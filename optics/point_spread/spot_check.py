@@ -268,9 +268,9 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of sides and corners, and the part of the probabilities that does not depend on the PSF.
+    """Return the nearness of points to sides and corners, and the part of their probabilities that no PSF affects.
 
-    Both are flat arrays, and the second one is the sum of three terms.
+    Both are flat arrays. The second one is the sum of three of the distributions that `_chances` lists.
 
     centre: position (x, y) of the window's centre, in samples.
     """

@@ -110,7 +110,7 @@ class StepSettings:
 
     @property
     def edge_ripple(self) -> float:
-        """Ripple of soft edges. It is not below LEAST_RIPPLE, because of rounding errors."""
+        """Relative ripple of the light behind soft edges, at least LEAST_RIPPLE because of rounding errors."""
         return max(self.ripple, LEAST_RIPPLE)
 
     def reaching(self, half_widths: float, distance: float) -> float:

@@ -88,7 +88,7 @@ EVERYTHING = Band(math.inf, 0.0, math.inf)
 
 
 def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) -> float:
-    """Return the distance [m] that light of a spatial frequency [1/m] moves to the side."""
+    """Return the distance [m] that light of a spatial frequency [1/m] moves sideways over the distance z [m]."""
     sine = frequency * wavelength
     return z * (sine if paraxial else sine / math.sqrt(1 - sine * sine))
 

@@ -107,7 +107,7 @@ def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> 
 
 
 def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the values of a spectrum at wavelengths, or raise a ValueError."""
+    """Return a function's result as an array of one value per wavelength, or raise a ValueError."""
     found = full_precision("radiance", found)
     try:
         values = np.broadcast_to(np.asarray(found, np.float64), shape)

@@ -162,7 +162,7 @@ class _Step:
         self._note(sight, "launch", lambda *asked: alone.launch(*asked).wait())
 
     def _note(self, owner: Any, name: str, alone: Callable[..., Any]) -> None:
-        """Record the step's call of this method, to repeat it separately."""
+        """Record the step's call of this method, so that the call can be repeated on its own."""
         method = getattr(owner, name)
 
         def noted(*asked: Any) -> Any:

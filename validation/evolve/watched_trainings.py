@@ -78,9 +78,10 @@ class Row:
 
     @property
     def fitness_error(self) -> float:
-        """Upper bound on the standard error of the fitness, without goals.
+        """Upper bound on the standard error of the fitness in a maze without goals.
 
-        The contacts follow from the difference between return and distance, and errors are added as in the worst case.
+        The number of contacts is computed from the difference between return and distance. Errors are assumed to add
+        up.
         """
         contacts_error = TRAINING.progress * self.distance_error + self.return_error
         return EVALUATION.progress * self.distance_error - EVALUATION.contact * contacts_error

@@ -76,7 +76,7 @@ def measure(aperture: float) -> Row:
 
 
 def orders(rows: list[Row]) -> tuple[float, float, float]:
-    """Return the exponents of NA in both misfits and in the loss of the peak, over the lenses of small aperture."""
+    """Return the powers of NA with which both misfits and the loss of the peak grow, for lenses of small aperture."""
     small = [row for row in rows if row.aperture <= LEADING_ORDER]
     apertures = [row.aperture for row in small]
     return (

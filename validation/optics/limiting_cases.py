@@ -141,7 +141,7 @@ def evanescent_wave() -> float:
 
 
 def far_away() -> float:
-    """Return the error over a window far smaller than the first zero: there |U| is the integral of u, divided by λz."""
+    """Return the error over a window far inside the first dark ring: there |U| is the integral of u, divided by λz."""
     distance, side = 1e6, 5
     found = np.abs(propagated(np.ones((side, side)), distance=distance).u)
     return relative_l2(found, np.full((side, side), (side * 1e-6) ** 2 / (LAMBDA * distance)))

@@ -91,7 +91,7 @@ MINUTE = math.radians(1 / 60)
 
 @dataclass(frozen=True)
 class Row:
-    """A published value, the computed one, and the range of computed/published."""
+    """A published and a computed value, and the range in which their ratio must lie."""
 
     name: str
     unit: str

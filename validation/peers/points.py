@@ -39,7 +39,7 @@ class Point:
 
     @property
     def series(self) -> tuple[str, str, str, str, str]:
-        """Key that points of the same method with other samples share."""
+        """Key that is the same for all points of a method, whatever their samples."""
         return self.case, self.peer, self.method, self.dtype, self.detail
 
 

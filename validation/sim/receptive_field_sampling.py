@@ -123,7 +123,10 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
 
 
 def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
-    """Return the fidelity of the cells of the reference's image, which are whole receptors with a perfect lens."""
+    """Return the fidelity with which the reference's image is rendered before it is convolved.
+
+    Each cell of this image is rendered as a receptor. With a perfect lens, cells are whole receptors.
+    """
     perfect = eyes.optics is None
     if light == "all":
         return sim.Fidelity(PERFECT_AREAS if perfect else CELL_AREAS, eyes.bands, light=light, samples="areas")

@@ -106,7 +106,7 @@ class Population:
     """Receptors over which errors are computed.
 
     crowd: states of all worlds.
-    counted: mask (env, eye, height, width) of the receptors in the first of these states.
+    counted: mask (env, eye, height, width) of the receptors over which errors are computed, in the first worlds.
     """
 
     crowd: WorldState
@@ -128,7 +128,7 @@ class Population:
 
 
 def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[Population]:
-    """Return all receptors in states that agents reached, and receptors that see an object in states with one ahead."""
+    """Return all receptors in states that agents reached, and receptors that see an object in states that face one."""
     crowd = lived_through(world, MANY)
     found = [Population(crowd, np.ones((states[0], scene.eyes.n_eyes, *scene.eyes.resolution), bool))]
     if world.objects:

@@ -102,7 +102,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Chart:
-    """All points of a scene, in σ.
+    """All points of a scene, with errors in σ.
 
     reference_error: standard error of the reference.
     left: difference between converged light of each kind and the reference.
