@@ -126,7 +126,7 @@ class PixelatedAperture(Aperture):
 
     @cached_property
     def _whole(self) -> np.ndarray:
-        """Mask of the pixels that lie inside, (row, column)."""
+        """Mask of the pixels that lie wholly within the opening, (row, column)."""
         return self.contains(self._centres[None, :], self._centres[:, None]) & ~self._near
 
     @cached_property

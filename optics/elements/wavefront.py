@@ -120,7 +120,7 @@ class Zernike(Aberration):
 
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
 
-        Noll's polynomials have the normalisation of OSA, a variance of 1. Astronomy and poppy use them.
+        Noll's polynomials have the normalisation of OSA, a variance of 1. They are used in astronomy and by poppy.
 
         Raises:
             ValueError: a number is outside 1 to 496, or a coefficient is invalid, see `Zernike`.

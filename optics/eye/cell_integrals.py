@@ -30,9 +30,9 @@ FEWER = ((2.0, 1e-2, 0.5), (1.0, 1e-3, 0.25))
 
 
 def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
-    """Return the samples per cycle of the highest frequency that cell integrals need.
+    """Return the number of samples that integrals over cells need per cycle of the highest frequency.
 
-    Their error is then within a third of the tolerance.
+    The error of the integrals is then within a third of the tolerance.
 
     cycles: number of cycles of the highest frequency per cell.
     """

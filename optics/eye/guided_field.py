@@ -149,9 +149,9 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return the accepted fraction of a source's light, E, over cells, and the part of all of E that they contain.
+    """Return integrals over cells of E, the accepted fraction of a source's light, and the part of E in these cells.
 
-    E is integrated over each cell, in units of tangents.
+    Areas of cells are in squared tangents. The part is relative to the integral of E over all directions.
     """
     from scipy.ndimage import map_coordinates
 

@@ -163,7 +163,7 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
 def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
     """Return the area that the light reaches.
 
-    most: largest half side [m]. With the longer side of the retina, the area contains the light that arrives at any
+    most: largest half side [m]. If it is the longer side of the retina, the area contains the light that arrives at any
         receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
     """
     distance = number(retina.distance)

@@ -81,10 +81,10 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack(found)
 
     def places(self, counted: np.ndarray) -> np.ndarray:
-        """Return positions (x, y) on the retina, (n, 2), for coordinates that count receptors from its middle.
+        """Return positions (x, y) on the retina, (n, 2), given in coordinates that count receptors from its middle.
 
-        In the counting coordinates, the receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. Beyond
-        the rim, receptors continue with the size of the outermost ones.
+        In these coordinates, the receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. Beyond the
+        rim, receptors continue with the size of the outermost ones.
         """
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         column, row = (counted + np.array([width, height]) / 2).T
@@ -94,7 +94,7 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack([x, y], axis=-1)
 
     def counted(self, places: np.ndarray) -> np.ndarray:
-        """Return coordinates (..., 2) that count receptors, for positions (x, y): the inverse of `places`."""
+        """Return positions (x, y) in coordinates that count receptors, (..., 2): the inverse of `places`."""
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         x, y = np.moveaxis(places, -1, 0)
         i = np.clip(np.searchsorted(self.rows, y, side="right") - 1, 0, height - 1)

@@ -223,7 +223,7 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Propagate the field from the relay plane to the window by Fresnel's integral, the paraxial part."""
+    """Propagate the field from the relay plane to the window by Fresnel's integral, which adds the paraxial part."""
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

@@ -15,7 +15,8 @@ __all__ = ["on_line", "on_window", "with_sphere"]
 def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, sign: int) -> Field:
     """Return the field times e^{±ik(ρ - z)} at points (x, y) [m].
 
-    ρ is the distance of the point from the pupil's centre, and z that of the window's plane: ρ - z = r²/(ρ + z).
+    ρ is the distance of the point from the pupil's centre, and z that of the window's plane. ρ - z is computed as (x² +
+    y²)/(ρ + z).
 
     sign: sign of the exponent.
     """

@@ -213,7 +213,7 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
 def _added(
     beam: Beam, rule: tuple[np.ndarray, ...], at: tuple[Array, Array], total: tuple[Array, Array], types: Precision
 ) -> tuple[Array, Array]:
-    """Return the real and imaginary part of `total` at points (x, y), plus the sum over nodes (x, y, weight)."""
+    """Return `total`, real and imaginary part at points (x, y), plus the sum over nodes (x, y, weight)."""
     import drjit as dr
 
     x, y = at

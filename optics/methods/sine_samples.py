@@ -5,8 +5,8 @@ The distance from a point ξ of the pupil to points x = c + u of a window about 
     |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
 
 With s as the variable, the term that is linear in u is exactly the Fourier kernel, however wide the aperture is. The
-remaining terms fall with the distance. They are a curvature of about u²NA²/λD cycles over the window, due to the
-obliquity of the rays.
+remaining terms decrease with the distance. They result from the obliquity of the rays, and vary by about u²NA²/λD
+cycles over the window.
 """
 
 from __future__ import annotations

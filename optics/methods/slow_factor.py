@@ -116,7 +116,7 @@ def axis_factor(path: Path, samples: SineSamples, axis: int, sines: np.ndarray, 
     Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
     that kernel.
 
-    sines: sines along the axis, minus those of the pupil's centre. The other sines are those of the pupil's centre.
+    sines: sines along the axis, minus that of the pupil's centre. Along the other axis, the sine is that of the centre.
     places: positions [m] along the axis, relative to the middle of the window. They broadcast with the sines.
     """
     none = np.zeros(1)

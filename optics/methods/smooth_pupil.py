@@ -4,11 +4,11 @@ The convolution multiplies the light of a ray of the frequency ν by e^{-2π²δ
 Light that is too steep to arrive in a window disappears from the samples, and a division of the spectrum by this factor
 restores the light of all other rays exactly.
 
-Within the Gaussian, the phase is a quadratic function: the samples contain the slope and the curvature of the wavefront
-in closed form. The edge of the aperture is a straight line there, so that light diffracted by it remains, even where
-the relief is steep. The integral of the Gaussian over one side of this line is a complementary error function of a
-complex argument. At a corner, the factors of both sides are multiplied. The largest neglected term is the third
-derivative of the phase, times δ³.
+Within the width of the Gaussian, the phase is approximated by a quadratic function, with the slope and the curvature of
+the wavefront. The integral then has a closed form. The edge of the aperture is a straight line there, so that light
+diffracted by it remains, even where the relief is steep. The integral of the Gaussian over one side of this line is a
+complementary error function of a complex argument. At a corner, the factors of both sides are multiplied. The largest
+neglected term is the third derivative of the phase, times δ³.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
 
 
 class _Gaussian(NamedTuple):
-    """The Gaussian times the light within it: logarithm of its integral, complex mean and complex covariance."""
+    """The Gaussian times the light, again a Gaussian: logarithm of its integral, complex mean and covariance."""
 
     log: np.ndarray
     mean: tuple[np.ndarray, np.ndarray]

@@ -4,8 +4,8 @@
 
 P is the light behind the pupil, times the areas of its samples. `down` and `across` are Fourier kernels times the
 interpolation weights of the points (b, a) of the window, and `kernel` is the slow factor at these points. At rank 1,
-there is one such point, and the sum is the matrix Fourier transform of P times one factor. These three arrays describe
-the geometry alone, so all light that passes the same samples shares them.
+there is one such point, and the sum is the matrix Fourier transform of P times one factor. `down`, `across` and
+`kernel` describe the geometry alone, so all light that passes the same samples shares them.
 
 `window_field` and `pupil_gradient` accept arrays of any library with the operators of NumPy, such as PyTorch, and any
 number of leading axes (pupil, depth, wavelength), which are broadcast.

@@ -136,7 +136,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def window_sums(self) -> np.ndarray | Array:
-        """Sum over the samples, times their area, (wavelength,), without checking the pitch."""
+        """Sum over the samples times their area, (wavelength,). The pitch is not checked."""
         import drjit as dr
 
         waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)

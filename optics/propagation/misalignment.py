@@ -84,7 +84,7 @@ class Alignment:
         return self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]
 
     def nodes(self, radius: float, sine: float, wavelength: float, allowed: float) -> tuple[np.ndarray, float]:
-        """Return the depths [m] between which fields are interpolated, or 0 alone, and the error of the intensity.
+        """Return the depths [m] between which fields are interpolated, or just 0, and the error of the intensity.
 
         Along a ray, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2. Interpolation between n
         Chebyshev nodes has an error of at most φⁿ / (2ⁿ⁻¹ n!).
@@ -128,7 +128,7 @@ class Alignment:
         return found
 
     def leaving(self, u: np.ndarray, dx: float, wavelength: float) -> np.ndarray:
-        """Return a field u (y, x) on the tilted plane times the obliquity factor, with sin θ instead of tan θ.
+        """Return a field u (y, x) on the tilted plane times 1 - tan α sin θ, an approximation of the obliquity factor.
 
         wavelength: wavelength [m] in the medium.
         """
@@ -147,7 +147,7 @@ class Alignment:
         return self.steepness * sine**2 * (self.steepness + sine)
 
     def on_element(self, x: Array, y: Array, types: Precision) -> tuple[Array, Array]:
-        """Return the coordinates along the tilted plane of points (x, y) [m] perpendicular to the axis."""
+        """Return coordinates along the tilted plane, given coordinates (x, y) [m] perpendicular to the axis."""
         if not self.steepness:
             return x, y
         (sx, sy), stretch = self.slope, math.hypot(1, self.steepness) - 1
@@ -164,9 +164,9 @@ def slowness(sine: float) -> float:
 
 
 def path_to_tilted_plane(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:
-    """Return the path [m] of a source's light from the plane of a pupil's centre to its tilted plane, minus its depth.
+    """Return the path [m] of a source's light from a pupil's plane without tilt to that with tilt, minus the depth ζ.
 
-    The result is for the samples of a grid about the centre, (y, x).
+    The result has one value for each sample of a grid about the pupil's centre, (y, x).
     """
     tangents = [math.tan(angle) for angle in source.angle]
     distance = number(source.distance)

@@ -83,7 +83,7 @@ class Stop:
         return cls(distance, pupil, (1 + EDGE_REACH) * pupil.radius, None, alignment)
 
     def apart(self, other: Alignment) -> float:
-        """Return the largest distance [m] of the centres along an axis."""
+        """Return the distance [m] between both centres along x or along y, whichever is larger."""
         return max(map(abs, self.alignment.beside(other)))
 
 
@@ -114,7 +114,7 @@ class StepSettings:
         return max(self.ripple, LEAST_RIPPLE)
 
     def reaching(self, half_widths: float, distance: float) -> float:
-        """Return the highest frequency [1/m] that `propagate` does not remove between planes, including its fade.
+        """Return the highest frequency [1/m] of light that `propagate` carries to the next plane, including its fade.
 
         The result is infinite if both planes coincide. If they are close, it includes evanescent waves that have not
         yet decayed.
@@ -159,7 +159,7 @@ class StepSettings:
         return replace(worst, plan=plan, u=np.sum([result.u for result in found], axis=0))
 
     def steep(self, field: PlaneField) -> float:
-        """Return the largest sin θ to the axis that tilts must represent.
+        """Return the largest sin θ, with θ measured from the axis, of light for which tilts must be accurate.
 
         If diffracted light is removed, the remaining light beyond geometrical rays is too weak to matter here.
         """

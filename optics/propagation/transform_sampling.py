@@ -138,7 +138,7 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
-    """Return the sampling with the shortest period for a passage. It determines the band of the passage.
+    """Return the sampling with the shortest period for a passage, and with the band that this period allows.
 
     spare: padding [m] for the blur of a truncated spectrum.
 

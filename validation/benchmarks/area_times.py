@@ -60,7 +60,7 @@ def moments(world: sim.World) -> WorldState:
 
 
 def seen_in(renderer: sim.BatchedRenderer, state: WorldState, truth: np.ndarray) -> np.ndarray:
-    """Return the mask of the signals that contain an object, which change if all objects are moved away."""
+    """Return the mask of the signals with light from an object: those that change if all objects are moved away."""
     away = replace(state, objects=state.objects + np.array([100.0, 0.0, 0.0]))
     found: np.ndarray = np.abs(renderer.signals(away) - truth) > SEEN * renderer.eye.throughput
     return found

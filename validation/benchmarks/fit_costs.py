@@ -169,7 +169,7 @@ def seconds(run: Callable[[], object], repeats: int) -> float:
 
 
 def fitted(operation: Operation, repeats: int) -> tuple[float, float]:
-    """Return seconds per call and per unit: the line through the times, each weighted by its size."""
+    """Return the seconds per call and per unit, from a line that is fitted to the times with least relative errors."""
     times = np.array([seconds(lambda n=n: operation.run(n), repeats) for n in operation.sizes])
     counts = np.array([operation.count(n) for n in operation.sizes], dtype=np.float64)
     terms = np.column_stack([np.ones_like(counts), counts]) / times[:, None]

@@ -124,7 +124,7 @@ class Checkout:
         self.folder, self._child = folder, subprocess.Popen(command, cwd=folder, env=environment, **pipes)
 
     def asked(self, line: str = "") -> float:
-        """Open the case `line`, or measure one turn of the open case; return its steps per second."""
+        """Let the process open the case `line` or, if it is empty, measure one turn; return the steps per second."""
         assert self._child.stdin
         assert self._child.stdout
         print(line, file=self._child.stdin, flush=True)

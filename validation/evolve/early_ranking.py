@@ -217,7 +217,7 @@ class Halving:
 def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") -> Halving:
     """Apply successive halving to the stored results.
 
-    share: promoted share, 1/2, or 1/4 with every other stored rung.
+    share: promoted fraction of the animals: 1/2 at every stored rung, or 1/4 at every other one.
     by: fitness that decides on promotion, "fitness" (FEW episodes) or "fitness_many".
     """
     fitness, many, spent = (columns(rows, name) for name in (by, "fitness_many", "cpu_seconds"))

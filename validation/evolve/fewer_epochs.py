@@ -211,7 +211,8 @@ def passes_until(task: str, least_epochs: int, evaluations: int) -> np.ndarray:
 def seconds(task: str, cpu: tuple[float, float], evaluations: int) -> np.ndarray:
     """Return the CPU time until each evaluation, (way, evaluation).
 
-    All epochs are assumed to take the same time, and so is all other work per step.
+    The ways are constant and fewer epochs. All epochs are assumed to take the same time, and so is all other work per
+    step.
     """
     passes = np.array([passes_until(task, least, evaluations) for least in (THROUGHOUT, FEWER)])
     (old, new), saved = passes.mean(axis=1), cpu[0] - cpu[1]

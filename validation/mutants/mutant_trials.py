@@ -42,7 +42,7 @@ class Trial:
 
 
 def nearest_tests(root: Path, path: str) -> list[str]:
-    """Return the test files that the folder of tests lists for a module, relative to the tree."""
+    """Return the test files of a module, relative to the tree. The docstring of their folder lists them."""
     package, *folders, name = Path(path).with_suffix("").parts
     if not folders:
         own = f"tests/{package}/test_{name}.py"

@@ -134,7 +134,10 @@ def broken_bounds(rows: list[Row], slow: Row) -> list[str]:
 
 
 def airy_order(rows: list[Row]) -> float:
-    """Return the exponent of NA in the difference from the Airy pattern from f/2 to f/8, at large Fresnel numbers."""
+    """Return the power of NA with which the difference from the Airy pattern grows, from f/8 to f/2.
+
+    The Fresnel numbers are large.
+    """
     fast, slow = (next(row for row in rows if row.f_number == n) for n in (2, 8))
     return float(np.log(fast.airy_misfit / slow.airy_misfit) / np.log(slow.f_number / fast.f_number))
 

@@ -120,7 +120,7 @@ def caught_again(height: Callable[[np.ndarray], np.ndarray], slope: np.ndarray, 
 
 
 def real_lens(aperture: float, focal_length: float, n: float, wavelength: float) -> RealLens:
-    """Return the relief whose mask is an ideal lens, flat side towards the light, rim in the plane z = 0."""
+    """Return results for the relief whose mask is an ideal lens. Light enters its flat side; its rim has z = 0."""
     radius = focal_length * aperture / np.sqrt(1 - aperture**2)
     height = (np.hypot(radius, focal_length) - focal_length) / (n - 1)
     nodes, weights = np.polynomial.legendre.leggauss(300)

@@ -65,8 +65,8 @@ PRISM_RADIUS, PRISM_DISTANCE = 20e-6, 1e-3
 class Prism:
     """Deviations [rad] of a prism with one angle.
 
-    real, reversed: by the real prism, with light through the glass first or through the slope first.
-    thin: by the mask.
+    real, reversed: of the real prism, if light leaves it or enters it through the slope.
+    thin: of its mask.
     transmitted: transmitted fraction of the power.
     psf: position of the peak of optics.psf; NaN if it was not computed.
     """
@@ -90,7 +90,7 @@ def prism(angle_deg: float, with_psf: bool = True) -> Prism:
 def psf_deviation(angle: float) -> float:
     """Return the direction [rad] of the brightest point behind a prism.
 
-    It is the top of a parabola through a cut of the PSF by optics.psf.
+    It is the vertex of a parabola through a cut of the PSF by optics.psf.
     """
     heights = np.tan(angle) * PRISM_RADIUS * (2 * np.arange(4) - 3)
     pupil = optics.Pupil(PRISM_RADIUS, optics.BSplineRelief(np.tile(heights, (4, 1))), n=N)

@@ -45,7 +45,7 @@ def one_thread() -> Iterator[None]:
 
 
 def median_seconds(compute: Callable[[], Any], repeats: int = REPEATS, least: float = 0.05) -> float:
-    """Return the median of at least `repeats` calls (three if one takes a second) and `least` seconds.
+    """Return the median duration of at least `repeats` calls (three if one takes a second) and `least` seconds.
 
     The call must have been made once before. If the second call is short, it is not counted, because it may still
     include warm-up.

@@ -169,7 +169,7 @@ def prysm_picture(n: int) -> Picture:
 
 
 def _scale(field: np.ndarray, pitch: float, out: np.ndarray) -> float:
-    """Return the factor that gives a code's output `out` Fresnel's amplitude on the axis, |Σ u| dξ²/λz."""
+    """Return the factor by which the output `out` of a code has Fresnel's amplitude on the axis, |Σ u| dξ²/λz."""
     axis = abs(out[N // 2, N // 2])
     return float(abs(field.sum()) * pitch**2 / (WAVE * Z) / axis)
 

@@ -54,7 +54,7 @@ class SampleGrid:
 
     @property
     def odd(self) -> SampleGrid:
-        """This grid, symmetric about its centre sample: without the first row and column if their number is even."""
+        """This grid without the first row and column if their number is even, so that it has a centre sample."""
         return SampleGrid(self.n - 1 + self.n % 2, self.dx)
 
 

@@ -26,11 +26,11 @@ def lommel_intensity(u: np.ndarray | float, v: np.ndarray | float) -> np.ndarray
 
 
 def defocused_psf(r: np.ndarray, wavelength: float, radius: float, focal_length: float, distance: float) -> np.ndarray:
-    """Return Fresnel's PSF [1/m²], of unit power, behind a thin lens exp(-ikρ²/2f), on the plane z = distance:
+    """Return Fresnel's PSF [1/m²], of unit power, behind a thin lens exp(-ikρ²/2f), on the plane z = distance.
 
-    πR²/(λz)² I(u, v) with u = kR²(1/z - 1/f), v = kRr/z: Lommel's integral without the Debye approximation, so that it
-    holds at any Fresnel number (Li & Wolf 1984, JOSA A 1:801). An infinite focal length is the bare aperture; for a
-    source at s take 1/f - 1/s in place of 1/f (`thin_lens_image_distance`).
+    It is πR²/(λz)² I(u, v) with u = kR²(1/z - 1/f), v = kRr/z, where I is `lommel_intensity`. Without the Debye
+    approximation, this holds at any Fresnel number (Li & Wolf 1984, JOSA A 1:801). An infinite focal length is the bare
+    aperture. For a source at the distance s, replace 1/f by 1/f - 1/s (`thin_lens_image_distance`).
     """
     k = 2 * np.pi / wavelength
     u, v = k * radius**2 * (1 / distance - 1 / focal_length), k * radius * np.asarray(r) / distance

@@ -1,8 +1,8 @@
 """The vector focus of symmetric light: Richards and Wolf's three integrals.
 
 B. Richards and E. Wolf, Proc. R. Soc. A 253, 358 (1959), eqs. 2.30 to 2.32. Each direction θ contributes a plane wave,
-whose field is rotated with the ray. With an amplitude a(θ) on the sphere about the focus, light polarised along x has
-there
+whose field is rotated with the ray. If the amplitude on the sphere about the focus is a(θ), the field of light
+polarised along x near the focus is
 
     E = (I₀ + I₂ cos 2φ, I₂ sin 2φ, -2i I₁ cos φ),   Iₘ = kz/2 ∫ a cₘ sin θ Jₘ(kρ sin θ) e^{ikW} dθ,
 

@@ -128,7 +128,7 @@ class Population:
 
 
 def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[Population]:
-    """Return all receptors in states that agents reached, and receptors that see an object in states that face one."""
+    """Return two populations: all receptors of agents after random actions, and receptors that see an object ahead."""
     crowd = lived_through(world, MANY)
     found = [Population(crowd, np.ones((states[0], scene.eyes.n_eyes, *scene.eyes.resolution), bool))]
     if world.objects:
@@ -151,9 +151,11 @@ def converged(
 
 @dataclass(frozen=True)
 class Runner:
-    """A setting that renders `count` worlds.
+    """A setting, and how to render with it.
 
-    fidelity: None for the reference.
+    fidelity: fidelity of the renderer; None for the reference.
+    count: number of worlds that are rendered at once.
+    signals: function that renders them.
     warning: warning of the automatic choice.
     """
 
@@ -226,7 +228,7 @@ def to_the_end(scene: Scene, world: sim.World, judged: Sequence[Population], lig
 
 
 def timed(runners: Sequence[Runner], crowd: WorldState, rounds: int) -> list[float]:
-    """Return the CPU seconds of the fastest call of each runner; short calls are repeated for ROUND in every round."""
+    """Return the CPU seconds of each runner's fastest call. Short calls are repeated for ROUND seconds a round."""
     quickest = [np.inf] * len(runners)
     for _ in range(rounds):
         for i, mine in enumerate(runners):
