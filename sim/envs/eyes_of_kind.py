@@ -110,7 +110,7 @@ class EyesOfKind:
         return signals if self._shot is None else self._shot(signals, self._normals.launch(worlds).wait())
 
     def _normals_of(self, worlds: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return normal numbers of this shape; motion detectors do not add noise of their own."""
+        """Return normal numbers of this shape for the noise of these worlds; motion detectors add no noise."""
         drawn = self._normals.launch(worlds).wait()
         return np.concatenate([drawn, np.zeros_like(drawn)], axis=2) if drawn.shape != shape else drawn
 

@@ -1,7 +1,7 @@
-"""Choice of the number of frames per action that receptors with dynamics need, so that fast motion blurs.
+"""Choice of the number of frames per action that receptors with dynamics need for correct motion blur.
 
-The choice plays a few random actions. It compares the responses at the end of each action with the responses to the
-finest frames, one per physics step.
+A few random actions are simulated. For each number of frames, the responses at the end of each action are compared with
+the responses to the largest possible number, up to one frame per physics step.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def dynamics_of(eye: Any) -> Any:
 def with_frames(
     task: BatchTask, fidelities: Sequence[Fidelities | None], scenes: Mapping[str, WorldScene] | None
 ) -> list[Fidelities | None]:
-    """Return the fidelities with a number of frames for all eyes whose receptors have dynamics.
+    """Return the fidelities with `frames` set for all eyes whose receptors have dynamics.
 
     The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify it. Otherwise it
     is the smallest number for which the errors of all signals are acceptable.

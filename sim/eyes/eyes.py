@@ -208,7 +208,7 @@ class Eyes:
 
 
 def _is_pupil(value: Any) -> bool:
-    """Return whether the value is a Pupil or None."""
+    """Return True if the value is a Pupil or None."""
     if value is None:
         return True
     from optics import Pupil

@@ -80,7 +80,7 @@ ReceptorSums = Callable[[np.ndarray], np.ndarray]
 
 
 def of_receptors(factors: np.ndarray) -> ReceptorSums:
-    """Return the map to signals from light that is already summed over each receptor.
+    """Return the function that maps light, already summed over each receptor, to signals.
 
     factors: weight of each component in each channel, (channel, component)
     """
@@ -98,7 +98,7 @@ def of_receptors(factors: np.ndarray) -> ReceptorSums:
 def of_components(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], mixing: np.ndarray, basis: np.ndarray
 ) -> ReceptorSums:
-    """Return the map to signals from light along rays, with one matrix product per component and channel.
+    """Return the function that maps light along rays to signals by one matrix product per component and channel.
 
     The factors of bands and channels are multiplied into the weights in advance.
     """
@@ -117,7 +117,7 @@ def of_components(
 
 
 def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-    """Return the map to signals from light along rays, with one matrix product per band.
+    """Return the function that maps light along rays to signals by one matrix product per band.
 
     This is cheaper than `of_components` if there are fewer bands than pairs of a component and a channel.
     """

@@ -69,6 +69,9 @@ def aspect_of(eye: optics.Eye) -> float:
 
 
 def extent_of(eye: optics.Eye, size: tuple[float, float]) -> tuple[float, float]:
-    """Return a rectangle's width and height on the plane at distance 1. size: in receptor widths and heights"""
+    """Return a rectangle's width and height on the plane at distance 1.
+
+    size: width and height of the rectangle [receptor widths and heights]
+    """
     height, width = tangent_size(eye)
     return width * size[0], height * size[1]

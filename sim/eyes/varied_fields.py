@@ -14,7 +14,7 @@ from optics.eye.receptor_lattice import ReceptorLattice, overlaps
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.receptive_fields import Draw, ReceptiveFields, kernels_of
 
-# Weights of a cell and its two neighbours. Fields at rays are then at most four times as large.
+# Weights of a cell and its two neighbours in the average over cells that `_mixture` takes.
 NEAR = 0.25, 0.5, 0.25
 
 
@@ -63,7 +63,8 @@ class VariedFields(ReceptiveFields):
         upper, lower = _edges(self.lattice.rows, self.resolution[0], self.cells)[row : row + 2]
         edges = _edges(self.lattice.columns[row], self.resolution[1], self.cells)
         found = np.zeros((planes, len(columns), len(draw)))
-        # In cells from the corner of the mixture. A ray at y gets the PSF from y + 1/2 - lower to y + 1/2 - upper.
+        # x and y are in cells from the corner of the mixture. The PSF of a ray at y extends from y + 1/2 - lower to y +
+        # 1/2 - upper.
         x, y = (draw.points * self.cells + np.array(self.density.shape[::-1]) / 2 + 0.5).T
         near = np.flatnonzero((y > upper) & (y < lower + height))
         if not near.size:
@@ -85,7 +86,7 @@ def _edges(edges: np.ndarray, receptors: int, cells: int) -> np.ndarray:
 
 
 def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate a table (plane, n + 1, x) linearly along its second axis, (plane, place, x)."""
+    """Interpolate a table (plane, n + 1, x) linearly along its second axis; return (plane, place, x)."""
     at = np.clip(places, 0, table.shape[1] - 1)
     k = np.minimum(at.astype(int), table.shape[1] - 2)
     share = (at - k)[:, None]
@@ -93,7 +94,7 @@ def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate a table (plane, ray, n + 1) linearly at places (receptor, ray), (plane, receptor, ray)."""
+    """Interpolate a table (plane, ray, n + 1) linearly at places (receptor, ray); return (plane, receptor, ray)."""
     at = np.clip(places, 0, table.shape[2] - 1)
     k = np.minimum(at.astype(int), table.shape[2] - 2)
     share, rays = at - k, np.arange(table.shape[1])

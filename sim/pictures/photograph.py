@@ -33,7 +33,7 @@ Progress = Callable[[float], None]
 
 
 def read_photograph(path: str | Path) -> np.ndarray:
-    """Read an image file as sRGB values (y, x, 3) in [0, 1], upright as its EXIF orientation says.
+    """Read an image file as sRGB values (y, x, 3) in [0, 1], rotated according to its EXIF orientation.
 
     Raises:
         ValueError: the file is no image, is damaged or too large, has one channel, or has transparent pixels.

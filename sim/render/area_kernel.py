@@ -111,7 +111,7 @@ class AreaKernel(RayKernel):
         return self._areas.radiance(area, met, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
-        """Return the fraction of each light that reaches each point of each world's bodies, flat (world, point)."""
+        """Return the fractions of the lights that reach each point on the bodies of each world, flat (world, point)."""
         if inputs.places is None:
             return []
         world = inputs.places // self._areas.places

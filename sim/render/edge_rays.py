@@ -76,7 +76,9 @@ class EdgeRays:
         return light.ravel()
 
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
-        """Return the receptors, flat, that differ strongly from a neighbour. An edge may pass between their first rays.
+        """Return a mask of the receptors that differ strongly from a neighbour, flat (view, receptor).
+
+        An edge may pass between the first rays of such receptors.
 
         light: (component, view, receptor or square beyond the rim)
         """

@@ -9,7 +9,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LightFactors:
-    """Factors by which all lights of each world are multiplied. bands: one per band and world, (env, band) float32."""
+    """Factors by which all lights of each world are multiplied.
+
+    bands: factors in each band, (env, band) float32
+    """
 
     bands: np.ndarray
 

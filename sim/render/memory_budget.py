@@ -120,6 +120,6 @@ def _of_files(statistics: Path, prefix: str) -> int:
 
 
 def _rounded_down(value: float) -> float:
-    """Round down to two digits."""
+    """Round down to two significant digits."""
     digit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return math.floor(value / digit) * digit

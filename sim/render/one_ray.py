@@ -54,7 +54,10 @@ def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> n
 
 
 def radiance(scene: MitsubaObject, ray: Array, wavelengths_nm: np.ndarray) -> np.ndarray:
-    """Return the radiance along a ray, ρ/π sum_l E_l cos θ_l over all unobstructed lamps l, (band,)."""
+    """Return the radiance along a ray, ρ/π sum_l E_l cos θ_l over all unobstructed lamps l, (band,).
+
+    ρ is the reflectance of the surface, E_l the irradiance from lamp l, and θ_l its angle of incidence.
+    """
     hit, total = scene.ray_intersect(ray), np.zeros(len(wavelengths_nm))
     for b, wavelength in enumerate(wavelengths_nm if hit.is_valid() else ()):
         hit.wavelengths = mi.Spectrum(float(wavelength))

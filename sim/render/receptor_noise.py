@@ -133,7 +133,9 @@ class NoiseModel:
         return cls(eye.noise_sigma, photons.astype(np.float32))
 
     def in_frames(self, share: float) -> tuple[NoiseModel | None, NoiseModel | None]:
-        """Return the shot noise of a frame that lasts this share of the integration time, and the remaining noise.
+        """Return the shot noise of a frame that lasts a part of the integration time, and the remaining noise.
+
+        share: duration of the frame, as a fraction of the integration time
 
         Receptors with dynamics sum the photons of their frames. Only the shot noise passes their filters.
         """

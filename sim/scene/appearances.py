@@ -48,7 +48,10 @@ class Appearance:
 def appearances_of(
     model: mujoco.MjModel, geoms: Sequence[int], materials: Mapping[int, Sequence[int]]
 ) -> list[Appearance]:
-    """Return all visible appearances of these geoms; materials: ids of the materials that may be drawn, by geom."""
+    """Return all visible appearances of these geoms.
+
+    materials: ids of the materials that may be drawn for a geom, by its id
+    """
     found = []
     for geom in geoms:
         if geom in materials:

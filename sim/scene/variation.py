@@ -99,7 +99,10 @@ class Variation:
         }
 
     def of_things(self, what: str) -> dict[str, str]:
-        """Return the names of ranges by the names of their objects; what: one of OF_THINGS."""
+        """Return the names of the ranges of one quantity, by the names of the objects.
+
+        what: the quantity, one of OF_THINGS
+        """
         return {name.rpartition(".")[0]: name for name in self.ranges if kind_of(name) == what}
 
     @property

@@ -131,7 +131,7 @@ class WorldModels:
         if geom in self._colors:
             raise ValueError(f"vary: {name} and {self._colors[geom]}: must be one of them; materials have colours")
         if not np.array_equal(self.model.geom_rgba[geom], surfaces.UNSET_RGBA):
-            raise ValueError(f"vary: {name}: the geom's own rgba takes the place of its materials': must have none")
+            raise ValueError(f"vary: {name}: the geom's own rgba replaces the colours of its materials: must have none")
         return {each: material_of(self.model, each, f"vary: {name}") for each in variation.ranges[name]}
 
     def _prepare_sizes(self, given: Any) -> None:

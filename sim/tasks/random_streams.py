@@ -150,7 +150,9 @@ class MotionNoise:
             self._drawn = np.ascontiguousarray(np.transpose(ahead[:, AHEAD - left :], (1, 2, 0, 3)))
             return
         if left != len(self._drawn):
-            raise ValueError("state: objects are at another action than elsewhere: must be set for all worlds at once")
+            raise ValueError(
+                "state: objects of other worlds have moved another number of times: must be set for all worlds at once"
+            )
         self._drawn[:, :, worlds] = np.transpose(ahead[worlds, AHEAD - left :], (1, 2, 0, 3))
 
 

@@ -37,7 +37,11 @@ ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's colum
 
 @dataclass(frozen=True)
 class _Hit:
-    """First hits of rays. is_lit: True if a ray hits the front of a surface. reflectance: one array per component"""
+    """First hits of rays.
+
+    is_lit: True if a ray hits the front of a surface
+    reflectance: one array per component
+    """
 
     t: Array
     point: Array
@@ -62,7 +66,10 @@ class ClosedFormTables:
 
 @dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """Spheres and tables for one lane. centres: centres of the visible spheres in the lane's world (Point3f)"""
+    """Spheres and tables for one lane.
+
+    centres: centres of the visible spheres in the lane's world (Point3f)
+    """
 
     centres: list[Array]
     tables: ClosedFormTables

@@ -29,7 +29,11 @@ RIM = 4  # number of sides of the floor; its rim counts as a wall in directions 
 
 @dataclass(frozen=True)
 class Face:
-    """A face of a wall. index: number of the face. left, right: ends of the face, as seen from the front (Point2f)"""
+    """A face of a wall.
+
+    index: number of the face
+    left, right: ends of the face, as seen from the front (Point2f)
+    """
 
     index: Array
     left: Array

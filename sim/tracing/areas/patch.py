@@ -50,7 +50,10 @@ class Area:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A part of an area, in units of the area's sides. a, b: middle of the part"""
+    """A part of an area, in units of the area's sides.
+
+    a, b: middle of the part
+    """
 
     a: Array
     b: Array

@@ -181,7 +181,10 @@ class _Outline:
 
 
 def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Array) -> _Outline:
-    """Return the outline. A direction v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|²."""
+    """Return the outline of the sphere with its centre at `way` from the eye.
+
+    A direction v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|².
+    """
     x, y, z = (dr.cross(way, v) for v in (across, along, ahead))
     square = radius * radius
 
@@ -250,7 +253,11 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
     """Return length and middle, in units of `side`, of the chord on which start + x side hits the sphere.
 
-    On the chord, q2 x² + 2 q1 x + q0 > 0, |x| is at most 1/2, and points lie ahead of the eye.
+    On the chord, q2 x² + 2 q1 x + q0 > 0 with the coefficients in the code, |x| is at most 1/2, and points lie ahead of
+    the eye.
+
+    way: vector from the eye to the sphere's centre
+    tangent: squared length of the tangents from the eye to the sphere
     """
     a, b = dr.dot(way, start), dr.dot(way, side)
     q2 = b * b - dr.squared_norm(side) * tangent

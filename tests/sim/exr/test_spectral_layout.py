@@ -167,7 +167,7 @@ def test_reflectance_round_trip(tmp_path):
 
 
 def test_reflectance_must_match():
-    with pytest.raises(ValueError, match=r"reflectance has shape .*: must have that of the radiance"):
+    with pytest.raises(ValueError, match=r"reflectance has shape .*: must have the shape of the radiance"):
         View("a", [500.0], np.ones((1, 2, 2)), reflectance=np.ones((1, 2, 3)))
     with pytest.raises(ValueError, match="one distinct wavelength per band"):
         View("a", [500.0, 600.0], reflectance=np.ones((1, 2, 2)))
