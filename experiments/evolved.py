@@ -65,7 +65,7 @@ class RunMetadata:
 
 @dataclass(frozen=True)
 class Store:
-    """Contents of a page: rows, conditions of their runs, null model (drift), origin, and the written answer."""
+    """Data of a page: rows, conditions of their runs, null model (drift), origin, and the written answer."""
 
     rows: list[Row]
     run_metadata: list[RunMetadata]
@@ -109,7 +109,7 @@ class Store:
 
 
 def conduct_table(store: Store) -> str:
-    """Return a table with a row per run."""
+    """Return a table of the conditions of the runs, with a row per run."""
     header = ["run", "candidates", "generations", "worker hours", "rhabdom at"]
     lines = [
         [

@@ -112,7 +112,7 @@ def _draw_lights(place: Any, rows: Sequence[Trained]) -> None:
 
 
 def light_message(crossings: Mapping[float, Crossing]) -> str:
-    """Return a title, which states whether the better eyes in bright light are worse in dimmer light beyond chance."""
+    """Return a title that states whether the better eyes in bright light are significantly worse in dimmer light."""
     if len(crossings) < 2:
         return "in dim light"
     bright, *dim = (crossings[sigma].differences for sigma in sorted(crossings))

@@ -20,8 +20,8 @@ from experiments.glass import blur
 __all__ = ["SPREAD", "WIDE", "Landscape", "Life", "behind_glass", "fitted", "holes", "lenses", "opening"]
 
 Floats = NDArray[np.float64]
-# Standard deviation of a training run's fitness: its value at an expected fitness of 0, and its slope over the expected
-# fitness. `Landscape.misfit` compares it with the deviations of real training runs.
+# Standard deviation of a training run's fitness: its value at an expected fitness of 0, and its increase per unit of
+# expected fitness. `Landscape.misfit` compares it with the deviations of real training runs.
 SPREAD = 5.0, 0.17
 
 

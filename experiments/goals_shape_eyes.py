@@ -61,7 +61,7 @@ PUBLISHED = {
 
 
 def page(store: Store) -> Page:
-    """Return the page of stored runs."""
+    """Return the page of results, made from stored runs."""
     return Page(
         name=NAME,
         command=(
@@ -140,7 +140,7 @@ def table(store: Store) -> str:
 
 
 def seeds_table(store: Store) -> str:
-    """Return a table with a row per run."""
+    """Return a table of results, with a row per run."""
     lines = []
     for group in store.groups:
         for seed in sorted({row.seed for row in store.group(group)}):

@@ -84,7 +84,7 @@ QUANTITIES = {
 
 
 def page(store: Store) -> Page:
-    """Return the page of stored runs."""
+    """Return the page of results, made from stored runs."""
     return Page(
         name=NAME,
         command=(
@@ -107,7 +107,7 @@ def page(store: Store) -> Page:
 
 
 def table(store: Store) -> str:
-    """Return a table of the first generation, the last generations, and the null model of the last ones."""
+    """Return a table of the quantities in the first and in the last generations, and of their null model."""
     first = [row for row in store.rows if row.generation == 0]
     header = ["mean", "first generation", f"last {LAST} generations", "null model"]
     lines = []
@@ -124,7 +124,7 @@ def rank_correlation(rows: Sequence[Row]) -> float:
 
 
 def table_by_peak(rows: Sequence[Row]) -> str:
-    """Return a table with a row per range of the shortest peak."""
+    """Return a table of fitness and success, with a row per range of the shortest peak."""
     lines = []
     for low, high in itertools.pairwise(RANGES):
         mine = [row for row in rows if not row.failed and low <= shortest(row) < high]
