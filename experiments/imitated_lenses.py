@@ -214,7 +214,8 @@ def draw(contents: Contents, path: Path) -> None:
         axes[0, 0].plot(
             [x.blur for x in mine], [x.fitness for x in mine], "o", color=color, ms=4, alpha=0.5, mec="none"
         )
-        axes[0, 0].plot(blurs, contents.landscape.fitness(aperture, blurs), color=color, lw=1.5, label=f"a = {aperture:g}")
+        expected = contents.landscape.fitness(aperture, blurs)
+        axes[0, 0].plot(blurs, expected, color=color, lw=1.5, label=f"a = {aperture:g}")
     axes[0, 0].set(xlabel="blur [receptors]", ylabel="fitness", title="training runs (dots) and surrogate (lines)")
     axes[0, 0].legend(frameon=False)
     cases = _cases(contents.rows)
