@@ -21,7 +21,7 @@ TOLERANCE = 1e-3
 
 @pytest.fixture
 def told(monkeypatch):
-    """Makes checks find these errors, one after the other, and returns the problems that were checked."""
+    """Return a function that lets the checks find given errors one after the other; it returns the checked problems."""
 
     def tell(*errors):
         checked, left = [], iter(errors)
