@@ -96,7 +96,7 @@ def missed(rows: Sequence[Trained]) -> Errors:
 def shortfall(rows: Sequence[Trained]) -> Errors:
     """Return the shortfall in fitness of each animal, by width and brain.
 
-        It is the distance from the best training run's fitness, relative to the distance from the best to the worst, as a
+    It is the distance from the best training run's fitness, relative to the distance from the best to the worst, as a
     mean over the animal's n training runs. As in `missed`, half a run is added to the sum, and n + 1 replaces n.
     """
     fitness = [row.fitness for row in rows if not row.failed]

@@ -95,7 +95,7 @@ class Store:
 
     @property
     def legend(self) -> str:
-        """Colours of the groups as text."""
+        """Colour of each group as text, such as "navigation blue, detection orange"."""
         names = {value: name for name, value in COLORS.items()}
         return ", ".join(f"{group} {names[color]}" for group, color in self.colors.items())
 

@@ -63,7 +63,7 @@ class Control:
 
 
 def controls() -> tuple[Control, ...]:
-    """Return the controls. The first one is the comparison itself."""
+    """Return the controls, preceded by the comparison without any control."""
     coarse, fine = _eyes(10, 4, 45.0), _eyes(2, 15, 135.0)
     blurred, repeated = "wiring.pool_side=4 wiring.repeat_side=15", "wiring.repeat_side=15"
     rays = "eye.rays_per_receptor=16 learning.rays_per_receptor=16"

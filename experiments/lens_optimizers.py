@@ -75,7 +75,12 @@ def lens(genome: Any) -> optics.Pupil:
 
 
 def loss(genome: Any, spot: float | None) -> Any:
-    """Return -log of the light in a Gaussian spot on the axis, or of the Strehl ratio near the axis (spot None)."""
+    """Return the loss of a lens, which searches minimise.
+
+    It is -log of the light in a Gaussian spot on the axis, or of the Strehl ratio near the axis.
+
+    spot: standard deviation of the spot [m]; None: the Strehl ratio is used
+    """
     import drjit as dr
     from drjit.llvm.ad import Float64
 

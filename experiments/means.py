@@ -81,7 +81,7 @@ def last_mean(rows: Sequence[Row], value: Callable[[Row], float]) -> Interval | 
 
 
 def last_values(rows: Sequence[Row], value: Callable[[Row], float]) -> Iterator[Floats]:
-    """Yield the finite values of each seed's last generations."""
+    """Yield, for each seed, the finite values of a quantity in its last LAST generations."""
     for seed in sorted({row.seed for row in rows}):
         mine = [row for row in rows if row.seed == seed]
         first = max(row.generation for row in mine) - LAST + 1

@@ -47,7 +47,7 @@ def difference(peak_nm: float) -> float:
 
 
 def contrast(row: Row) -> float:
-    """Return the difference of goal and adversary for a candidate's best receptor type."""
+    """Return the largest difference between the signals of goal and adversary among a candidate's receptor types."""
     return max((difference(peak) for peak in peaks(row)), default=NO_NUMBER)
 
 
@@ -57,17 +57,17 @@ def peaks(row: Row) -> list[float]:
 
 
 def shortest(row: Row) -> float:
-    """Return the shortest peak [nm]."""
+    """Return the shortest peak of a candidate's receptor types [nm]."""
     return min(peaks(row), default=NO_NUMBER)
 
 
 def middle(row: Row) -> float:
-    """Return the median peak [nm]."""
+    """Return the median peak of a candidate's receptor types [nm]."""
     return float(np.median(peaks(row))) if row.peaks_nm else NO_NUMBER
 
 
 def longest(row: Row) -> float:
-    """Return the longest peak [nm]."""
+    """Return the longest peak of a candidate's receptor types [nm]."""
     return max(peaks(row), default=NO_NUMBER)
 
 

@@ -80,7 +80,7 @@ def succeeded(candidate: Candidate) -> bool:
 
 
 def by_generation(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
-    """Return the candidates of each generation, sorted by generation and index."""
+    """Return (generation, its candidates) for each generation, sorted by generation and by index."""
     ordered = sorted(candidates, key=lambda c: (c.generation, c.index))
     return [(generation, list(members)) for generation, members in groupby(ordered, lambda c: c.generation)]
 

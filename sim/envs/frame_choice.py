@@ -144,7 +144,11 @@ def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.nda
 
 
 def _responses(dynamics: ReceptorDynamics, signals: np.ndarray, frames: int, seconds: float) -> np.ndarray:
-    """Return the responses at the end of each action if only this number of the frames is rendered."""
+    """Return the responses at the end of each action if `frames` evenly spaced frames of it are rendered.
+
+    signals: signals in all frames, (action, frame, world, ...)
+    seconds: duration of an action [s]
+    """
     if not len(signals):
         return np.zeros(1)
     finest, n = signals.shape[1:3]

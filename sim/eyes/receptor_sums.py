@@ -173,7 +173,7 @@ def within_stretches(
 
 
 def _mixed(weights: Sequence[scipy.sparse.csr_array], factors: np.ndarray) -> scipy.sparse.csr_array:
-    """Return sum_b factors[b] weights_b, in double precision."""
+    """Return the sum over bands of each band's weights (receptor, ray) times its factor, in double precision."""
     total = float(factors[0]) * weights[0].astype(np.float64)
     for factor, band in zip(factors[1:], weights[1:], strict=True):
         total = total + float(factor) * band.astype(np.float64)

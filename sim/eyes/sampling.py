@@ -119,7 +119,7 @@ class BoxSampling:
         return np.broadcast_to(weights, (self.eye.bands, *weights.shape))
 
     def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return directions and bounce samples."""
+        """Return the directions (ray, 3) and the bounce samples (ray, 2) of these receptors' rays."""
         height, width = self.eye.resolution
         shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
         corners = self._corners()[receptors]
@@ -127,7 +127,7 @@ class BoxSampling:
         return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
 
     def _through(self, points: np.ndarray) -> np.ndarray:
-        """Return the directions of rays through points (receptor, ray, 2) of squares of size 1, one per receptor."""
+        """Return the directions of rays through points (receptor, ray, 2) in units of the receptors' sides."""
         return directions_of(self.eye, from_receptors(self.eye, points.reshape(-1, 2)))
 
     def _corners(self) -> np.ndarray:

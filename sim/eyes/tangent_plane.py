@@ -19,7 +19,10 @@ def from_receptors(eye: optics.Eye, counted: np.ndarray) -> np.ndarray:
 
 
 def to_receptors(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """Return the inverse of `from_receptors`, (..., 2)."""
+    """Convert points of the tangent plane to coordinates in which every receptor has the size 1, (..., 2).
+
+    This is the inverse of `from_receptors`.
+    """
     return plane if eye.lattice is None else eye.lattice.counted(plane)
 
 

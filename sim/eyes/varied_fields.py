@@ -45,7 +45,7 @@ class VariedFields(ReceptiveFields):
         return cls(field, density, eye.resolution, cells, eye.lattice)
 
     def drawn_for(self, receptors: np.ndarray) -> VariedFields:
-        """Return the same fields with the mixture of only these receptors' fields."""
+        """Return a copy whose mixture, from which rays are drawn, contains only the fields of these receptors."""
         return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
@@ -58,7 +58,7 @@ class VariedFields(ReceptiveFields):
         return found
 
     def _values_in_row(self, draw: Draw, row: int, columns: np.ndarray) -> np.ndarray:
-        """Return the values for some receptors of a row."""
+        """Return the result of `values` for the receptors in some columns of one row."""
         planes, height, width = self.field.shape
         upper, lower = _edges(self.lattice.rows, self.resolution[0], self.cells)[row : row + 2]
         edges = _edges(self.lattice.columns[row], self.resolution[1], self.cells)
@@ -80,7 +80,12 @@ class VariedFields(ReceptiveFields):
 
 
 def _edges(edges: np.ndarray, receptors: int, cells: int) -> np.ndarray:
-    """Return edges in cells from the top or the left of the retina."""
+    """Convert edges of receptors to numbers of cells from the top or the left of the retina.
+
+    edges: positions from the middle, in sides of an average receptor
+    receptors: number of receptors along the axis
+    cells: number of cells along the side of an average receptor
+    """
     found: np.ndarray = (edges + receptors / 2) * cells
     return found
 

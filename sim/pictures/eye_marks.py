@@ -43,7 +43,7 @@ def with_eyes(
 
 
 def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: float) -> np.ndarray | None:
-    """Return a point's (x, y) in an image; None behind the camera."""
+    """Return the position (x, y) of a point in an image [pixels]; None if it is behind the camera."""
     right, up, back = (point - view.position) @ view.rotation
     if -back < NEAREST * reach:
         return None

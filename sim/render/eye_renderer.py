@@ -168,7 +168,7 @@ class EyeRenderer:
 
     @cached_property
     def _few(self) -> Self:
-        """Renderer of a few of the worlds."""
+        """Renderer of FEW worlds with the same eyes, for `launch_some`."""
         return self.resized(FEW)
 
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
@@ -274,12 +274,12 @@ class EyeRenderer:
 
     @cached_property
     def _has_components(self) -> bool:
-        """True if the components of light are not the bands."""
+        """True if light is traced in components other than the bands."""
         return not np.array_equal(self.tracer.basis, np.eye(self.eye.bands))
 
     @cached_property
     def _sums_of_bands(self) -> Any:
-        """Function that returns signals from light in bands."""
+        """Function that maps light in the bands to signals, see `sim.eyes.receptor_sums`."""
         return self.sensor.receptor_sums(self._mixing, np.eye(self.eye.bands))
 
     def _components(self, found: np.ndarray) -> np.ndarray:

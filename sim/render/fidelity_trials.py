@@ -91,7 +91,7 @@ class FidelityTrials:
         return error
 
     def have_areas(self, *lights: str) -> bool:
-        """Return whether area sampling is possible in this world for all of these parts of the light."""
+        """Return whether area sampling is possible in this world for all of these levels of light."""
         if self._eye.lattice is not None:
             return False
         try:

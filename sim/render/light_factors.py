@@ -34,7 +34,7 @@ class LightFactors:
 
     @property
     def level(self) -> np.ndarray:
-        """Factors for signals of the shape (env, eye, channel, height, width)."""
+        """Common factor of all bands in each world, in the shape of signals (env, eye, channel, height, width)."""
         return self.bands[:, :1, None, None, None]
 
     def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:

@@ -102,7 +102,11 @@ class _Kernel:
     def launch(
         self, keys: np.ndarray, frames: np.ndarray, frame_of: Callable[[list[Array]], np.ndarray]
     ) -> PendingFrame:
-        """Start drawing with these keys. frame_of: function that converts the device's arrays to the frame's values"""
+        """Start drawing normal numbers.
+
+        keys, frames: key and frame number of each world
+        frame_of: function that converts the arrays on the device to the values of the frame
+        """
 
         def launch() -> Callable[[], np.ndarray]:
             self._keys.values[:], self._frames.values[:] = keys, frames

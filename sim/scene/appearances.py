@@ -41,7 +41,7 @@ class Appearance:
 
     @property
     def alpha(self) -> float:
-        """Opacity."""
+        """Opacity of the geom, from 0 (invisible) to 1."""
         return float(surfaces.rgba(self.model, self.geom)[3])
 
 

@@ -126,7 +126,7 @@ class WorldModels:
             getattr(data, where)[address] = drawn[name]
 
     def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
-        """Return the ids of materials, by name."""
+        """Return the ids of the materials that may be drawn for a geom, by the names of the materials."""
         assert variation is not None
         if geom in self._colors:
             raise ValueError(f"vary: {name} and {self._colors[geom]}: must be one of them; materials have colours")

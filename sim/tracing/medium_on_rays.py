@@ -29,7 +29,7 @@ class MediumOnRays:
 
     @classmethod
     def from_bands(cls, medium: BandMedium, basis: np.ndarray) -> MediumOnRays:
-        """Return the medium for a diagonal basis (component, band): radiance_b = basis[b, b] component_b."""
+        """Return the medium for a tracer whose `basis` (component, band) is diagonal: components are scaled bands."""
         veil = medium.veil / np.diag(basis)
         return cls(tuple(map(float, np.maximum(medium.attenuation, LEAST))), tuple(map(float, veil)))
 

@@ -59,7 +59,7 @@ class Slice:
     patch: Patch
 
     def inverse_distance(self, area: Area) -> Array:
-        """Return 1/z along the eye's axis [1/m]."""
+        """Return the inverse 1/z of the slice's distance along the eye's axis [1/m]."""
         found: Array = dr.norm(self.seen) * dr.rcp(dr.norm(self.patch.point - area.origin))
         return found
 
@@ -102,7 +102,7 @@ class SphereView:
         return self._between(mi.Float(0), mi.Float(1))
 
     def strip(self, number: Array) -> Strip:
-        """Return one of the strips."""
+        """Return the strip with this number, counted from 0."""
         per = dr.rcp(mi.Float(self.sides))
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
@@ -120,7 +120,7 @@ class SphereView:
         return Strip(length * width, seen, *sides, self._patch(seen, *sides), dr.select(self._upright, *upright))
 
     def slice(self, strip: Strip, number: Array) -> Slice:
-        """Return one slice of a strip."""
+        """Return the slice of a strip with this number, counted from 0."""
         per = dr.rcp(mi.Float(self.sides))
         seen = strip.seen + strip.along * ((mi.Float(number) + 0.5) * per - 0.5)
         sides = strip.along * per, strip.across
@@ -280,7 +280,7 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
-    """Return the patch around the point at which a direction hits the sphere."""
+    """Return the patch around the point at which a ray in the direction `seen` hits the sphere."""
     length = dr.squared_norm(seen)
     ahead = dr.dot(way, seen)
     t = (ahead - dr.sqrt(dr.maximum(ahead * ahead - length * tangent, 0))) / length
