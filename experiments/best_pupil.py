@@ -46,7 +46,7 @@ COLORS = {"hole": "#D55E00", "lens": "#0072B2"}
 
 @dataclass(frozen=True)
 class Row:
-    """Measures of an eye at one noise.
+    """Measures of an eye at one level of noise.
 
     pupil: "hole" (pinhole) or "lens" (ideal lens in focus)
     noise_sigma: standard deviation of a receptor's noise

@@ -37,10 +37,11 @@ FACTORS: dict[str, Size] = {
 
 
 def error(row: Row) -> float:
-    """Return the share of episodes in which the goal did not come first, as (k + 1/2) / (n + 1) (Jeffreys' mean).
+    """Return the share of episodes in which the goal was not reached first.
 
-    This mean is never 0, so its logarithm exists. In a maze, no animal reaches the goal. The error is then 1 minus the
-    fitness divided by the full return.
+    If these are k of n episodes, the share is estimated as (k + 1/2) / (n + 1) (Jeffreys' mean), which is never 0, so
+    that its logarithm exists. In a maze, no animal reaches the goal. The error is then 1 minus the ratio of the fitness
+    to the full return.
     """
     if math.isfinite(row.full_return):
         return 1 - row.fitness / row.full_return
@@ -61,7 +62,7 @@ def fitted(rows: Sequence[Row], *sizes: Size) -> PowerLaw | None:
 
 
 def trained(store: Store, group: str) -> list[Row]:
-    """Return the candidates with a policy."""
+    """Return the candidates of a group that have a trained policy."""
     return [row for row in store.group(group) if not row.failed and row.parameters]
 
 

@@ -88,7 +88,7 @@ def _lives(rows: Iterable[Trained], value: Callable[[Trained], float]) -> dict[t
 
 
 def missed(rows: Sequence[Trained]) -> Errors:
-    """Return the share of k in n episodes in which the goal was missed, (k + 1/2) / (n + 1) (Jeffreys), never 0."""
+    """Return the share of episodes in which the goal was missed, by width and brain; see `brains_and_acuity.error`."""
     shares = _lives(rows, lambda row: ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1))
     return {animal: float(np.mean(values)) for animal, values in shares.items()}
 
@@ -96,8 +96,8 @@ def missed(rows: Sequence[Trained]) -> Errors:
 def shortfall(rows: Sequence[Trained]) -> Errors:
     """Return the shortfall in fitness of each animal, by width and brain.
 
-    It is the distance from the best training run's fitness, relative to the distance from the best to the worst, as a
-    mean over the animal's n training runs. As in `missed`, half a run is added to the sum, and n + 1 replaces n.
+    The shortfall of a training run is 0 for the best of all runs and 1 for the worst. The shortfall of an animal is the
+    mean over its training runs and, so that it is never 0, one additional run with the shortfall 1/2.
     """
     fitness = [row.fitness for row in rows if not row.failed]
     high = max(fitness, default=0.0)

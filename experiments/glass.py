@@ -41,8 +41,8 @@ def blur(animal: Phenotype, config: EyeConfig) -> float:
     """Return the blur of a distant point in receptors: the root mean square distance of rays from their centroid.
 
     A ray through the pupil at r reaches the retina at r + f (n - 1) grad h (paraxial; Goodman, §5.1), where f is the
-    distance from pupil to retina, and h the relief's height. Diffraction is ignored. Without glass, the result is the
-    blur of the pinhole. For a perfect lens, it is NaN.
+    distance from pupil to retina, n the refractive index, and h the relief's height. Diffraction is ignored. Without
+    glass, the result is the blur of the pinhole. For a perfect lens, it is NaN.
     """
     if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
         return math.nan

@@ -113,7 +113,7 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return a quantity over the generations: its spread in each population, and its value in the champion.
+    """Return a quantity over the generations: its spread in each population, and its value in the best candidate.
 
     value: function that returns the quantity of a phenotype
     """

@@ -242,7 +242,7 @@ class Run:
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:
-        """Candidates in the order in which they finished, once for every rung after which they are on record."""
+        """Candidates in the order of the record; a candidate that has completed several rungs occurs once for each."""
         return list(self.record.lines.values())
 
     def on_record(self, candidate_id: int, rung: int) -> Candidate | None:

@@ -84,7 +84,8 @@ class EyesOfKind:
     ) -> PendingFrame:
         """Launch the last frame of an action, after the receptors have seen its earlier frames.
 
-        If only some worlds are rendered, and they do not begin an episode, their last frame replaces the one before.
+        If only some worlds are rendered, and they do not begin an episode, the new frame replaces the frame that was
+        last rendered in these worlds.
         """
         everyone, light = np.arange(self._simulation.n), self._simulation.light(self._wavelengths)
         first, chosen = fresh or worlds is not None, everyone if worlds is None else worlds

@@ -117,7 +117,10 @@ class CompoundEye:
 
     @property
     def mosaic(self) -> np.ndarray | None:
-        """Type of each signal, (channel, ommatidium); None if every ommatidium has all types in order."""
+        """Receptor type of each signal, (channel, ommatidium).
+
+        It is None if every ommatidium has receptors of all types, in the order of `receptors`.
+        """
         return None if self.types is None else self.types.T
 
     @property
@@ -166,7 +169,7 @@ class CompoundEye:
     def photons(self) -> np.ndarray | None:
         """Absorbed photons for a signal of 1, (channel, ommatidium); None without a photon budget.
 
-        The étendue is the facet's area times the acceptance of white light.
+        The number is proportional to the étendue: the facet's area times the acceptance of white light.
         """
         if self.photon_budget is None:
             return None

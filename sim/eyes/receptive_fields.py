@@ -135,7 +135,7 @@ class ReceptiveFields:
         return weights
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the value of some receptors' fields in the cells of rays, (plane, receptor, ray)."""
+        """Return the values of these receptors' fields in the cells of the drawn rays, (plane, receptor, ray)."""
         row, column = np.divmod(receptors, self.resolution[1])
         y = draw.rows[None] - row[:, None] * self.cells
         x = draw.columns[None] - column[:, None] * self.cells

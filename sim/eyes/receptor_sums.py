@@ -24,7 +24,9 @@ ONE_THREAD = 2**18
 
 @dataclass(frozen=True)
 class RowProduct:
-    """signal[view, channel, i, j] = sum over rays of radiance[view, ray] W[channel, receptor (i, j), ray].
+    """Matrix products, one per row of receptors, that sum the radiance along rays to signals.
+
+    signal[view, channel, i, j] is the sum over all rays of radiance[view, ray] W[channel, receptor (i, j), ray].
 
     stretches: for each row of receptors, the index of the first ray that it uses, and the weights of its rays (ray,
         channel * width) float32

@@ -23,7 +23,8 @@ class VariedFields(ReceptiveFields):
     """Tabulated receptive fields of receptors with a `density`.
 
     field: power per cell of the PSF, rotated by 180°, (plane, y, x)
-    density: see `ReceptiveFields`. It follows the density of receptors, because every receptor has the same share
+    density: see `ReceptiveFields`. It follows the density of receptors, because the fields of all receptors have equal
+        parts in the mixture
     resolution: receptors (height, width)
     cells: cells along the side of an average receptor
     lattice: rectangles of the receptors
@@ -49,7 +50,7 @@ class VariedFields(ReceptiveFields):
         return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the value of some receptors' fields at rays, (plane, receptor, ray)."""
+        """Return the values of these receptors' fields at the points of the drawn rays, (plane, receptor, ray)."""
         rows, columns = np.divmod(receptors, self.resolution[1])
         found = np.zeros((len(self.field), len(receptors), len(draw)))
         for row in np.unique(rows):

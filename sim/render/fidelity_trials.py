@@ -191,9 +191,13 @@ class FidelityTrials:
     def _signals(
         self, trial: Trial, depth: DepthLayers, light: str, views: RandomViews | None = None, most: int = RAYS
     ) -> np.ndarray:
-        """Return signals (view, channel, receptor) in the first views.
+        """Return signals (view, channel, receptor) in as many of the views as the number of rays allows.
 
-        most: largest number of rays, which limits the number of views
+        trial: samples of each eye, and their weights
+        depth: layers among which light is divided
+        light: level of light
+        views: None: the views of the trials
+        most: largest number of rays in all views together
         """
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))

@@ -32,7 +32,7 @@ SECOND = 3  # seed of the samples for a second reflection
 class KernelInputs:
     """Inputs of a kernel that are the same in every call.
 
-    lanes: numbers of the lanes
+    lanes: index of each lane
     sizes: number of samples of an eye, number of eyes of a world, and number of lanes
     along: directions of the samples
     tables: the tracer's inputs

@@ -140,8 +140,7 @@ class MotionNoise:
         """Restore the state of these worlds from the return value of `get_state`.
 
         Raises:
-            ValueError: not all worlds are restored, and the number of remaining numbers differs from that of the other
-                worlds.
+            ValueError: only some worlds are restored, and they have fewer or more numbers left than the other worlds.
         """
         _set_states(self._generators, state["motion"], worlds)
         ahead = np.asarray(state["motion_ahead"])

@@ -213,10 +213,10 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return three fractions of the area, and the light of the visible part of a sphere.
+        """Return the fractions of the area in which a sphere hides left wall, right wall and floor, and its light.
 
-        In these fractions of the area, the sphere hides the left wall, the right wall and the floor. Its light is
-        multiplied by the fraction of the area that it fills, per component. Parts that nearer spheres hide are omitted.
+        The light is multiplied by the fraction of the area that the sphere fills, per component. Parts of the sphere
+        that nearer spheres hide are omitted.
         """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)

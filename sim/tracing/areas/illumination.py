@@ -53,7 +53,7 @@ class FrameState:
     """Inputs that change between calls.
 
     bodies: centres of the moving spheres; the agent is the last one
-    inputs: tables
+    inputs: tables that are the same in all worlds
     world: number of the world of each area
     body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is neglected
     """

@@ -71,7 +71,7 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Numbers of the cells, float32, flat, for the kernel."""
+        """Numbers of all cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
         return self.grid.numbers.astype(np.float32).ravel()
 
 
@@ -79,7 +79,7 @@ class LightNodes:
 class NodeTables:
     """Reflected light at the nodes.
 
-    cells: numbers of the free cells
+    cells: see `CellGrid.numbers`
     floor, walls: light at their nodes, one array per component
     """
 
