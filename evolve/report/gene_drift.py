@@ -73,7 +73,7 @@ class Drift:
 
     @property
     def random(self) -> str:
-        """Kind of fitness that the searches maximise, as text; its task fitness is random."""
+        """What the searches maximise, as text: random "fitness", or random "task fitness minus costs"."""
         return "task fitness minus costs" if self.costs else "fitness"
 
     def as_plain_values(self) -> dict[str, Any]:

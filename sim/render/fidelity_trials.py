@@ -132,7 +132,7 @@ class FidelityTrials:
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
     def _truth(self, sampling: EyeSampling, receptors: np.ndarray) -> Trial:
-        """Return the reference's rays for areas. Behind a pupil, the rays are drawn for these receptors only."""
+        """Return many rays as a reference for areas. Behind a pupil, they are drawn for these receptors only."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
             return sampling.trial(int(np.clip(of_a_view // len(receptors), *TRUE_AREA)), receptors)

@@ -86,7 +86,7 @@ class Stripes:
         return Texture(mi.Float(first), mi.Float(columns), self._least_sides[int(first)])
 
     def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
-        """Return the mean reflectance, per component, over consecutive stretches of equal weight.
+        """Return the mean reflectance, per component, over consecutive stretches of a texture, which have equal weight.
 
         ends: ends of the stretches, in columns; texel centres are at whole numbers
         spread: additional width of each stretch, half of it on either side
