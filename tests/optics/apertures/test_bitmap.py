@@ -20,8 +20,8 @@ def lopsided(n, seed):
 
 def in_the_focal_plane(image, at):
     """Return the PSF in the focal plane by Fraunhofer's integral over square pixels (Goodman, §4.4.1 and §5.2). Each
-    pixel gives a product of two sincs, with a phase that depends on its position. The PSF is |U|²/A with U(X) = ∫
-    exp(-2πi x X/λf) dx/λf.
+    pixel gives a product of two sincs, with a phase that depends on its position. The PSF is |U|²/A, where A is the
+    area of the opening and U(X) = ∫ exp(-2πi x X/λf) dx/λf.
     """
     n, pitch = len(image), 2 * RADIUS / len(image)
     centres = (np.arange(n) + 0.5) * pitch - RADIUS
