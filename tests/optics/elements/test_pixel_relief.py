@@ -261,7 +261,7 @@ class TestScatter:
 
     @pytest.mark.slow
     def test_light_that_goes_everywhere_is_seen_too(self):
-        """Random heights scatter light up to the rim of the eye. All cells together receive the light of a wide window."""
+        """Random heights scatter light up to the eye's rim. All cells together receive the light of a wide window."""
         noise = PixelRelief(np.random.default_rng(0).random((32, 32)) * 1e-6)
         eye = optics.Eye(pupil=Pupil(25e-6, noise), resolution=(9, 9), fov_deg=45, bands=1)
         kernel = eye.kernel(1)

@@ -80,7 +80,7 @@ class TestDepth:
         np.testing.assert_array_equal(LENS.see(scene, S, z=everywhere), LENS.see(scene, S, z=2e-3))
 
     def test_far_scenes_need_one_layer(self):
-        """Light from 10 m on is practically parallel: R² / (2 z λ) = 6e-5 waves."""
+        """Light from 10 m and more is practically parallel, R² / (2 z λ) = 6e-5."""
         bank = LENS.sight(S, (10.0, math.inf))
         assert bank.choices[0].counts == (1,)
         assert bank.choices[0].predicted_error < 1e-3
@@ -137,7 +137,7 @@ class TestField:
             return eye.kernel(S, direction_deg=tuple(math.degrees(math.atan(t)) for t in (right, -down)))
 
         def kernel_of(i, j):
-            """Return the kernel of a symmetric eye, which is a mirrored kernel of one quadrant."""
+            """Return the kernel of a symmetric eye, a mirrored kernel of one quadrant."""
             right, down = (j - (width - 1) / 2) * cell, (i - (height - 1) / 2) * cell
             return corner(abs(right), abs(down))[:, :: (1 if down > 0 else -1), :: (1 if right > 0 else -1)]
 
@@ -195,7 +195,7 @@ class TestNodeChoice:
         assert worst_difference([(1, b), (-1, a)], 2) == pytest.approx(expected)
 
     def test_a_quadratic_family_errs_as_predicted(self):
-        """For kernels proportional to t², interpolation between nodes at the distance h has an error of h²/4."""
+        """Linear interpolation of t² between nodes at the distance h has an error of h²/4."""
         choice = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
         assert [choice.error((n,)) for n in (3, 5, 9)] == pytest.approx([1 / 4, 1 / 16, 1 / 64])
         assert choice.choose(0.1).counts == (5,)
@@ -258,9 +258,7 @@ class TestLightFrom:
             np.testing.assert_allclose(one, seen[0], atol=1e-4 * LENS.throughput)
 
     def test_stripes_are_what_the_diffraction_limit_leaves_of_them(self):
-        """The reference is a sum over harmonics of the stripes, times Airy's OTF (Goodman, eq. 6-32) and the receptor's
-        transform.
-        """
+        """The reference is a sum over harmonics, with Airy's OTF (Goodman, eq. 6-32) and the receptor's transform."""
         eye = replace(LENS, resolution=(41, 41), sensor_width=41 / 9 * LENS.sensor_width, tolerance=1e-3)
         eye = replace(eye, fov_deg=math.degrees(2 * math.atan(eye.sensor_width / 2 / LENS.sensor_distance)))
         assert eye.sensor_distance == pytest.approx(LENS.sensor_distance)
@@ -278,7 +276,7 @@ class TestLightFrom:
 
     def test_detail_within_cells_is_better_put_at_their_centres(self):
         """Smooth waves are given as means over cells. Errors fall with the square of the cell size if cells resolve the
-        PSF (0.2 of a receptor). Light from the centres of cells always has less than half the error.
+        PSF. Light from the centres of cells always has less than half the error.
         """
         eye = replace(LENS, tolerance=1e-4)
         height, width = eye.resolution
