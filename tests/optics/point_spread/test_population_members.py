@@ -156,7 +156,7 @@ def test_a_narrow_mask_is_sampled_finely(waist):
 
 @pytest.mark.parametrize("common", [{"height": 1.0}, {"wavefront": 1e6}])
 def test_what_all_of_a_pupil_has_in_common_changes_nothing(common):
-    """A metre of glass or of path is about two million waves, which float32 does not resolve to a tenth of a wave."""
+    """A metre of glass or of path is a million waves or more, which float32 does not resolve to a tenth of a wave."""
     lens = {
         "height": optics.BSplineRelief.paraboloid(0, 1 / (0.5 * Z), 15e-6),
         "wavefront": optics.Zernike({(3, 1): 0.1}),
