@@ -67,8 +67,8 @@ def test_p_counts_searches_that_came_as_far_on_either_side():
 
 
 def test_runs_that_agree_have_a_smaller_p_than_one():
-    """If the null model is uniform in [0, 1], the mean of two draws has a triangular distribution, and p = 4 m² for a
-    mean m < 1/2.
+    """The mean of two draws from a null model that is uniform in [0, 1] has a triangular distribution. A mean m < 1/2
+    therefore has p = 4 m².
     """
     end = Drift("a", "x", 5, 0.0, 0.5, 1.0, " ".join(f"{(i + 0.5) / 1000:.4f}" for i in range(1000)))
     assert end.p(0.1, 0.1) == pytest.approx(4 * 0.1**2, rel=0.15), "three standard errors of this number of draws"

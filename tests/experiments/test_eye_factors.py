@@ -79,7 +79,7 @@ def test_every_animal_is_an_animal_of_a_run():
 
 
 def test_stored_runs_are_recognised(tmp_path):
-    """If storing a design with six digits changed its noise, the design would not be found in the file, and would be
+    """A design whose noise changed when it was stored with six digits would not be found in the file, and would be
     trained again in every call.
     """
     some = [trained(design, 1.0) for design in designs() if design.seed == 0]

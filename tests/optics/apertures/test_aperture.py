@@ -166,8 +166,8 @@ def test_derivatives(name, mode):
 
 
 def test_power_of_the_soft_disk():
-    """By Parseval's theorem, the sum of squares over the grid equals the integral of the squared spectrum, which is the
-    product of the disk's spectrum and the kernel's.
+    """The sum of squares over the grid equals the integral of the squared spectrum (Parseval's theorem). The spectrum
+    is the product of the disk's spectrum and the kernel's.
     """
     soft = Circle().soften(5.0, 1e-6)
     rate = 2.01 * soft.stopband

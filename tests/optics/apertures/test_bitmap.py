@@ -106,8 +106,8 @@ def test_an_image_without_open_pixels_is_refused():
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
 def test_planning_and_quadrature_of_many_edges_take_as_long_as_the_sum(seed):
-    """In an earlier version, the first PSF of a 64 x 64 image took seven times as long as the second. The difference
-    was the time for the quadrature nodes.
+    """The first PSF of a 64 x 64 image took seven times as long as the second in an earlier version. The difference was
+    the time for the quadrature nodes.
     """
     open_ = optics.Pupil(30e-6, aperture=optics.union(optics.Bitmap([[1]])))
     optics.psf(open_, dx=0.5e-6, shape=(65, 65), tolerance=1e-4)

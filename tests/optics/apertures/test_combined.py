@@ -124,7 +124,7 @@ def test_a_ring_is_a_difference():
 
 
 def test_small_disks_are_softened_from_both_ends():
-    """If a stop is smaller than the reach of the kernel, both ends of its arcs lie within this reach."""
+    """Both ends of the arcs of a stop lie within the reach of the kernel if the stop is smaller than this reach."""
     x, y = np.random.default_rng(1).uniform(-0.4, 0.4, (2, 1000))
     shape, edge = difference(Circle(), Disk(0.07, (0.05, 0.02))), Circle().soften(4.0, 1e-7).edge
     assert edge.reach > 0.14

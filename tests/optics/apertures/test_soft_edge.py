@@ -1,4 +1,6 @@
-"""The soft edge's kernel: its spectrum is 1, then 0, up to the ripple; its transition needs the fewest samples."""
+"""The kernel of soft edges: its spectrum is 1 in the passband and 0 in the stopband, up to the ripple, and the width of
+the transition needs the fewest samples.
+"""
 
 import numpy as np
 import pytest

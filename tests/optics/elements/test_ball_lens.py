@@ -88,7 +88,7 @@ def test_the_wavefront_of_a_perfect_lens_is_flat_and_its_psf_that_of_an_ideal_le
 
 
 def test_the_wavefronts_slope_is_the_longitudinal_aberration():
-    """If a wavefront is ahead by W at the height x, a ray there crosses the axis at the distance z with n/z = n/f +
+    """A ray at the height x, at which the wavefront is ahead by W, crosses the axis at the distance z with n/z = n/f +
     W'/x, up to the fourth order in x/f.
     """
     lens = BallLens(R, 1.5, 1.5, 1.0)

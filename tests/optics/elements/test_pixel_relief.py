@@ -84,7 +84,7 @@ class TestLenses:
 
     @pytest.mark.slow
     def test_whole_waves_change_nothing(self):
-        """At its wavelength, a lens whose heights are wrapped to one wave equals the full lens."""
+        """A lens whose heights are wrapped to one wave equals the full lens at this wavelength."""
         whole = self.lens(24)
         assert self.strehl(whole % WAVE) == pytest.approx(self.strehl(whole), rel=1e-5)
 
@@ -216,7 +216,7 @@ class TestScatter:
     """Pixels scatter light to places that smooth glass does not reach."""
 
     def test_of_a_grating_it_is_the_order_that_the_share_reaches(self):
-        """Of two levels, the two first orders have 0.811 of the light, the third 0.09, and the fifth 0.032."""
+        """The two first orders of two levels have 0.811 of the light, the third orders 0.09, and the fifth 0.032."""
         count, periods = 128, 32
         heights = np.broadcast_to(np.arange(count) // 2 % 2 * WAVE / 2, (count, count))
         pupil = Pupil(1e-3, PixelRelief(heights), aperture=Slit(1.4, 1.4))

@@ -28,8 +28,8 @@ def smooth(side=40):
 
 
 def test_a_gaussian_beam_stays_one():
-    """If the pupil does not cut off the Gaussian beam of waist w, the beam has the waist λf/πw in the focus, with the
-    intensity exp(-2r²/w²).
+    """A Gaussian beam of waist w, with the intensity exp(-2r²/w²), has the waist λf/πw in the focus if the pupil does
+    not cut it off.
     """
     waist = R / 4
     result = optics.psf(lens(GaussianMask(waist)), **ASKED, tolerance=1e-5)
@@ -145,8 +145,8 @@ def test_rings_by_transforms_of_radii(mask):
 
 
 def test_a_zone_plate_has_a_focus():
-    """On the axis, each edge of a zone at the distance L contributes ± z/L e^{ikL} (first Rayleigh-Sommerfeld
-    integral). A tenth of the light (1/π²) is in the focus.
+    """Each edge of a zone contributes ± z/L e^{ikL} to the field on the axis, where L is its distance from there (first
+    Rayleigh-Sommerfeld integral). A tenth of the light (1/π²) is in the focus.
     """
     z, radius = 2e-3, 100e-6
     plate = Rings.zone_plate(radius, z, WAVE)

@@ -156,7 +156,7 @@ def test_samples_are_the_polynomials():
 
 @pytest.mark.parametrize("kind", ["zernike", "map"])
 def test_wider_than_the_pupil(kind):
-    """If a wavefront is defined over twice the radius of the pupil, the pupil has a quarter of the defocus."""
+    """The pupil has a quarter of the defocus if the wavefront is defined over twice the radius of the pupil."""
     x = (np.arange(32) + 0.5) / 16 - 1
     wide = Zernike({(2, 0): 0.8}, radius=2 * R)
     if kind == "map":
@@ -221,7 +221,7 @@ def test_a_population_has_them_too():
 
 
 def test_beside_a_relief_of_pixels():
-    """In a pupil with a stepped relief and a wavefront, a lens made of pixels compensates half a wave of defocus."""
+    """A stepped relief is combined with a wavefront: a lens made of pixels compensates half a wave of defocus."""
     steps = optics.PixelRelief(np.where(np.add.outer(np.arange(8), np.arange(8)) % 2, 2e-7, 0))
     bent = 1e6 * 40.0 * R**2 / (4 * math.sqrt(3))
     plain = Pupil(R, steps, thin_lens_focal_length=1 / (1 / F + 40.0), aperture=Slit(1, 1))

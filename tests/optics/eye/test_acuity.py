@@ -49,8 +49,8 @@ def test_a_lattice_of_points_aliases_beyond_its_acuity():
 
 
 def test_an_ideal_observer_detects_at_the_predicted_threshold():
-    """At the threshold, an observer who compares the likelihoods of random photon counts picks the right one of two
-    intervals in 75 % of the trials.
+    """An observer who compares the likelihoods of random photon counts picks the right one of two intervals in 75 % of
+    the trials at the threshold.
     """
     rng = np.random.default_rng(3)
     x = np.arange(64) / 64 * 4 * 2 * np.pi

@@ -59,9 +59,7 @@ def test_error_is_within_a_third_of_the_tolerance(tolerance, cycles, from_cell):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("cycles", "fewer"), [(0.5, 0.5), (0.1, 0.25)])
 def test_samples_that_larger_cells_need_are_too_few_for_smaller_ones(cycles, fewer):
-    """With the number of samples that is enough for larger cells, the error exceeds a third of the tolerance of
-    0.01.
-    """
+    """The error exceeds a third of the tolerance of 0.01 with a number of samples that is enough for larger cells."""
     assert integral_error(samples_per_cycle(1e-2, cycles) - fewer, cycles, False) > 1e-2 / 3
 
 

@@ -81,8 +81,8 @@ def test_errors_fall_with_the_tolerance():
 
 @pytest.mark.slow
 def test_a_wide_guide_integrates_intensity_over_its_section():
-    """With dozens of modes, the kernel is the PSF integrated over the disk of the waveguide. The evanescent fields,
-    whose length is the radius divided by V, also collect light around the disk.
+    """The kernel of a waveguide with dozens of modes is the PSF integrated over the disk of the waveguide. The
+    evanescent fields, whose length is the radius divided by V, also collect light around the disk.
     """
     guide = Waveguide(5e-6, 1.42, 1.34)
     eye = Eye(LENS, (3, 3), 2 * math.degrees(math.atan(9e-6 / FOCAL)), 18e-6, 1, waveguide=guide, full_aperture=1e-4)

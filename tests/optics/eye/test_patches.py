@@ -74,8 +74,8 @@ def test_a_patch_of_a_human_fovea():
 
 
 def test_a_retina_behind_water_sees_the_angles_before_it():
-    """If the medium in front of a fish's eye changes, f stays the same, and so do the places on the retina to which
-    directions are imaged.
+    """The focal length f of a fish's eye stays the same if it is taken out of the water, and so do the places on the
+    retina to which directions are imaged.
     """
     f = WHOLE.sensor_distance
     pupil = Pupil(30e-6, thin_lens_focal_length=1.33 * f, medium_n=1.33, object_n=1.0)

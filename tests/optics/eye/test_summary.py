@@ -72,7 +72,7 @@ def test_sampling_limit_is_half_a_cycle_per_receptor():
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.1, 0.4])
 def test_noise_limit_inverts_the_circular_mtf(sigma):
-    """At the limit f, MTF(f) = σ / a². The lens is slow, so that the window of its PSF contains many fringes, and the
+    """The MTF at the limit is σ / a². The lens is slow, so that the window of its PSF contains many fringes, and the
     MTF is finely sampled.
     """
     eye = lens(50e-6, noise_sigma=sigma * 0.25, tolerance=1e-3)

@@ -76,8 +76,8 @@ def errors(method, cases):
 
 
 def test_fresnels_error_falls_with_the_square_of_the_angle():
-    """At a fixed Fresnel number N, the neglected phase a⁴/λz³ is N³ (λ/a)², and the neglected obliquity (a/z)² is N²
-    (λ/a)².
+    """The neglected phase a⁴/λz³ is N³ (λ/a)², and the neglected obliquity (a/z)² is N² (λ/a)², at a fixed Fresnel
+    number N.
     """
     radii = np.array([10e-6, 20e-6, 40e-6])
     cases = [(a, a**2 / WAVELENGTH, 1.5 * a) for a in radii]

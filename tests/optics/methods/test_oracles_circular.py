@@ -247,7 +247,7 @@ class TestQuality:
 
 
 class TestOrdersOfConvergence:
-    """With a hard edge on a grid of N samples, errors fall like N^-1 to N^-1.5. With the soft edge of `psf`, they stay
+    """Errors of a hard edge on a grid of N samples fall like N^-1 to N^-1.5. Errors of the soft edge of `psf` stay
     below the tolerance.
     """
 

@@ -49,7 +49,7 @@ class TestFieldOrders:
     @pytest.mark.fast_cases(4)
     @pytest.mark.parametrize("name", CASES)
     def test_every_order_has_its_share(self, name):
-        """With 16 samples per period, order m of a step has an error of 1 - sinc²(m/16), which is 5 % for m = 2."""
+        """Order m of a step with 16 samples per period has an error of 1 - sinc²(m/16), which is 5 % for m = 2."""
         phase, law = self.CASES[name]
         orders = (-2, -1, 0, 1, 2)
         got = self.efficiencies(phase, 16, orders)
@@ -93,8 +93,8 @@ class TestReliefs:
 
     @pytest.mark.slow
     def test_binary_relief_starves_order_zero(self):
-        """With steps of half a wave and half a period, order 0 has no light and order 1 has 40.5 %. The spline rounds
-        the steps, with an error that decreases with the number of samples.
+        """Steps of half a wave, over half of each period, send no light to order 0 and 40.5 % to order 1. The spline
+        rounds the steps, with an error that decreases with the number of samples.
         """
         errors, samples = [], (128, 256)
         flat = self.peak(None, 0)

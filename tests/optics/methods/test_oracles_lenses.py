@@ -93,7 +93,7 @@ class TestChromaticFocus:
 class TestThinLens:
     @pytest.mark.parametrize("conjugate", [1.5, 2.0, 4.0])
     def test_image_of_a_finite_source_is_airys(self, conjugate):
-        """On the image plane of a lens of f/17, the PSF is Airy's pattern for the image distance, except for errors of
+        """The PSF on the image plane of a lens of f/17 is Airy's pattern for the image distance, except for errors of
         order NA².
         """
         f, radius = 2e-3, 60e-6

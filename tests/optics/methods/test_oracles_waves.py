@@ -42,7 +42,7 @@ class TestGaussian:
         ],
     )
     def test_exact(self, waist, z, dtype, bound):
-        """With λ/(πw0) = 0.27, grazing light with a relative amplitude of 2e-7 is lost; with 0.05, none."""
+        """Grazing light with a relative amplitude of 2e-7 is lost for λ/(πw0) = 0.27, and none for 0.05."""
         dx, n = waist / 6, 64
         out_dx = waist * np.hypot(1, z * WAVELENGTH / (np.pi * waist**2)) / 8
         out = optics.propagate(
@@ -99,7 +99,7 @@ class TestPlaneWaves:
     @pytest.mark.parametrize("axis", [0, 1])
     @pytest.mark.parametrize("sine", [-0.6, 0.0, 0.3, 0.6])
     def test_tilted(self, sine, axis):
-        """In the middle of the plateau, far from its edges, the phase changes by kz cos θ."""
+        """The phase in the middle of the plateau, far from its edges, changes by kz cos θ."""
         n, dx, z = 256, 0.25e-6, 10e-6
         along = np.broadcast_to(positions(n, dx), (n, n)) if axis == 1 else positions(n, dx)[:, None]
         u = plateau(n, dx, 20e-6, 2.5e-6) * np.exp(2j * np.pi * sine / WAVELENGTH * along)

@@ -43,9 +43,7 @@ def test_a_round_pupil_in_focus_errs_as_tabulated(sine):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.1, 0.3])
 def test_unpolarised_light_errs_by_what_curvature_it_has(sine):
-    """To second order, the error is -∇²I/4k², which follows from the curvature of Airy's pattern without vector
-    theory.
-    """
+    """The error is -∇²I/4k² to second order, which follows from Airy's pattern without vector theory."""
     u = np.linspace(1e-6, 80, 20001)
     from scipy.special import j1, jv
 

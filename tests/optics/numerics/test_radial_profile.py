@@ -54,8 +54,8 @@ def test_planes_nearer_than_the_pupil_is_wide(radius, distance):
 
 
 def test_a_profile_costs_no_more_than_its_wave_turns():
-    """If the phase changes by 63 radians over the radius, and the obliquity adds a tenth, about fifty points and a
-    table twice as fine are enough. A pupil a hundred times as far away needs no additional points.
+    """About fifty points and a table twice as fine are enough if the phase changes by 63 radians over the radius, and
+    the obliquity adds a tenth. A pupil a hundred times as far away needs no additional points.
     """
     near, far = (RadialProfile.resolving(1e-4, 1e5, distance, 1e-4) for distance in (2e-3, 2e-1))
     assert 30 < far.points <= near.points < 150
@@ -87,9 +87,7 @@ def test_a_hole_of_a_thousand_zones():
 
 
 def test_long_lines_are_their_own_table(monkeypatch):
-    """If the profile has many points, they are interpolated without a matrix from Chebyshev points. The PSF is the
-    same.
-    """
+    """A profile with many points is interpolated without a matrix from Chebyshev points. The PSF is the same."""
     asked = {"dx": 1e-6, "shape": (101, 101), "tolerance": 1e-5, "dtype": "float64", "method": "hankel"}
     by_points = optics.psf(Pupil(30e-6), [550e-9], 1e-3, **asked).psf[0]
     monkeypatch.setattr(radial_profile, "LARGEST_MATRIX", 1)

@@ -176,7 +176,7 @@ def test_bad_input_names_itself(make, message):
 
 
 def test_fields_of_thin_rhabdoms_reach_far(monkeypatch):
-    """At V = 1, a mode falls by a factor e over five core radii. A field of twelve radii misses 0.3 % of the power;
+    """A mode at V = 1 falls by a factor e over five core radii. A field of twelve radii misses 0.3 % of the power;
     forty radii are enough.
     """
     thin = Ommatidium(FacetLens(25e-6, 30e-6), Waveguide(0.64e-6))

@@ -55,9 +55,7 @@ def test_cells_count_with_the_share_that_lies_within():
 
 
 def test_many_radii_take_no_more_work_than_some():
-    """In an earlier version, the edge of each circle was evaluated separately, and 1000 circles took 1000 times as
-    long.
-    """
+    """Earlier versions evaluated the edge of each circle separately, so that 1000 circles took 1000 times as long."""
     pupil = optics.Pupil(1e-3, thin_lens_focal_length=12.5e-3)
     blurred = optics.psf(pupil, sensor_distance=12.8e-3, dx=1.1e-6, shape=(129, 129))
     optics.encircled_energy(blurred, 30e-6)

@@ -62,7 +62,7 @@ def test_field_is_the_integral(name, method):
 
 
 def test_symmetric_fields_along_a_line_are_those_of_the_plane():
-    """In a wide window, the sum over nodes is computed along one radius only."""
+    """The sum over nodes is computed along one radius only if the window is wide."""
     wide = {**ASKED, "dx": 0.5e-6, "shape": (121, 121)}
     line = optics.psf(PUPILS["lens"], **wide, method="rayleigh_sommerfeld", tolerance=1e-6, field=True)
     plane = optics.psf(PUPILS["lens"], **wide, method="split_angular_spectrum", tolerance=1e-6, field=True)

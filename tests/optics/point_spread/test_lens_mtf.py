@@ -61,7 +61,7 @@ def test_frequencies_beyond_the_cutoff_are_refused_in_all_directions():
 
 
 def test_lateral_colour_cancels_a_pattern_of_twice_its_width():
-    """If two equal images are 10 µm apart along x, contrasts are multiplied by |cos(πfx 10 µm)|, which is 0 at 50
+    """Contrasts are multiplied by |cos(πfx 10 µm)| if two equal images are 10 µm apart along x. This factor is 0 at 50
     cycles per mm.
 
     On the axis of the lens, x is the sagittal direction.
@@ -77,7 +77,7 @@ def test_lateral_colour_cancels_a_pattern_of_twice_its_width():
 
 
 def test_tangential_is_the_direction_from_the_axis():
-    """If the lens and the image point are rotated by 90° about the axis, neither contrast changes."""
+    """Neither contrast changes if the lens and the image point are rotated by 90° about the axis."""
     turned = triplet(20, 0.55e-6)
     turned.pupil_x, turned.pupil_y = -turned.pupil_y, turned.pupil_x
     x, y, z = turned.reference_center

@@ -104,7 +104,7 @@ def test_a_window_without_the_peak_has_no_strehl_ratio():
 
 
 def test_the_higher_of_two_lobes_is_found_between_samples():
-    """Of two lobes, the one with the lower sample can have the higher peak."""
+    """The lobe with the lower sample can have the higher peak."""
     result = focus(0.45e-6, 41, source_angle=(0.05e-3, 0.03e-3))
     sampled = result.psf.max() / (focus(0.05e-6, 11).psf.max())
     assert sampled < 0.97

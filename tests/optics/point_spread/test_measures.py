@@ -22,9 +22,7 @@ def circular_mtf(f: np.ndarray, cutoff: float) -> np.ndarray:
 
 
 def test_mtf_of_an_ideal_lens_is_the_overlap_of_two_disks():
-    """At f/8, 1 % of the light lies outside the window of 400 µm, which raises the contrasts at low frequencies by 1
-    %.
-    """
+    """The window of 400 µm loses 1 % of the light at f/8, which raises the contrasts at low frequencies by 1 %."""
     result = ideal(8, 1.6e-6, 257)
     transfer = optics.mtf(result)
     f = np.linspace(0.1, 1, 10) * transfer.cutoff[0]
@@ -103,7 +101,7 @@ def test_strehl_ratio_under_defocus():
 
 
 def test_encircled_energy_follows_airy_at_any_pitch():
-    """At f/16, the PSF deviates from Airy's by 2e-3. Samples can be summed if they are at most 8.8 µm apart."""
+    """The PSF at f/16 deviates from Airy's by 2e-3. Samples can be summed if they are at most 8.8 µm apart."""
     f_number = 16
     radius = FOCAL_LENGTH / (2 * f_number)
     radii = np.array([5e-6, 1.07e-5, 2e-5])

@@ -31,8 +31,8 @@ def radial_means(shares, dx, frequencies, orientations):
 
 
 def test_contrasts_between_the_grids_frequencies_are_the_pictures_own():
-    """If light fills the window, contrasts change sign within one step of the frequency grid. Linear interpolation
-    would have an error of 0.04 there.
+    """Contrasts change sign within one step of the frequency grid if light fills the window. Linear interpolation would
+    have an error of 0.04 there.
     """
     result = optics.psf(LENS, [WAVELENGTH], FOCUS + 1.6e-4, dx=0.5e-6, shape=(145, 145), tolerance=1e-4)
     transfer = optics.mtf(result, tolerance=1)
@@ -104,7 +104,7 @@ def test_contrasts_carry_derivatives_by_the_focus():
 
 
 def test_quality_says_what_its_steps_may_miss(monkeypatch):
-    """If light fills a wide window, the contrast has a peak that is narrower than a step of the integral over
+    """The contrast of light that fills a wide window has a peak that is narrower than a step of the integral over
     frequency.
     """
     pupil = optics.Pupil(0.1e-3, thin_lens_focal_length=2e-3)

@@ -48,8 +48,8 @@ def test_the_error_that_is_seen_is_the_one_that_is_stated(told):
 
 
 def test_an_exact_method_tries_again_for_a_smaller_tolerance(told):
-    """If the error is ten times too large, the PSF is computed again with 0.03 of the tolerance, for which the method
-    takes more samples.
+    """A PSF whose error is ten times too large is computed again with 0.03 of the tolerance, for which the method takes
+    more samples.
     """
     tight = 2e-4
     checked = told(10 * tight, 0.5 * tight)
@@ -63,7 +63,7 @@ def test_an_exact_method_tries_again_for_a_smaller_tolerance(told):
 
 @pytest.mark.parametrize("error", [3.0, 20.0])
 def test_quick_samples_that_fail_give_way_to_samples_of_all_light(told, error):
-    """If slightly more accuracy is needed, there are more of the quick samples. If much more is needed, samples for all
+    """More of the quick samples are used if slightly more accuracy is needed. If much more is needed, samples for all
     light are used instead.
     """
     asked, ask = 1e-2, {"sensor_distance": 400e-6, "method": "low_rank", **WINDOW}

@@ -66,7 +66,7 @@ def test_in_a_medium_behind_any_lens():
 
 
 def test_the_batch_takes_it_and_leaves_it_the_rest():
-    """In one batch, three members are computed separately: a height map, a wide pupil whose remaining phase is too
+    """Three members of one batch are computed separately: a height map, a wide pupil whose remaining phase is too
     large, and a pupil with a derivative.
     """
     wide = optics.Pupil(200e-6, thin_lens_focal_length=Z)

@@ -204,8 +204,8 @@ def test_of_somewhat_dimmer_ones_errors_are_told(inner, waist, tolerance):
 
 
 def test_dim_masks_are_no_reason_to_leave():
-    """If a mask transmits an amplitude of 0.001 everywhere, the edge contributes no more than its usual share of the
-    light.
+    """The edge contributes no more than its usual share of the light if a mask transmits an amplitude of 0.001
+    everywhere.
     """
     pupil = optics.Pupil(12e-6, mask=optics.MaskMap(np.full((4, 4), 0.03)), thin_lens_focal_length=Z)
     assert list(population_pictures([Member(pupil, LAMBDA, Z, math.inf)], Grid.square(33, 0.5e-6), 1e-2))

@@ -58,8 +58,8 @@ class TestOracles:
         assert result.psf[0, 2, 2] * math.pi * self.a**2 == pytest.approx(exact, rel=error)
 
     def test_far_field_of_an_aperture_is_fraunhofers(self):
-        """At the Fresnel number 5e-4, |U|² = (πa²/λρ)² (z/ρ)² (2 J1(v)/v)² with v = ka sin θ, except for errors of the
-        order of the Fresnel number squared.
+        """The intensity at the Fresnel number 5e-4 is (πa²/λρ)² (z/ρ)² (2 J1(v)/v)² with v = ka sin θ, except for
+        errors of the order of the Fresnel number squared.
         """
         from scipy.special import j1
 
@@ -91,7 +91,7 @@ def test_methods_agree_with_the_direct_sum_within_their_prediction(method, seed)
 
 @pytest.mark.parametrize("method", METHODS[:2])
 def test_error_follows_the_tolerance(method):
-    """In float64, every requested digit is obtained."""
+    """Every requested digit is obtained in float64."""
     r = np.hypot(*np.meshgrid(*[np.arange(-15, 16) * 0.5e-6] * 2))
     exact = np.abs(reference.ideal_lens_field(r.ravel(), 550e-9, 30e-6, 240e-6)).reshape(r.shape) ** 2 / LENS.area
     for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
@@ -194,7 +194,7 @@ class TestWindow:
 class TestPower:
     @pytest.mark.parametrize("method", ["angular_spectrum", "far_field"])
     def test_a_wide_window_holds_all_power(self, method):
-        """If samples resolve the highest frequency of the intensity, their sum equals the integral."""
+        """The sum of samples equals the integral if they resolve the highest frequency of the intensity."""
         result = optics.psf(
             prism(8e-6, 0.1), [550e-9], 120e-6, dx=1e-6, shape=(281, 281), tolerance=2e-3, method=method
         )
@@ -203,7 +203,7 @@ class TestPower:
         assert result.power[0] < 1.001
 
     def test_evanescent_light_does_not_arrive(self):
-        """If a relief is so steep that the deflected light is evanescent, almost no light arrives."""
+        """Almost no light arrives behind a relief that is so steep that the deflected light is evanescent."""
         lost = optics.psf(
             prism(8e-6, 1.5), [550e-9], 120e-6, dx=2e-6, shape=(141, 141), tolerance=1e-2, dtype="float64"
         )

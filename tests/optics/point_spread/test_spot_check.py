@@ -68,7 +68,7 @@ def test_half_the_nodes_sum_what_is_even_in_y(aperture, cycles):
 
 @pytest.mark.parametrize("spare", [1.0, 2.0])
 def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
-    """If the PSF was computed by the reference sum itself, the two do not differ. The check then reports the accuracy
+    """A PSF that was computed by the reference sum itself does not differ from it. The check then reports the accuracy
     of the sum. In a dark window, the accuracy is lower, unless the sum is computed with additional digits.
     """
     effort = replace(spot_check_module.EFFORT, spare_digits=(spare,))
@@ -137,8 +137,8 @@ def test_ordinary_paths_round_as_before():
 
 @pytest.mark.parametrize("samples", range(1, 8))
 def test_windows_with_few_samples_are_checked(samples):
-    """In an earlier version, the check of a single sample was omitted if it took longer than a third of the PSF's time.
-    The error could then be 0.63 of the tolerance, while 0.5 was stated.
+    """Earlier versions omitted the check of a single sample if it took longer than a third of the PSF's time. The error
+    could then be 0.63 of the tolerance, while 0.5 was stated.
     """
     beam = Beam(Pupil(1e-3, optics.BSplineRelief(1e-7 * np.eye(4))), PointSource(), 550e-9, 10e-3)
     task = Problem.from_beam(beam, Grid((1, samples), 3e-6, (1e-4, 2e-4)), 1e-4)
@@ -190,8 +190,8 @@ def test_the_far_corner_of_a_window_off_the_axis_is_checked(seed):
 
 @pytest.mark.parametrize("shape", [(3, 3), (4, 5), (5, 5), (2, 6)])
 def test_direct_sums_of_few_samples_are_checked(shape):
-    """In an earlier version, a check of eight points took too long for them and was omitted. Their plans then stated
-    half the tolerance.
+    """Earlier versions omitted their check, because a check of eight points took too long. Their plans then stated half
+    the tolerance.
     """
     rng = np.random.default_rng(sum(shape))
     distance = 1.5e-3

@@ -110,7 +110,7 @@ def test_a_small_eye_is_smythes_integral(angle, z):
 
 
 def test_a_polygon_of_many_corners_has_the_published_spot():
-    """At NA 0.9 and 500 nm, the sum gives the published 365 by 270 nm."""
+    """The sum gives the published spot of 365 by 270 nm at NA 0.9 and 500 nm."""
     round_ = lens(0.9, aplanatic=True, aperture=optics.Polygon.regular(96))
     options = {"apodization": "aplanatic", "polarization": (1, 0), "dx": 5e-9, "shape": (161, 161)}
     spot = optics.vector_focus(round_, WAVE, **options)
@@ -186,7 +186,9 @@ def test_where_single_precision_will_not_do_double_is_taken():
 
 
 def test_evanescent_rays_are_refused():
-    """If light is oblique by half a radian, some rays of a lens as wide as its distance would have a sine of 1.17."""
+    """Some rays of a lens as wide as its distance would have a sine of 1.17 if the light is oblique by half a
+    radian.
+    """
     with pytest.raises(optics.AccuracyError, match=r"sine of 1\.17: must be at most 0\.98"):
         optics.vector_focus(optics.Pupil(20e-6, thin_lens_focal_length=20e-6), source_angle=(0.5, 0.0))
 

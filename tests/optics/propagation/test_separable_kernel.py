@@ -65,8 +65,8 @@ def test_the_direct_sum_is_met_to_the_predicted_error(name, tolerance, dtype):
 
 
 def test_the_paraxial_kernel_is_wrong_where_the_separable_kernel_is_right():
-    """At a distance of 0.3 m and 20 mm off the axis, the phase k ρ⁴/8z³ that Fresnel neglects displaces light by ρ³/2z²
-    = 44 µm, which is 4 samples.
+    """The phase k ρ⁴/8z³ that Fresnel neglects displaces light by ρ³/2z² = 44 µm (4 samples) at a distance of 0.3 m, 20
+    mm off the axis.
     """
     n, dx, z, out_dx, shape, centre = CASES["0.3 m, oblique"]
     u = tilted(n, dx, n * dx / 6, (0.06, 0.08))

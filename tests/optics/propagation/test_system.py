@@ -104,7 +104,7 @@ def test_a_relief_of_the_mediums_index_changes_nothing():
 
 
 def test_a_relay_of_two_lenses_inverts_its_object():
-    """In paraxial theory, a relay of length 4f gives -u(-x) e^{4ikf}; the sign is that of (1/iλf)². Rays from x at the
+    """A relay of length 4f gives -u(-x) e^{4ikf} in paraxial theory, with the sign of (1/iλf)². Rays from x at the
     angle θ deviate by a phase of order k x² θ²/f.
     """
     focal_lengths, errors = np.array([75e-6, 150e-6]), []
@@ -245,7 +245,7 @@ LENS_TRAIN = [
 
 
 def test_loose_tolerances_take_fewer_samples_and_keep_their_predictions():
-    """With a loose tolerance, fewer diffracted frequencies are included. The result agrees with that of a tight
+    """Fewer diffracted frequencies are included with a loose tolerance. The result agrees with that of a tight
     tolerance to within the predicted error.
     """
     where = {"wavelength": 550e-9, "out_dx": 1e-6, "out_shape": (96, 96)}

@@ -179,7 +179,7 @@ class TestLightInBands:
 
 
 def test_an_error_of_reflectances_is_the_worst_channels():
-    """If one of two channels has an error, this error is reported, although the other channel has none."""
+    """The error of one of two channels is reported, although the other channel has none."""
     wavelengths = np.linspace(410e-9, 690e-9, 8)
     weights = np.vstack([np.full(8, 0.1), np.linspace(0.0, 0.2, 8)])
     exact = SimpleNamespace(wavelengths=wavelengths, weights=weights)

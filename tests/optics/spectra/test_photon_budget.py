@@ -65,7 +65,7 @@ def test_photons_grow_with_the_receptor_and_fall_with_the_focal_length():
 @pytest.mark.parametrize("radius", [50e-6, 25e-6])
 @pytest.mark.parametrize("time", [1e-5, 4e-5])
 def test_variance_is_the_mean_over_the_photons(radius, time):
-    """By the Poisson distribution, the variance of a signal is its mean divided by N. The relative noise is therefore
+    """The variance of a signal is its mean divided by N (Poisson distribution). The relative noise is therefore
     proportional to 1/a and to 1/√Δt. A Gaussian of fixed width would have the same variance in all four cases.
     """
     budget = PhotonBudget(illuminance=1e3, integration_time=time)

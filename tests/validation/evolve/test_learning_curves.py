@@ -103,8 +103,8 @@ def test_ten_eyes_must_beat_one_by_more_than_chance():
 
 
 def test_a_journey_ends_where_its_first_episode_ends():
-    """In two worlds, an animal walks 1 m per action from (3, 4). In the first world, the episode ends after two actions
-    and a new one begins.
+    """Animals in two worlds walk 1 m per action from (3, 4). In the first world, the episode ends after two actions and
+    a new one begins.
     """
     worlds = Journey(Walkers())
     worlds.reset()

@@ -40,7 +40,7 @@ def test_a_textbook_that_does_not_fail_is_caught(measured):
 
 
 def test_wrap_around_falls_like_the_beam_on_the_periods_edge(measured):
-    """At the edge of the period P, the amplitude of the repeated beam of waist w is exp(-(P/2w)²). The logarithm of the
+    """The amplitude of the repeated beam of waist w is exp(-(P/2w)²) at the edge of the period P. The logarithm of the
     integrated error is therefore a linear function of (P/w)², with a slope of -1/4 to -1/2.
     """
     p = np.array(aliasing.PERIODS[1:6])

@@ -17,7 +17,7 @@ def test_all_bounds_hold(rows):
 
 
 def test_known_departure_at_f2(rows):
-    """At NA 0.24, which is close to f/2 (0.2425), the deviation is 4.5e-2, as in `ideal_lens_psf` at the Fresnel number
+    """The deviation at NA 0.24, which is close to f/2 (0.2425), is 4.5e-2, as in `ideal_lens_psf` at the Fresnel number
     27.
     """
     row = next(row for row in rows if row.aperture == 0.24)

@@ -36,8 +36,8 @@ def test_all_three_prisms_agree_for_small_angles():
 
 
 def test_transmission_has_its_known_values():
-    """At normal incidence on glass with n = 1.5, 4 % of the light is reflected. At Brewster's angle arctan(1/n), no
-    p-polarised light is reflected.
+    """Glass with n = 1.5 reflects 4 % of the light at normal incidence, and no p-polarised light at Brewster's angle
+    arctan(1/n).
     """
     assert refraction.transmission(0.0, 1.5) == pytest.approx(0.96)
     brewster = np.arctan(1 / 1.5)

@@ -101,7 +101,7 @@ def test_a_spoilt_file_is_named_with_its_line(tmp_path, old, new, said):
 
 
 def test_stored_points_are_of_known_cases_and_peers_that_came_close():
-    """If the error of a package exceeded 10 % with its best settings, we would be using it incorrectly."""
+    """An error above 10 % with the best settings of a package would indicate that we use it incorrectly."""
     points = read_points()
     assert {p.case for p in points} == set(NAMED)
     for case in NAMED:

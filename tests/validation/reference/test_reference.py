@@ -51,8 +51,8 @@ class TestCircular:
             assert reference.airy_encircled_energy(edge, *arguments) == pytest.approx(total, rel=1e-12)
 
     def test_mtf_is_the_overlap_of_two_disks(self):
-        """By Goodman's other definition, the MTF is the autocorrelation of the pupil: the common area of two disks
-        whose centres are s diameters apart.
+        """The MTF is also the autocorrelation of the pupil (Goodman): the common area of two disks whose centres are s
+        diameters apart.
         """
         radius, focal_length = 30e-6, 240e-6
         cutoff = 2 * radius / (WAVELENGTH * focal_length)
@@ -121,8 +121,8 @@ class TestRayleighSommerfeld:
 
     @pytest.mark.parametrize("f_number", [1.4, 2, 2.8, 4, 5.6, 8, 11, 16])
     def test_nodes_suffice_for_every_lens_of_the_chart(self, f_number):
-        """In windows of ±10 λ f/D, including the corners, twice the number of nodes changes the field by less than
-        1e-12 of the peak.
+        """Twice the number of nodes changes the field by less than 1e-12 of the peak, in windows of ±10 λ f/D including
+        the corners.
         """
         radius, f = 300e-6 / (2 * f_number), 300e-6
         r = np.linspace(0, 14.2 * WAVELENGTH * f_number, 24)

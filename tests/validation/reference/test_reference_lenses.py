@@ -120,7 +120,7 @@ class TestLenses:
         assert height / math.tan(bend) == pytest.approx(f, rel=1e-6)
 
     def test_kinoforms_axis_is_fresnels_integral(self):
-        """With t = ρ², the field on the axis is -i(π/λz) ∫ exp(iφ(t) + ikt/2z) dt, integrated zone by zone."""
+        """The field on the axis is -i(π/λz) ∫ exp(iφ(t) + ikt/2z) dt over t = ρ², integrated zone by zone."""
         design, f, wavelength, zones = 550e-9, 1e-3, 480e-9, 5
         step = 2 * design * f
         for order in (1, 2):

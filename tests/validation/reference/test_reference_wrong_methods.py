@@ -59,7 +59,7 @@ def fraunhofer_in_the_near_field():
 
 
 def tangent_in_the_far_field():
-    """At 45°, the pattern depends on sin θ, not on tan θ, and has the obliquity factor."""
+    """The pattern at 45° depends on sin θ, not on tan θ, and has the obliquity factor."""
     r, z = np.linspace(0, 16e-3, 200), 16e-3
     exact = reference.circular_aperture_fraunhofer(r, WAVELENGTH, 0.7e-6, z)
     return exact, reference.airy_psf(r, WAVELENGTH, 0.7e-6, z) * np.pi * 0.7e-6**2

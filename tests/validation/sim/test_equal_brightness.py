@@ -13,9 +13,7 @@ PAGE = Path(__file__).parents[3] / "docs/validation/equal_brightness.md"
 
 
 def test_shipped_bands_are_balanced_and_even_ones_are_not():
-    """With bands of equal width, the objects differ by as much as the noise if an eye just misses the top of an
-    object.
-    """
+    """Objects with bands of equal width differ by the noise level if an eye just misses their top."""
     assert abs(difference(BAND_EDGES_DEG, 2.0).mean()) < 0.2
     assert abs(difference(np.arange(1, 6) * 30.0, 2.0).mean()) > 0.8
 
