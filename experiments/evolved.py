@@ -65,7 +65,7 @@ class RunMetadata:
 
 @dataclass(frozen=True)
 class Store:
-    """Contents of a page: rows, conditions of their runs, null model (drift), origin, and the written answer."""
+    """Data of a page: rows, conditions of their runs, null model (drift), origin, and the written answer."""
 
     rows: list[Row]
     run_metadata: list[RunMetadata]
@@ -95,7 +95,7 @@ class Store:
 
     @property
     def legend(self) -> str:
-        """Colours of the groups as text."""
+        """Colour of each group as text, such as "navigation blue, detection orange"."""
         names = {value: name for name, value in COLORS.items()}
         return ", ".join(f"{group} {names[color]}" for group, color in self.colors.items())
 
@@ -109,7 +109,7 @@ class Store:
 
 
 def conduct_table(store: Store) -> str:
-    """Return a table with a row per run."""
+    """Return a table of the conditions of the runs, with a row per run."""
     header = ["run", "candidates", "generations", "worker hours", "commits of rhabdom"]
     lines = [
         [

@@ -76,7 +76,11 @@ class Body(sim.Task):
 
 @dataclass(frozen=True)
 class Row:
-    """Steps of one world per CPU second, by part; worlds: number of worlds stepped together."""
+    """Rates of a model.
+
+    worlds: number of worlds that are stepped together.
+    rates: steps of one world per CPU second, for each part.
+    """
 
     name: str
     worlds: int
@@ -84,7 +88,7 @@ class Row:
 
     @property
     def overhead(self) -> float:
-        """Time of a whole step relative to physics and rendering one after the other."""
+        """Time of a whole step, relative to the sum of the times for physics and for rendering."""
         return 1 / self.rates["both"] / (1 / self.rates["physics"] + 1 / self.rates["sight"])
 
     @property
@@ -109,7 +113,7 @@ def environments() -> dict[str, Callable[[int], EyesVecEnv]]:
 
 
 def parts_of(env: EyesVecEnv) -> dict[str, Callable[[], object]]:
-    """Return the measured parts: one step of all worlds each."""
+    """Return functions that run the measured parts of one step of all worlds, by name."""
     random = np.random.default_rng(0)
 
     def action() -> np.ndarray:
@@ -138,7 +142,7 @@ def timed(part: Callable[[], object], steps: int) -> float:
 
 
 def measured(name: str, env: EyesVecEnv) -> Row:
-    """Measure the parts in turns."""
+    """Measure the parts of a step in turn, and return their rates."""
     with contextlib.closing(env), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env.reset()

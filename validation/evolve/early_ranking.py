@@ -77,7 +77,7 @@ RAYS = 96  # rays of an eye, and at least one per receptor
 
 @dataclass(frozen=True)
 class Row:
-    """One animal on one rung: fitness from FEW and MANY episodes; steps, below the budget after early stopping."""
+    """One animal on one rung, with its fitness in FEW and in MANY episodes. Early stopping makes `steps` < `budget`."""
 
     animal: int
     eyes: int
@@ -116,9 +116,8 @@ def config(animal: Phenotype) -> RunConfig:
     rays = max(1, RAYS // (animal.resolution[0] * animal.resolution[1]))
     settings = (f"learning.total_steps={TOTAL}", f"learning.eval_interval={TOTAL // 2 ** (RUNGS - 1)}")
     optics = ("eye.optics=false", f"eye.rays_per_receptor={rays}")
-    return assemble(
-        "detection", assignments=[*settings, *optics, f"search.rungs={RUNGS}", f"evaluation.episodes={FEW}"]
-    )
+    more = (f"search.rungs={RUNGS}", f"evaluation.episodes={FEW}")
+    return assemble("detection", assignments=[*settings, *optics, *more])
 
 
 def climbed(number: int, animal: Phenotype) -> list[Row]:
@@ -205,8 +204,8 @@ def _of_ranks(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 class Halving:
     """Successive halving of the stored animals as one generation.
 
-    cost: CPU seconds relative to all full training runs.
-    place: rank of the animal that it selects, in the order after full training by MANY episodes; 1 is the best.
+    cost: CPU time relative to full training of all animals.
+    place: final rank of the selected animal, by its fitness in MANY episodes after full training; 1 is the best.
     """
 
     rungs: int
@@ -216,9 +215,10 @@ class Halving:
 
 
 def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") -> Halving:
-    """Apply successive halving with stored budgets; `by`: "fitness" or "fitness_many" decides on promotion.
+    """Apply successive halving to the stored results.
 
-    share: promoted share, 1/2, or 1/4 with every other rung.
+    share: promoted fraction of the animals: 1/2 at every stored rung, or 1/4 at every other one.
+    by: fitness that decides on promotion, "fitness" (FEW episodes) or "fitness_many".
     """
     fitness, many, spent = (columns(rows, name) for name in (by, "fitness_many", "cpu_seconds"))
     search = replace(SearchConfig(), population=len(fitness), rungs=rungs, promoted=share)

@@ -71,7 +71,10 @@ LEAST_SAVED = 0.05  # share of the CPU time
 
 @dataclass(frozen=True)
 class Life:
-    """A training run; curve: mean returns of its evaluations, one every INTERVAL steps."""
+    """A training run.
+
+    curve: mean returns of its evaluations, one every INTERVAL steps.
+    """
 
     task: str
     seed: int
@@ -137,7 +140,13 @@ def pairs(lives: Sequence[Life], task: str) -> list[tuple[Life, Life]]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Results of a task's training runs in both ways: returns, difference with standard error, goals first, CPU."""
+    """Results of a task's training runs with constant and with fewer epochs.
+
+    returns: mean returns.
+    gain, error: mean difference of the returns, and its standard error.
+    goals: fractions of episodes in which the goal was reached first.
+    cpu: CPU times [s].
+    """
 
     returns: tuple[float, float]
     gain: float
@@ -147,7 +156,7 @@ class Comparison:
 
 
 def compared(both: Sequence[tuple[Life, Life]]) -> Comparison:
-    """Compare two or more pairs."""
+    """Compare two or more pairs of training runs."""
     areas = np.array([[np.mean(life.curve) for life in pair] for pair in both])
     gains = areas[:, 1] - areas[:, 0]
     goals, cpu = (
@@ -204,7 +213,8 @@ def passes_until(task: str, least_epochs: int, evaluations: int) -> np.ndarray:
 def seconds(task: str, cpu: tuple[float, float], evaluations: int) -> np.ndarray:
     """Return the CPU time until each evaluation, (way, evaluation).
 
-    All epochs are assumed to take the same time, and so is all other work per step.
+    The ways are constant and fewer epochs. All epochs are assumed to take the same time, and so is all other work per
+    step.
     """
     passes = np.array([passes_until(task, least, evaluations) for least in (THROUGHOUT, FEWER)])
     (old, new), saved = passes.mean(axis=1), cpu[0] - cpu[1]

@@ -237,8 +237,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the requested training, then write the page of all stored results."""
     options_parser = parser(__doc__ or "")
     options_parser.add_argument("--train", nargs="+", default=[], choices=CASES, metavar="CASE", help=" | ".join(CASES))
-    options_parser.add_argument("--seeds", nargs="+", type=int, default=[0], help="of the trainings")
-    options_parser.add_argument("--steps", type=int, default=600_000, help="of each training")
+    options_parser.add_argument("--seeds", nargs="+", type=int, default=[0], help="seeds of the training runs")
+    options_parser.add_argument("--steps", type=int, default=600_000, help="steps of each training run")
     options_parser.add_argument("--interval", type=int, default=50_000, help="steps between evaluations")
     options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored training runs")
     options = options_parser.parse_args(arguments)

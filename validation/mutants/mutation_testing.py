@@ -81,7 +81,7 @@ class Row:
 
 
 def stored(path: Path) -> list[Row]:
-    """Return the trials so far."""
+    """Return all stored trials."""
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", newline="") as file:
@@ -147,7 +147,7 @@ def share(rows: Sequence[Row]) -> float:
 
 
 def broken(rows: Sequence[Row]) -> list[str]:
-    """Return bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     found = [
         f"{row.path}: {row.change}: not killed, without a reason"
         for row in rows

@@ -52,7 +52,11 @@ HOPELESS = 1e3
 
 @dataclass(frozen=True)
 class Row:
-    """Relative L2 errors of the field recovered from `distance` [wavelengths]; the textbook's in two dtypes."""
+    """Relative L2 errors of the field recovered from `distance` [wavelengths].
+
+    float64, float32: by the textbook's method in these types.
+    ours: by optics.propagate.
+    """
 
     distance: float
     float64: float
@@ -64,7 +68,7 @@ class Row:
 class Spot:
     """A Gaussian spot.
 
-    waist: [wavelengths].
+    waist: radius [wavelengths] at which the amplitude has fallen to 1/e.
     share: exact evanescent share.
     said: share reported by optics.propagate.
     error: error of the recovered field.

@@ -75,7 +75,8 @@ class Dark:
     """Results for one window.
 
     brightness: root mean square of the window over that of the focus.
-    errors, predicted: NaN if refused; per DARK_TOLERANCES in float32, last in float64.
+    errors, predicted: actual and predicted errors, one for each of DARK_TOLERANCES in float32, then one in float64. NaN
+        if the PSF is refused.
     """
 
     angle: float
@@ -120,7 +121,7 @@ def dark(angle: float) -> Dark:
 
 
 def breaking_distances(rows: list[Distant]) -> list[float]:
-    """Return distances at which naive phases exceed each of BREAKS, interpolated by power laws."""
+    """Return distances at which errors of float32 phases exceed each of BREAKS, interpolated by power laws."""
     errors = np.maximum.accumulate([row.naive for row in rows])
     return [float(np.exp(np.interp(np.log(b), np.log(errors), np.log(DISTANCES)))) for b in BREAKS]
 

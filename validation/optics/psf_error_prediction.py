@@ -185,7 +185,7 @@ def reason(refusal: str) -> str:
 
 
 def shares(rows: Sequence[Row]) -> dict[str, float]:
-    """Return quantities on which the bounds are set."""
+    """Return the quantities that the bounds limit, by name."""
     answered = [row for row in rows if row.runs]
     ratios = np.array([row.ratio for row in answered])
     # Refused cases are not timed; a chosen method above the tolerance counts as too slow.

@@ -83,16 +83,16 @@ from validation.pages.page import Page, parser
 
 GREEN, MIDDLE = 540e-9, 500e-9
 LUMINANCES = (3.4, 34.0, 340.0)  # [cd/m²], Banks et al. 1987
-FREQUENCIES = np.array([5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0])  # [cycles/degree], the same
+FREQUENCIES = np.array([5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0])  # [cycles/degree], Banks et al. 1987
 CYCLES, SECONDS, PUPIL_AREA, D_PRIME = 7.5, 0.1, math.pi * 1e-6, 0.77  # 70.7 % correct
-TRANSMISSION, EFFICIENCY, COVERED = 0.68, 0.5, 0.9  # Geisler 1984: ocular media, cones; share of the fovea
+TRANSMISSION, EFFICIENCY, COVERED = 0.68, 0.5, 0.9  # Geisler 1984: of ocular media, of cones; fraction of the fovea
 IDEAL_AT_5 = 1000.0, 10_000.0
 MINUTE = math.radians(1 / 60)
 
 
 @dataclass(frozen=True)
 class Row:
-    """A published value, the computed one, and the range of computed/published."""
+    """A published and a computed value, and the range in which their ratio must lie."""
 
     name: str
     unit: str
@@ -215,7 +215,7 @@ def limits() -> list[Row]:
 def geisler_photons() -> float:
     """Return photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
 
-    The budget's light is daylight. The ratio of its luminance to that of its light at 555 nm converts it.
+    The photons of daylight near 555 nm are divided by the luminance of daylight in a band 1 nm wide.
     """
     narrow = optics.Receptors((optics.Spectrum((554.0, 555.0, 556.0), (0.0, 1.0, 0.0)),), range_nm=(550.0, 560.0))
     budget = optics.PhotonBudget(math.pi, integration_time=1.0, quantum_efficiency=1.0)
@@ -223,7 +223,7 @@ def geisler_photons() -> float:
     lumens_per_watt = 683.0
     luminance = (
         budget.spectral_irradiance / math.pi * float(daylight(np.array(555e-9))) * lumens_per_watt * 1e-9
-    )  # of 1 nm
+    )  # of a band 1 nm wide
     return float(photons / luminance)
 
 

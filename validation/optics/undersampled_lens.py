@@ -107,8 +107,8 @@ def true_psf(lens: Lens, dx: float, side: int = 65) -> optics.PSFResult:
 def energy_inside(u: np.ndarray, dx: float, radius: float) -> float:
     """Return ∫ |u|² over a disk about the centre, of the band-limited function through the samples.
 
-    Gauss-Legendre in radius, trapezoidal rule in angle. The points lie between the samples, so the Fourier sum is
-    evaluated directly.
+    The quadrature is Gauss-Legendre's in radius and the trapezoid rule in angle. The points lie between the samples, so
+    the Fourier sum is evaluated directly.
     """
     n = len(u)
     frequency = np.fft.fftshift(np.fft.fftfreq(n, dx))

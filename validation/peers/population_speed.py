@@ -57,7 +57,11 @@ GOAL = 3000.0  # PSFs per CPU second, at a tolerance of 1e-2
 
 @dataclass(frozen=True)
 class Row:
-    """code, with its setting; PSFs per CPU second; median and largest error over some of the eyes."""
+    """Results of a code with one setting.
+
+    rate: PSFs per CPU second.
+    median, worst: median and largest error over some of the eyes.
+    """
 
     code: str
     asked: str
@@ -113,7 +117,7 @@ def one(pupil: optics.Pupil, **asked: object) -> np.ndarray:
 
 
 def timed(code: str, asked: str, population: list[optics.Pupil], known: dict[int, np.ndarray], picture: Picture) -> Row:
-    """Compute the eyes that are compared, then time the code on new eyes."""
+    """Return the errors of a code for the eyes in `known`, and its speed for new eyes."""
     errors = [relative_l2(picture(population[i]), image) for i, image in known.items()]
     seconds = []
     for again in range(AGAIN):
@@ -127,9 +131,9 @@ def timed(code: str, asked: str, population: list[optics.Pupil], known: dict[int
 
 
 def pupil_field(pupil: optics.Pupil, n: int, parts: int = 1) -> tuple[np.ndarray, float]:
-    """Return samples (n, n) of the pupil's field with the phase r²/2z that a focus lacks, and their pitch [m].
+    """Return samples (n, n) of the pupil's field with Fresnel's phase kr²/2z, and their pitch [m].
 
-    For even n the axis is at n//2.
+    Transforms to a focus lack this phase. For even n, the axis is at n//2.
 
     parts: subsamples of a cell at the edge along an axis.
     """
@@ -147,7 +151,7 @@ def pupil_field(pupil: optics.Pupil, n: int, parts: int = 1) -> tuple[np.ndarray
 
 
 def finished(amplitude: np.ndarray, pupil: optics.Pupil) -> np.ndarray:
-    """PSF from an amplitude in the code's own scale: Fresnel's |U|² has the power of the pupil's spectrum."""
+    """Return the PSF [1/m²] for Fresnel's amplitude U on the window."""
     image = np.abs(amplitude) ** 2
     found: np.ndarray = image / pupil.area
     return found
@@ -166,7 +170,7 @@ def prysm_picture(n: int) -> Picture:
 
 
 def _scale(field: np.ndarray, pitch: float, out: np.ndarray) -> float:
-    """Return the factor that gives the axis |Σ u| dξ²/λz, for any convention of a code."""
+    """Return the factor by which the output `out` of a code has Fresnel's amplitude on the axis, |Σ u| dξ²/λz."""
     axis = abs(out[N // 2, N // 2])
     return float(abs(field.sum()) * pitch**2 / (WAVE * Z) / axis)
 

@@ -53,7 +53,7 @@ NEXT, FACTOR = 3, 3.0  # resolutions that differ by at most NEXT receptors take 
 class Choice:
     """Chosen samples of one setting.
 
-    sweep: property that differs from the setting before
+    sweep: property in which the setting differs from the preceding one
     error: predicted error relative to the tolerance
     time: CPU time of a frame per receptor [s]
     """
@@ -70,7 +70,7 @@ class Choice:
 
     @property
     def value(self) -> float:
-        """Value of the property that differs."""
+        """Value of the property `sweep`."""
         return {RECEPTORS: self.receptors, FIELD: self.fov_deg, EYES: self.eyes}[self.sweep]
 
 

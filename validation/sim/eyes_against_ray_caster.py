@@ -51,7 +51,7 @@ MANY, ROUNDS = 64, 5
 
 @dataclass(frozen=True)
 class Row:
-    """One model.
+    """Results for one model.
 
     moving: number of moving geoms.
     same: share of receptors with the same depth.

@@ -46,7 +46,12 @@ LARGEST, MEAN, WITHOUT = 0.03, 0.01, 0.1  # bounds
 
 @dataclass(frozen=True)
 class Case:
-    """Signals (y, x) relative to white, for one focus."""
+    """Signals (y, x) relative to white, for one focus.
+
+    traced: by Mitsuba's thin lens.
+    seen: by the eye, with occlusion.
+    added: by the eye, without occlusion.
+    """
 
     name: str
     traced: np.ndarray

@@ -70,7 +70,7 @@ TABULATION = 0.01  # [σ] below which errors come from PSFs, not from rays (1 % 
 
 @dataclass(frozen=True)
 class Series:
-    """Errors [σ] of one pupil and retina by rays per receptor, and of the choice of "auto", in its light."""
+    """Errors [σ] with one pupil and retina, for numbers of rays per receptor and for the choice of "auto"."""
 
     pupil: str
     retina: str
@@ -83,7 +83,7 @@ class Series:
 
     @property
     def slope(self) -> float:
-        """Slope of errors above TABULATION over rays, both logarithmic; -inf for too few errors."""
+        """Slope of log error over log rays, for errors above TABULATION; -inf for too few errors."""
         kept = [(r, e) for r, e in zip(self.rays, self.errors, strict=True) if e > TABULATION]
         if len(kept) < 3:
             return -math.inf
@@ -125,7 +125,10 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
 
 
 def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
-    """Return the fidelity of the cells of the reference's image, which are whole receptors with a perfect lens."""
+    """Return the fidelity with which the reference's image is rendered before it is convolved.
+
+    Each cell of this image is rendered as a receptor. With a perfect lens, cells are whole receptors.
+    """
     perfect = eyes.optics is None
     if light == "all":
         return sim.Fidelity(PERFECT_AREAS if perfect else CELL_AREAS, eyes.bands, light=light, samples="areas")
@@ -133,7 +136,7 @@ def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
 
 
 def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: sim.Fidelity) -> tuple[np.ndarray, float]:
-    """Return the signals of the eyes by rays or areas, and their number per receptor."""
+    """Return the signals of the eyes, and the number of rays or areas per receptor."""
     renderer = sim.BatchedRenderer(world, eyes, 1, fidelity)
     rays = len(renderer.sensor.directions) / math.prod(eyes.resolution)
     return np.concatenate([renderer.signals(state.take(np.array([i]))) for i in range(state.n)])[:, 0], rays

@@ -69,10 +69,10 @@ from validation.sim.speed_accuracy_points import Chart, Errors, Point, Setting, 
 
 BANDS = 8  # of the references: error 0.7 % of a signal, since their weights are exact
 SPP = {"perfect lens": 96**2, "lens": 64}  # of each half of a reference: per receptor, and per cell of its image
-TO_THE_END = {"perfect lens": 4096, "lens": 64}  # rays per receptor
+TO_THE_END = {"perfect lens": 4096, "lens": 64}  # rays per receptor of converged renderings
 FEW, MANY = 8, 64  # worlds rendered at once: few for many rays
 # States that agents reached, and states with an object ahead. Over 8 of the latter, the standard deviation of the error
-# from chance is 0.06 σ behind a # lens with a = 0.25, where the error of "auto" is closest to its bound.
+# from chance is 0.06 σ behind a lens with a = 0.25, where the error of "auto" is closest to its bound.
 STATES = {"perfect lens": (4, 8), "lens": (4, 24)}
 SLACK = 0.8  # smallest speed relative to the front's
 REFERENCE_ERROR = 0.15  # [σ] largest standard error of the reference
@@ -105,7 +105,11 @@ BEHIND_LENS = (
 
 @dataclass(frozen=True)
 class Population:
-    """Receptors over which errors are computed: a mask (env, eye, height, width) for the crowd's first states."""
+    """Receptors over which errors are computed.
+
+    crowd: states of all worlds.
+    counted: mask (env, eye, height, width) of the receptors over which errors are computed, in the first worlds.
+    """
 
     crowd: WorldState
     counted: np.ndarray
@@ -126,7 +130,7 @@ class Population:
 
 
 def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[Population]:
-    """Return all receptors in states that agents reached, and receptors that see an object in states with one ahead."""
+    """Return two populations: all receptors of agents after random actions, and receptors that see an object ahead."""
     crowd = lived_through(world, MANY)
     found = [Population(crowd, np.ones((states[0], scene.eyes.n_eyes, *scene.eyes.resolution), bool))]
     if world.objects:
@@ -149,9 +153,11 @@ def converged(
 
 @dataclass(frozen=True)
 class Runner:
-    """A setting that renders `count` worlds.
+    """A setting, and how to render with it.
 
-    fidelity: None for the reference.
+    fidelity: fidelity of the renderer; None for the reference.
+    count: number of worlds that are rendered at once.
+    signals: function that renders them.
     warning: warning of the automatic choice.
     """
 
@@ -224,7 +230,7 @@ def to_the_end(scene: Scene, world: sim.World, judged: Sequence[Population], lig
 
 
 def timed(runners: Sequence[Runner], crowd: WorldState, rounds: int) -> list[float]:
-    """Return the CPU seconds of the fastest call of each runner; short calls are repeated for ROUND in every round."""
+    """Return the CPU seconds of each runner's fastest call. Short calls are repeated for ROUND seconds a round."""
     quickest = [np.inf] * len(runners)
     for _ in range(rounds):
         for i, mine in enumerate(runners):

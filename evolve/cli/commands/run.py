@@ -68,7 +68,7 @@ def resume(arguments: Namespace) -> int:
 
 
 def _refuse_without_run(arguments: Namespace) -> None:
-    """Refuse options that apply to a run that starts, and have no effect on a plan."""
+    """Refuse options that have no effect with `--dry-run`, because no run starts."""
     for name in ("open", "tensorboard", "quiet", "scheduler"):
         if getattr(arguments, name):
             raise ConfigError(f"--{name}: must be left out with --dry-run, which prints the plan for this machine only")

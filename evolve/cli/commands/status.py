@@ -53,7 +53,7 @@ def _read(arguments: Namespace) -> dict[str, Any]:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print one line for each run in a directory, the latest last. For an unreadable run, it states the reason."""
+    """Print one line for each run in a directory, the latest last; for an unreadable run, the line gives the reason."""
     # os.path.exists returns False for an unreadable folder, which cannot be a run of this user. pathlib would raise.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
