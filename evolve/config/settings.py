@@ -34,7 +34,7 @@ class WorldConfig:
     unseen: bool = setting(
         False,
         None,
-        "evaluate in mazes that training does not use; they also decide selection and early stopping: not held out",
+        "evaluate in mazes that training does not use; no test set, since selection and early stopping use them, too",
     )
     course: str = setting("short", None, "navigation's course: short, or long (twice the length, half the actions)")
     evaluation_course: str = setting("short", None, "navigation's course in evaluation")

@@ -28,7 +28,7 @@ class EyeConfig:
     sensor_width: float = setting(
         200e-6, Interval(1e-6, 1e-2), "width of the retina [m], unless receptor_pitch determines it"
     )
-    noise_sigma: float = setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal]")
+    noise_sigma: float = setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal of white]")
     illuminance: float = setting(
         0.0, Interval(0, 1e6), "illuminance of the scene [lx], which determines shot noise; 0: no shot noise"
     )
@@ -106,7 +106,7 @@ class EyeConfig:
     )
     adaptation_ms: float = setting(1000.0, Interval(1, 1e7), "time constant of the mean that controls the gain [ms]")
     event_threshold: float = setting(
-        0.0, Interval(0, 100), "receptors count changes of the logarithm of their signal by this step; 0: no events"
+        0.0, Interval(0, 100), "change of the logarithm of a receptor's signal that counts as an event; 0: no events"
     )
     motion_detectors: str = setting(
         "none", None, "detectors between neighbours, as further channels: none, hassenstein_reichardt or barlow_levick"

@@ -9,7 +9,7 @@ not mean that the values agree. Its only purpose is to detect a change of the co
 **Method.** Land's sensitivity S is `optics.optical_sensitivity` in white light with k = 0.0067 per µm. Acceptance
 angles Δρ are full widths at half maximum of `optics.Ommatidium.sensitivity`, which is computed by wave optics with
 waveguide modes. All rhabdoms have the refractive index 1.363 in a medium of 1.340. Both indices were measured in flies.
-Acuity is that of a hexagonal lattice.
+Acuity is computed for a hexagonal lattice of receptors.
 
 **Sources.** The last column states which part of the source was read: the article, a table, an appendix, the caption of
 a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible, and that the
@@ -19,10 +19,10 @@ value comes from a later article or from our notes. "Closed form" means that it 
   diffraction. The computed angles are therefore larger, by 20 to 65 %. Angles measured by electrophysiology agree
   better with the computed ones: 2.6° on average in dark-adapted eyes, and less than 1.9° in the acute zone of
   light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017). A closed pupil removes the higher modes
-  (Stavenga 2004), so the light-adapted angle is computed from the first mode. The rhabdom of *Apis cerana* has a
-  waveguide parameter of V = 2.55 at 540 nm, just above the cut-off of the second mode at 2.405. Its angle is therefore
-  sensitive to the refractive indices. For *Apis dorsata*, the table's S differs by 9 % from the value that follows from
-  its other columns (D, f, Δρ and l).
+  of the rhabdom (Stavenga 2004), so the light-adapted angle is computed from the first mode. The rhabdom of *Apis
+  cerana* has a waveguide parameter of V = 2.55 at 540 nm, just above the cut-off of the second mode at 2.405. Its angle
+  is therefore sensitive to the refractive indices. For *Apis dorsata*, the table's S differs by 9 % from the value that
+  follows from its other columns (D, f, Δρ and l).
 - *Drosophila*: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1.
 - Blowfly: Stavenga, J. Exp. Biol. 207, 1703, 2004, caption of fig. 4. Dark-adapted angles approach d/f, and
   light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves between
