@@ -153,8 +153,7 @@ class Problem:
 
     @property
     def phase_band_inside(self) -> float:
-        """Highest spatial frequency [1/m] of the phase over the disk alone; a relief may be steeper in the soft edge.
-        """
+        """Highest spatial frequency [1/m] of the phase over the disk; a relief may be steeper in the soft edge."""
         return SLOPE_MARGIN * self.slopes.steepest_inside / self.light.wavelength + self.detail
 
     @cached_property

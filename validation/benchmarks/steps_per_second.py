@@ -4,11 +4,12 @@ How many steps per second do worlds and models reach, and what fraction of a ste
 detection reaches 11701 steps per CPU second and the humanoid 1107. Rendering takes 49 % to 71 % of the time of physics
 and rendering together.
 
-**Method.** The benchmark uses two built-in tasks and two of Gymnasium's models (ant, humanoid; MIT). Each agent has two
-eyes of 15 x 15 receptors and 60°, with 4 rays per receptor in direct light, 4 bands, and noise. Actions are random, and
-episodes restart when they end. Rates are steps per CPU second of one thread, as the median of a few rounds in one
-process. Each round measures physics and rules alone, rendering alone, and whole steps, one after the other. Other work
-on the machine therefore affects all three in the same way, and hardly changes their ratios.
+**Method.** The benchmark uses two built-in tasks and two models of Gymnasium (ant and humanoid, with the MIT licence).
+Each agent has two eyes of 15 x 15 receptors, which are 60° wide. Eyes have noise, and are rendered with 4 rays per
+receptor in direct light and 4 bands. Actions are random, and episodes restart when they end. Rates are steps per CPU
+second of one thread, as the median of a few rounds in one process. Each round measures physics with the rules of the
+task, rendering alone, and whole steps, one after the other. Other work on the machine therefore affects all three in
+the same way, and hardly changes their ratios.
 
 **Table.** "render" is the rate of rendering alone and "step" is the rate of whole steps. "share" is the fraction of the
 time of physics and rendering that is spent on rendering. "step/sum" is the time of a whole step relative to the sum of

@@ -13,14 +13,14 @@ evolutionary run, but no animal is stopped at a rung.
 **First table.** The table compares the order of the animals after each rung with their order after the last rung. Cells
 state Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over animals. In the column "32
 episodes", the fitness of both rungs comes from the 32 evaluation episodes that a run uses. In the column "128
-episodes", it comes from 128 episodes of the same policies in other worlds. The last line compares the two measures of
-fitness after the last rung.
+episodes", it comes from 128 episodes of the same policies in other worlds. The last line states the correlation between
+the two measures of fitness after the last rung.
 
 **Second table.** The table lists possible schedules of successive halving, applied to these animals as one generation.
-"CPU time" is relative to training all animals to the end. The last two columns state the final rank of the animal that
-the schedule selects as the best. The final rank is the rank after the last rung by the fitness in 128 episodes. The
-schedule decides which animals continue, from the fitness in 32 episodes (first of these columns) or in 128 episodes
-(second).
+"CPU time" is relative to training all animals to the end. "0.5 promoted" means that half of the animals continue to the
+next rung. The last two columns state the final rank of the animal that the schedule selects as the best. The final rank
+is the rank after the last rung by the fitness in 128 episodes. In the column "by 32 episodes", the schedule decides
+from the fitness in 32 episodes which animals continue, and in the last column from the fitness in 128 episodes.
 
 **Result.** Two rungs save a fifth of the time if half of the animals continue to the second rung. Schedules that select
 animals earlier save more time but may lose the best animal. Successive halving is off by default. Thirty-two episodes

@@ -12,8 +12,9 @@ of these tests fails, hangs or crashes.
 
 The first mutants are those in `validation/mutants/named_mutants.py`, which contain mistakes that no test had noticed at
 first. The others are drawn evenly from all places in the three packages where such a mistake can be made. Some mutants
-do not change results, but only the time of the computation or an invisible detail. The table lists them as "alike",
-with the reason, and does not count them as mistakes.
+do not change results, but only the time of the computation or an invisible detail. The table calls them "alike" and
+does not count them as mistakes. Below the table, each mutant that survived or is alike is listed with its file and
+line, the change, the original line of code, and the reason.
 
 **Bounds.** At least 90 % of the mutants that are mistakes are killed. Every mutant that survived or is alike has a
 stated reason.

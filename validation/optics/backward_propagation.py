@@ -12,7 +12,8 @@ Samples with a pitch of λ/4 represent such a wave along their diagonal. At larg
 With a negative distance, `optics.propagate` only reverses phases. It omits waves beyond f = 1/λ (evanescent waves), and
 `result.evanescent_power` reports their fraction of the input's power. Waves that have decayed cannot be recovered. The
 recovered field therefore lacks the evanescent part of the original, and its error equals the square root of the
-evanescent fraction. Forward propagation reports this fraction, so the error of the recovered field is known in advance.
+evanescent fraction. Forward propagation also reports the evanescent fraction, so the error of the recovered field is
+known in advance.
 
 **Tables.** Both tables use Gaussian spots exp(-r²/w²). The exact field of such a spot at the distance z is summed from
 its closed-form spectrum. In the first table w is 2 λ. This spot has almost no evanescent part, so the table shows only

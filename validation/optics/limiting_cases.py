@@ -1,7 +1,7 @@
 """Limiting cases: a known value or an error of one line
 
 Does every input at the edge of the domain give the right value or a clear error? Yes: all 12 inputs with a known result
-give this result within their tolerance, and all 26 invalid inputs are refused in one line.
+give this result within their tolerance, and all 26 invalid inputs are refused with an error of one line.
 
 **Method.** Each row of the table passes an input at the edge of the domain to `optics`, and has an expected outcome.
 For an accepted input, the correct result is known, mostly in closed form. The computed result must agree with it within
@@ -18,7 +18,7 @@ instead. The inputs are:
   light behind an aperture without a lens;
 - a window of one sample, compared with the closed form; a window far off the axis, compared with quadrature; and a
   source at grazing incidence, compared with a result in float64;
-- `optics.propagate` over a distance of 0, for an evanescent wave, and for a field of zeros.
+- `optics.propagate` over a distance of 0 and of 1e6 m, for an evanescent wave, and for a field of zeros.
 
 **Refused inputs.** These inputs raise an error:
 

@@ -12,22 +12,23 @@ waveguide modes. All rhabdoms have the refractive index 1.363 in a medium of 1.3
 Acuity is that of a hexagonal lattice.
 
 **Sources.** The last column states which part of the source was read: the article, a table, an appendix, the caption of
-a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible: the value comes
-from a later article, or from the proposal for this page. "Closed form" means that it comes from a formula.
+a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible, and that the
+value comes from a later article or from our notes. "Closed form" means that it comes from a formula.
 
 - Honeybees: Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1. The published Δρ is d/f, which ignores
   diffraction. The computed angles are therefore larger, by 20 to 65 %. Angles measured by electrophysiology agree
   better with the computed ones: 2.6° on average in dark-adapted eyes, and less than 1.9° in the acute zone of
   light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017). A closed pupil removes the higher modes
-  (Stavenga 2004), so the light-adapted angle is computed from the first mode. *Apis cerana* has V = 2.55 at 540 nm,
-  just above the cut-off of the second mode at 2.405. Its angle is therefore sensitive to the refractive indices. For
-  *Apis dorsata*, the table's S differs by 9 % from the value that follows from its other columns (D, f, Δρ and l).
+  (Stavenga 2004), so the light-adapted angle is computed from the first mode. The rhabdom of *Apis cerana* has a
+  waveguide parameter of V = 2.55 at 540 nm, just above the cut-off of the second mode at 2.405. Its angle is therefore
+  sensitive to the refractive indices. For *Apis dorsata*, the table's S differs by 9 % from the value that follows from
+  its other columns (D, f, Δρ and l).
 - *Drosophila*: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1.
 - Blowfly: Stavenga, J. Exp. Biol. 207, 1703, 2004, caption of fig. 4. Dark-adapted angles approach d/f, and
   light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves between
   these limits could not be read, so the column "published" contains the limits. The curves are for tapered rhabdomeres,
   whereas the model has straight ones.
-- *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The inputs are quoted.
+- *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The dimensions of the eye are quoted.
 - *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. According to geometrical optics, the
   acceptance angle of the receptor is 45°. The row shows by how much the PSF of the lens increases this angle.
 - Humans: Curcio et al., J. Comp. Neurol. 292, 497, 1990, abstract (199,000 cones per mm², 100,000 to 324,000 in

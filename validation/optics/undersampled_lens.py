@@ -15,9 +15,9 @@ In `optics.psf`, the user does not choose the sampling of the pupil: the functio
 phase, or uses a method that needs no grid. Its PSFs of the same pupils are accurate to the requested tolerance.
 
 **Table.** The table shows the energy inside the first dark ring of the Airy pattern, as a fraction of the light through
-the pupil. "textbook" is the angular spectrum method on the grid of the pupil samples, with band-limited interpolation
-of the field. "exact" is the Rayleigh-Sommerfeld integral. The rows with f = 0.4 mm show the f/2 lens and its grid ten
-times smaller, with 16 to 512 samples.
+the pupil. "pitch / needed" is the pitch divided by λ / (2 NA). "textbook" is the angular spectrum method on the grid of
+the pupil samples, with band-limited interpolation of the field. "exact" is the Rayleigh-Sommerfeld integral. The rows
+with f = 0.4 mm show the f/2 lens and its grid ten times smaller, with 16 to 512 samples.
 
     python -m validation.optics.undersampled_lens [--out DIR] [--docs DIR]
 """

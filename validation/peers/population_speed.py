@@ -7,20 +7,21 @@ The fastest peer, prysm with 32 samples, computes 2871 with a median error of 6.
 **Method.** The eyes resemble the eyes in an evolutionary search: pupil radii of 15 to 40 µm, a relief of 4 x 4 control
 points that is close to that of a lens, a retina at a distance of 240 µm, and green light. A PSF has 65 x 65 samples
 with a pitch of 0.25 µm. Each code computes PSFs on one thread. `psf_batch` is timed on the whole population, and the
-other codes are timed on 24 new eyes. The time includes the computation of the relief's heights and of all matrices that
-an eye needs. The error of a PSF is its relative L2 distance from our direct sum over nodes, which is accurate to 1e-5.
-The table states the median and the largest error over every fifth eye.
+other codes are timed on 24 eyes that they have not computed before. The time includes the computation of the relief's
+heights and of all matrices that an eye needs. The error of a PSF is its relative L2 distance from our direct sum over
+nodes, which is accurate to 1e-5. The table states the median and the largest error over every fifth eye.
 
 **Table.** `psf_batch` runs with five tolerances and `psf` with three. The peers run with 32 to 256 samples across the
 pupil. The second table is for the design of lenses. The pupils have a radius of 1 mm, a focal length of 10 mm, and a
-map of heights or Zernike modes. The table states CPU times of single PSFs, without and with the gradient with respect
-to all heights or coefficients. The last two columns state the time and the error of a matrix Fourier transform in
-NumPy. Unlike `optics`, it does not predict its error.
+map of heights or Zernike modes. A map of heights is smooth, plus random deviations with the stated standard deviation
+("noise"). The table states CPU times of single PSFs, without and with the gradient with respect to all heights or
+coefficients, and the predicted and the actual error of the PSF. The last two columns state the time and the error of a
+matrix Fourier transform in NumPy. Unlike `optics`, it does not predict its error.
 
 **Limits.** The other codes cannot share a plan between the eyes of a population. Unlike `optics.psf`, they also have no
 exact propagator whose output grid can be chosen freely. Their matrix Fourier transform from the pupil to the focal
-plane is used instead. It equals Fresnel's integral if the phase kr²/2z is added to the field in the pupil. The errors
-of these codes therefore come from the paraxial model, and from the hard or grey edge of the sampled pupil.
+plane is used instead. This transform equals Fresnel's integral if the phase kr²/2z is added to the field in the pupil.
+The errors of these codes therefore come from the paraxial model, and from the hard or grey edge of the sampled pupil.
 
     python -m validation.peers.population_speed [--eyes N] [--without-peers] [--out DIR] [--docs DIR]
 """

@@ -1,8 +1,8 @@
-"""Cost of the automatic choice of samples over resolution, field of view and number of eyes
+"""Cost of the automatic choice of samples for different resolutions, fields of view and numbers of eyes
 
 Are there eyes for which a slight change makes the automatic choice ("auto") use many more samples? No. In every setting
 it chooses area sampling, in which each sample is the mean light on a receptor or a part of it (an area). One to six
-areas per receptor are enough for a predicted error within the tolerance.
+areas per receptor are enough for a predicted error within the tolerance, which is half of the receptor noise.
 
 **Method.** `sim.choose_fidelity` chooses samples for eyes with perfect lenses in detection, a maze and navigation. One
 property changes at a time: the number of receptors across, the field of view, or the number of eyes. Detection has

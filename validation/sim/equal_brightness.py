@@ -7,7 +7,7 @@ signals from goal and adversary differ by at most 0.04 of the receptor noise, in
 30°, and an adversary has horizontal bands. Light comes from above. If all bands had the same width, adversaries would
 therefore be brighter or darker than goals, and one photoreceptor could distinguish them. To prevent this, the edges of
 the bands are fitted by least squares, so that an adversary is as bright as a uniformly grey sphere. The fit covers 24
-directions, and distances at which an eye of 45° sees (nearly) all of an object. It starts from edges that are 30°
+directions, and distances at which an eye of 45° sees (nearly) all of an object. The fit starts from edges that are 30°
 apart, and penalises deviations from them. The two lowest edges can hardly be seen and are not fitted.
 
 The light of one illuminated sphere is computed by tracing rays, without the renderer.
