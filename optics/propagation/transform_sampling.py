@@ -104,8 +104,8 @@ class TransformSampling:
 class KeptLight:
     """The light that can reach a window.
 
-    It is described by its band of frequencies and by the distance [m] along the longer axis from the far edge of one
-    plane to the far edge of the other.
+    band: its band of frequencies.
+    reach: distance [m] along the longer axis from the far edge of one plane to the far edge of the other.
     """
 
     band: Band
