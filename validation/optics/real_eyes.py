@@ -213,7 +213,7 @@ def limits() -> list[Row]:
 
 
 def geisler_photons() -> float:
-    """Return photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
+    """Return the photons of 1 cd/m² at 555 nm by a PhotonBudget, per second, mm² of pupil and square minute of arc.
 
     The photons of daylight near 555 nm are divided by the luminance of daylight in a band 1 nm wide.
     """
