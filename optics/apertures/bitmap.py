@@ -40,7 +40,7 @@ class Bitmap(ReadOnlyArrays):
             raise ValueError(f"image has shape {image.shape}: must be square (n, n), n from 1 to {MOST}")
         if not np.isin(image, (0, 1)).all():
             other = float(image[~np.isin(image, (0, 1))][0])
-            raise ValueError(f"image holds {other:g}: must be 0 or 1; amplitudes in between are a MaskMap")
+            raise ValueError(f"image holds {other:g}: must be 0 or 1; use a MaskMap for amplitudes in between")
         object.__setattr__(self, "image", image == 1)
         super().__post_init__()
         edges = len(self.outline.segments)

@@ -120,8 +120,8 @@ def read_exit_pupil(
     """Convert a lens from another program to a pupil with a wavefront.
 
     The pupil is a circle, an ellipse or, if a lens mount cuts off part of the light, a convex polygon. The light may
-    reach the image plane at an angle. The PSF is then the PSF on this plane: the pupil has the direction sines of the
-    rays along the plane, minus those of the ray through its centre.
+    reach the image plane at an angle. The PSF then refers to this plane. For this purpose, a position in the pupil is
+    given by the sines of its ray along the plane, minus those of the ray through the pupil's centre.
 
     system: an object of one of two kinds. The first has pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like
         optiland's WavefrontData with any distribution of rays. The second has data (complex), dx [mm] and wavelength

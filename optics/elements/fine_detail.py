@@ -33,7 +33,7 @@ def band_of(samples: np.ndarray, level: float) -> float:
 
 
 def power_beyond(samples: np.ndarray) -> np.ndarray:
-    """Return the samples' power spectrum, summed from each frequency upwards: mean squares, (longer side,).
+    """Return the power (mean square) of the samples' components from each frequency upwards, (longer side,).
 
     Entry k contains all components whose frequency along x or along y is at least k/4 cycles per half a side.
 

@@ -44,8 +44,8 @@ class SphericalIndex:
         """Interpolate a relative index, given as a function of r/R, at Chebyshev points in (r/R)².
 
         Raises:
-            ValueError: n r decreases where it is below 1, its value just outside the sphere. Light could then stay in
-                the sphere.
+            ValueError: n r decreases somewhere, at values below 1. Just outside the sphere it is 1, so light could stay
+                inside.
         """
         found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
         t = np.linspace(0, 1, 20 * TERMS)

@@ -114,7 +114,9 @@ def ideal_contrast_sensitivity(
     u, transferred = reals("cycles_per_degree", cycles_per_degree), reals("contrast", contrast)
     sizes = reals("area", area)
     if u.shape != transferred.shape or sizes.shape not in ((), u.shape):
-        raise ValueError(f"contrast has shape {transferred.shape} and area {sizes.shape}: must be those of frequencies")
+        raise ValueError(
+            f"contrast has shape {transferred.shape} and area {sizes.shape}: must be {u.shape}, as frequencies"
+        )
     for name, values, least in (("cycles_per_degree", u, 0.0), ("contrast", transferred, 0.0), ("area", sizes, 0.0)):
         in_range(name, float(values.min(initial=1.0)), least, math.inf)
     in_range("contrast", float(transferred.max(initial=0.0)), 0.0, 1.0)

@@ -63,8 +63,8 @@ def choose_bands(
             return chosen
         coarse = fine
     raise AccuracyError(
-        f"tolerance = {tolerance:g}: {CANDIDATES[-1]} bands leave a predicted error of {total:.1e} of white's "
-        "signal; increase the tolerance or specify a number of bands"
+        f"tolerance = {tolerance:g}: {CANDIDATES[-1]} bands leave a predicted error of {total:.1e} of the "
+        "signal of white; increase the tolerance or specify a number of bands"
     )
 
 

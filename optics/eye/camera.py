@@ -208,7 +208,7 @@ def _read(signals: np.ndarray | Array, sensor: Sensor, eye: Eye, rng: np.random.
         import drjit as dr
 
         if sensor.bits is not None:
-            raise ValueError(f"bits = {sensor.bits} and the pupil carries derivatives: must be None, steps have none")
+            raise ValueError(f"bits = {sensor.bits} and the pupil carries derivatives: must be None, for derivatives")
         tensor: Any = type(signals)
         return dr.clip(signals * tensor(per_signal + 0 * mean) + tensor(noise), 0, sensor.full_well) + tensor(read)
     electrons = np.minimum(mean + noise, sensor.full_well) + read

@@ -106,7 +106,7 @@ class NodeChoice:
         share = "" if most is None else f", of which {self.stage} may use {most:.2g}"
         nodes_leave = f"{' x '.join(map(str, self.candidates[-1]))} {self.stage} nodes leave"
         raise NodeError(
-            f"tolerance = {tolerance:g}{share}: {nodes_leave} {error:.1e} of white's signal; "
+            f"tolerance = {tolerance:g}{share}: {nodes_leave} {error:.1e} of the signal of white as an error; "
             "increase the tolerance or specify a number of nodes"
         )
 

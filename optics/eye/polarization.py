@@ -48,7 +48,7 @@ def microvilli_of(given: Any) -> Tile | None:
     plain = all(isinstance(cell, Microvilli) for row in tile for cell in row)
     if not tile or not plain or len({len(row) for row in tile}) != 1 or not tile[0]:
         raise ValueError(
-            f"microvilli = {shown(given)}: must be Microvilli(azimuth_deg), or rows of them, all as long, or None"
+            f"microvilli = {shown(given)}: must be Microvilli(azimuth_deg), or rows of them, equally long, or None"
         )
     return tile
 
@@ -71,8 +71,8 @@ def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
         sine = pupil.radius / math.hypot(pupil.radius, distance)
         raise AccuracyError(
             f"microvilli behind a pupil of NA {sine:.2g}: steep rays change polarised signals by up to {error:.2g} of "
-            f"white's; tolerance = {tolerance:g} allows NA {sine * math.sqrt(tolerance / error):.2g}: raise it, narrow "
-            "the pupil, or see Microvilli.signal(vector_focus(...))"
+            f"the signal of white; tolerance = {tolerance:g} allows NA {sine * math.sqrt(tolerance / error):.2g}: "
+            "increase it, narrow the pupil, or see Microvilli.signal(vector_focus(...))"
         )
 
 

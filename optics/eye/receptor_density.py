@@ -145,7 +145,7 @@ def density_on(
     right, up = np.meshgrid(np.degrees(np.arctan(across)), -np.degrees(np.arctan(down)))
     found = reals("density(right_deg, up_deg)", density(right, up))
     if found.shape != right.shape:
-        raise ValueError(f"density(right_deg, up_deg) has shape {found.shape}: must be that of its angles")
+        raise ValueError(f"density(right_deg, up_deg) has shape {found.shape}: must be that of the angles")
     return _checked("density(right_deg, up_deg)", found)
 
 

@@ -33,7 +33,8 @@ MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of a 
 class WindowStack:
     """Light of several sources and wavelengths through a pupil to a window at one distance.
 
-    The numbers of the pupil except its radius, of the sources, and the distance may carry derivatives of PyTorch.
+    The distance, the numbers of the sources and those of the pupil, except its radius, may carry derivatives of
+    PyTorch.
 
     wavelengths: wavelengths [m] in vacuum.
     distance: distance [m] of the window behind the pupil.

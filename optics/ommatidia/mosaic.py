@@ -93,7 +93,7 @@ class AppositionEye:
         for own in np.array_split(self.directions, -(-len(self.directions) * len(x) // MOST)):
             scene = reals("radiance", radiance(own[:, :1] + x, own[:, 1:] + y))
             if scene.shape != (len(own), len(x)) or not np.isfinite(scene).all():
-                raise ValueError(f"radiance gives shape {scene.shape}: must be finite, of its angles' shape")
+                raise ValueError(f"radiance gives shape {scene.shape}: must be finite, of the shape of the angles")
             found.append(scene @ weights)
         return np.concatenate(found)
 

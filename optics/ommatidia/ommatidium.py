@@ -82,7 +82,7 @@ class Ommatidium:
         try:
             x, y = np.broadcast_arrays(x, y)
         except ValueError:
-            raise ValueError(f"angle_x has shape {x.shape} and angle_y {y.shape}: must be alike") from None
+            raise ValueError(f"angle_x has shape {x.shape} and angle_y {y.shape}: must be equal") from None
         for name, value in (("angle_x", x), ("angle_y", y)):
             in_range(f"abs({name})", float(np.abs(value).max(initial=0.0)), 0.0, math.asin(STEEPEST[-1]))
         tx, ty = np.tan(x), np.tan(y)

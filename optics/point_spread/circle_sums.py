@@ -34,7 +34,7 @@ PART = 0.1  # choice: error of interpolation and quadrature, in units of the ker
 class SoftCircles:
     """The sums Σ_j v_j w(ρ_j, R) over samples v for every radius R, as a product of matrices.
 
-    w is the weight of a sample at the distance ρ_j from the centre, which is defined at the top of the module.
+    The top of the module defines w, the weight of a sample at the distance ρ_j from the centre.
 
     near: indices of the samples that contribute to any circle.
     samples: interpolation between these samples and evenly spaced distances (sample, distance), sparse.

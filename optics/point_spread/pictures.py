@@ -231,6 +231,6 @@ def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) ->
         raise AccuracyError(
             f"tolerance = {problem.tolerance:g}: the window is so dark that {problem.dtype} rounding reaches "
             f"{above(error, problem.tolerance)}"
-            + ("; dtype='float64' has a 1e6 times lower floor" if problem.dtype == "float32" else "")
+            + ("; dtype='float64' rounds 1e6 times more finely" if problem.dtype == "float32" else "")
         )
     return error + sampling.model_error

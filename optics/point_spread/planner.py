@@ -214,7 +214,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
         for name, option in weighed.items()
     ]
     why = (
-        f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
+        f"Fresnel number {problem.fresnel_number:.3g}, largest sine of the included light "
         f"{problem.band() * problem.wavelength:.2g}; "
         + ("cheapest method that meets the tolerance" if auto else "requested")
         + _why_for_derivatives(problem, best)

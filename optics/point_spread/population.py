@@ -91,7 +91,7 @@ def _plan(member: Member, samples: _Samples, window: Grid, error: float, leaving
     shape = samples.at.size, samples.at.size
     sine = steepest_sine(member.pupil.radius, number(member.distance), leaving)
     scalar = scalar_theory_error(sine, light_spread(member.pupil))
-    why = "one of a population: rank 1, not spot-checked"
+    why = "shared plan of a population: rank 1, no spot check"
     return Plan("low_rank", shape, "float32", error, why, population_seconds(shape[0], window), scalar_error=scalar)
 
 

@@ -92,7 +92,7 @@ def _check_rays(beam: Beam) -> None:
     steepest = beam.pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.index
     if steepest > STEEPEST:
         raise AccuracyError(
-            f"rays leave the pupil under a sine of {steepest:.3g}: must be at most {STEEPEST:g}, "
+            f"rays leave the pupil with a sine of {steepest:.3g}: must be at most {STEEPEST:g}, "
             "beyond which light has no direction"
         )
 
@@ -127,7 +127,7 @@ def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float
     polarised = float(np.linalg.norm(real[1:])) if known else 0.0
     if not known or given.shape == (2,) or given.imag.any() or real[0] <= 0 or polarised > real[0] * (1 + ROUNDING):
         raise ValueError(
-            f"polarization = {shown(polarization)}: must be a Jones vector (x, y), not (0, 0), or Stokes' parameters "
+            f"polarization = {shown(polarization)}: must be a Jones vector (x, y), not (0, 0), or Stokes parameters "
             "(S0, S1, S2, S3), with S0 positive and not below the norm of the others"
         )
     _, s1, s2, s3 = (float(part) for part in real / real[0])

@@ -27,7 +27,7 @@ PER_PSF, PER_ENTRY, PER_SAMPLE = 5e-5, 2e-8, 1.7e-7
 
 
 def window_seconds(problem: Problem) -> float:
-    """Return the time of evaluating the PSF, copying it to NumPy, and selecting the points of the spot check [s]."""
+    """Return the time [s] to evaluate the PSF, copy it to NumPy, and select the points of the spot check."""
     check = CHECK_SYMMETRIC_SAMPLE if problem.symmetric else CHECK_SAMPLE
     each = OUTPUT_SAMPLE[problem.dtype] + (0.0 if problem.reach is not None else check)
     return math.prod(problem.window.shape) * each
@@ -55,7 +55,7 @@ def population_seconds(across: int, window: Grid) -> float:
 
 
 def window_bytes(problem: Problem) -> float:
-    """Return the memory of all arrays of the size of the window, at their peak [bytes]."""
+    """Return the peak memory [bytes] of all arrays that are as large as the window."""
     each = OUTPUT_ARRAYS * ITEM_BYTES[problem.dtype] + (0.0 if problem.reach is not None else CHECK_BYTES)
     return math.prod(problem.window.shape) * each
 

@@ -28,7 +28,7 @@ NEAR_ZERO = 2.0
 class ErrorCauses(ReadOnlyArrays):
     """Parts of the error of contrasts, relative to all light that arrives, (wavelength,).
 
-    lost: light outside the window, at most.
+    lost: upper bound on the light outside the window.
     light: uncertainty of the light that arrives.
     rest: error of the PSF inside the window.
     """

@@ -106,7 +106,7 @@ def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxia
 
     It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. The
     displacement along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression. The blur is
-    therefore larger than that of a fade in fx alone, by the gradient of the expression.
+    therefore larger than that of a fade in fx alone, by the factor of the expression's gradient.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 

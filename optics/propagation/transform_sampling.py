@@ -104,8 +104,8 @@ class TransformSampling:
 class KeptLight:
     """The light that can reach a window.
 
-    It is described by its band of frequencies and by the distance [m] along the longer axis from the far edge of one
-    plane to the far edge of the other.
+    band: its band of frequencies.
+    reach: distance [m] along the longer axis from the far edge of one plane to the far edge of the other.
     """
 
     band: Band
@@ -183,8 +183,8 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
     """Return the largest displacement [m] along an axis of light with frequencies up to f_N along each axis.
 
     Light moves in the direction of (fx, fy), so the displacement along x is z tan θ fx/|f|. It is largest for fx = f_N
-    and the largest tan θ, which is that of the corner |f| = √2 f_N or of PERIOD_MAX_SINE. In the paraxial case it is zλ
-    fx for every fy.
+    and the largest tan θ. The latter belongs to the corner |f| = √2 f_N, or to PERIOD_MAX_SINE if this is smaller. In
+    the paraxial case it is zλ fx for every fy.
     """
     if paraxial:
         return walk(nyquist, wavelength, z, paraxial)

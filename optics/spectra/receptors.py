@@ -129,7 +129,7 @@ def _mosaic(mosaic: Any, types: int) -> tuple[tuple[int, ...], ...]:
     except (TypeError, ValueError, OverflowError):
         whole = False
     if not whole or tile.min() < 0 or tile.max() >= types:
-        raise ValueError(f"mosaic: must be rows, all as long, of indices of types from 0 to {types - 1}")
+        raise ValueError(f"mosaic: must be rows, equally long, of indices of types from 0 to {types - 1}")
     return tuple(tuple(int(kind) for kind in row) for row in tile)
 
 

@@ -138,7 +138,7 @@ def test_a_scene_that_is_no_function(odd):
 
 
 def test_angles_of_different_shapes():
-    with pytest.raises(ValueError, match=r"angle_x has shape \(2,\) and angle_y \(3,\): must be alike"):
+    with pytest.raises(ValueError, match=r"angle_x has shape \(2,\) and angle_y \(3,\): must be equal"):
         facets().ommatidium.mode_power(np.zeros(2), np.zeros(3))
 
 

@@ -202,7 +202,7 @@ def _of_ranks(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Halving:
-    """Successive halving of the stored animals as one generation.
+    """Result of successive halving, with all stored animals as one generation.
 
     cost: CPU time relative to full training of all animals.
     place: final rank of the selected animal, by its fitness in MANY episodes after full training; 1 is the best.

@@ -115,8 +115,8 @@ def _hills(rng: np.random.Generator) -> np.ndarray:
 def _window(rng: np.random.Generator, radius: float, distance: float, focused: bool) -> dict[str, Any]:
     """Return a window of random width, at most 50° off the axis.
 
-    Half its width is a part of the pupil's shadow or a few Airy radii, whichever is larger, or follows from a number of
-    samples with a coarse pitch.
+    Half its width is a part of the pupil's shadow or a few Airy radii, whichever is larger. Instead, the width of some
+    windows follows from a number of samples with a coarse pitch.
     """
     shadow = radius * rng.uniform(0.3, 1.5) * (0.1 if focused else 1.0)
     rings = rng.uniform(3, 12) * WAVELENGTH * distance / (2 * radius)

@@ -213,17 +213,14 @@ def limits() -> list[Row]:
 
 
 def geisler_photons() -> float:
-    """Return photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
-
-    The photons of daylight near 555 nm are divided by the luminance of daylight in a band 1 nm wide.
-    """
+    """Return the photons of 1 cd/m² at 555 nm by a PhotonBudget, per second, mm² of pupil and square minute of arc."""
     narrow = optics.Receptors((optics.Spectrum((554.0, 555.0, 556.0), (0.0, 1.0, 0.0)),), range_nm=(550.0, 560.0))
     budget = optics.PhotonBudget(math.pi, integration_time=1.0, quantum_efficiency=1.0)
     photons = budget.photons(optics.SpectralBands.uniform(1, narrow), 1e-6 * MINUTE**2)[0]
     lumens_per_watt = 683.0
     luminance = (
         budget.spectral_irradiance / math.pi * float(daylight(np.array(555e-9))) * lumens_per_watt * 1e-9
-    )  # of a band 1 nm wide
+    )  # luminance of daylight in a band 1 nm wide, as wide as the band of the photons
     return float(photons / luminance)
 
 

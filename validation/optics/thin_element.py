@@ -108,7 +108,7 @@ def _lens(aperture: float, focal_length: float = FOCAL_LENGTH) -> RealLens:
 
 
 def limits() -> dict[str, float]:
-    """Return the limits of the mask: slopes with given errors of the deviation, and onsets of omitted effects."""
+    """Return limits of the mask: slopes with given errors of its deviation, and depths from which it omits effects."""
 
     def off(angle: float, by: float) -> float:
         return 1 - thin_deviation(angle, N) / deviation_glass_first(angle, N) - by

@@ -91,7 +91,7 @@ def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -
 def own_best(peers: Iterable[Point]) -> list[Point]:
     """Return the point of the smallest error of each peer, among methods that solve the same problem.
 
-    Paraxial methods are excluded, because they are most accurate with a handful of samples by chance.
+    Paraxial methods are excluded, because by chance they are most accurate with a handful of samples.
     """
     found: dict[str, Point] = {}
     for point in peers:

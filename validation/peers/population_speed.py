@@ -133,9 +133,9 @@ def timed(code: str, asked: str, population: list[optics.Pupil], known: dict[int
 def pupil_field(pupil: optics.Pupil, n: int, parts: int = 1) -> tuple[np.ndarray, float]:
     """Return samples (n, n) of the pupil's field with Fresnel's phase kr²/2z, and their pitch [m].
 
-    Transforms to a focus lack this phase. For even n, the axis is at n//2.
+    The phase must be added, because transforms to a focus omit it. For even n, the axis is at n//2.
 
-    parts: subsamples of a cell at the edge along an axis.
+    parts: number of subsamples, along each axis, of a cell that the edge cuts.
     """
     pitch = 2 * pupil.radius / (n - 1)
     at = (np.arange(n) - n // 2) * pitch

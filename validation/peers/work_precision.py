@@ -65,7 +65,7 @@ def table(points: Sequence[Point]) -> str:
 
 
 def curves(ours: Sequence[Point], peers: Sequence[Point]) -> list[Curve]:
-    """Return the Pareto front of each code; for this package one per dtype, with all methods as dots."""
+    """Return the Pareto front of each code; for this package, a front for each dtype, and all methods as dots."""
     found = []
     for peer in sorted({point.peer for point in peers}):
         kept = front((point.seconds, point.error) for point in peers if point.peer == peer)

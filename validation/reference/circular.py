@@ -61,8 +61,8 @@ def circular_aperture_on_axis(radius: float, distance: float, wavelength: float)
 def converging_wave_at_focus(radius: float, distance: float, wavelength: float) -> complex:
     """Return the exact field at the focus of exp(-ik(L(ρ) - z)), L = √(ρ² + z²), behind a circular aperture:
 
-    ∫ z/(2πL²) (1/L - ik) 2πρ dρ with ρ dρ = L dL is 1 - z/L - ikz ln(L/z), where L belongs to the edge
-    (first Rayleigh-Sommerfeld integral, Goodman §3.5; Airy's peak is its limit |kR²/2z|² for R << z).
+    1 - z/L - ikz ln(L/z), where L belongs to the edge. It is the first Rayleigh-Sommerfeld integral ∫ z/(2πL²) (1/L -
+    ik) 2πρ dρ (Goodman §3.5), with ρ dρ = L dL. For R << z, its squared modulus is that of Airy's peak, |kR²/2z|².
     """
     tangent2 = (radius / distance) ** 2
     secant = np.sqrt(1 + tangent2)

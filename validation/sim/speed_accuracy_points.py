@@ -105,7 +105,7 @@ class Chart:
     """All points of a scene, with errors in σ.
 
     reference_error: standard error of the reference.
-    left: difference between converged light of each kind and the reference.
+    left: remaining difference from the reference, by kind of light, with very many samples.
     """
 
     scene: str

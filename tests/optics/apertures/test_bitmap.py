@@ -88,7 +88,7 @@ def test_the_image_is_copied_and_read_only():
     [
         (np.ones((3, 4)), r"image has shape \(3, 4\): must be square \(n, n\), n from 1 to 512"),
         (np.ones((513, 513)), "must be square"),
-        ([[0.5]], "image holds 0.5: must be 0 or 1; amplitudes in between are a MaskMap"),
+        ([[0.5]], "image holds 0.5: must be 0 or 1; use a MaskMap for amplitudes in between"),
         ([[255]], "image holds 255: must be 0 or 1"),
         ([[np.nan]], "image holds nan: must be 0 or 1"),
         (np.indices((100, 100)).sum(axis=0) % 2, "straight edges: must be at most 4000; draw it more coarsely"),

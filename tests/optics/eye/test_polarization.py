@@ -216,7 +216,7 @@ CELLS = Microvilli(0.0)
     ("make", "message"),
     [
         (lambda: replace(PERFECT, microvilli=3.0), "microvilli = 3.0: must be Microvilli"),
-        (lambda: replace(PERFECT, microvilli=[[CELLS], [CELLS, CELLS]]), "rows of them, all as long"),
+        (lambda: replace(PERFECT, microvilli=[[CELLS], [CELLS, CELLS]]), "rows of them, equally long"),
         (lambda: replace(PERFECT, microvilli=[]), "microvilli = "),
         (lambda: replace(PERFECT, microvilli=[[CELLS, None]]), "microvilli = "),
         (lambda: PERFECT.see(WHITE, 2, polarization=(1.0, 0.0)), "this eye has no microvilli"),
@@ -227,7 +227,7 @@ CELLS = Microvilli(0.0)
         (lambda: seen((1.0, 1j)), "angle: must be real numbers"),
         (
             lambda: Eye(optics.Pupil(100e-6, thin_lens_focal_length=241e-6), microvilli=CELLS),
-            "NA 0.38: .* up to 0.091 of white's; tolerance = 0.01 allows NA 0.13",
+            "NA 0.38: .* up to 0.091 of the signal of white; tolerance = 0.01 allows NA 0.13",
         ),
     ],
 )

@@ -217,7 +217,7 @@ def test_eyes_with_a_map_can_be_compared_and_pickled():
         (lambda: Eye(density=np.zeros((2, 2))), "density is 0 at its smallest: must be greater than 0"),
         (lambda: Eye(density=np.full((2, 2), np.nan)), "density holds NaN"),
         (lambda: Eye(density=lambda right, up: right), r"density\(right_deg, up_deg\) is -2.* at its smallest"),
-        (lambda: Eye(density=lambda right, up: 1.0), r"has shape \(\): must be that of its angles"),
+        (lambda: Eye(density=lambda right, up: 1.0), r"has shape \(\): must be that of the angles"),
         (lambda: Eye(density=1 + 1e9 * np.eye(1, 500)), "density makes the narrowest receptor"),
         (lambda: Eye(density=even_lattice((2, 2))), r"density is a lattice of \(2, 2\) receptors: must be of \(15, 15"),
         (lambda: Eye(LENS, density=Fovea(), waveguide=optics.Waveguide(2e-6)), "density and waveguide are given"),
