@@ -99,7 +99,9 @@ class WorldConfig:
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return the height of the walls, the medium, and this set of layouts (None without a family)."""
+        """Return the arguments of `sim.build_world` for the walls' height, the medium, and the set `name` of
+        layouts.
+        """
         layouts = None
         if self.layouts == FAMILY:
             from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need

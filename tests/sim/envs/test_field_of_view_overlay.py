@@ -25,7 +25,9 @@ def ray(row, column):
 
 
 def points():
-    """Return depth and position at the eyes' height for each pixel that shows this plane."""
+    """Return depth and position of the points at the eyes' height, for each pixel that shows the plane at this
+    height.
+    """
     found = {}
     for row in range(SIZE[0]):
         for column in range(SIZE[1]):
