@@ -99,9 +99,7 @@ class WorldConfig:
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return the arguments of `sim.build_world` for the walls' height, the medium, and the set `name` of
-        layouts.
-        """
+        """Return height of walls, medium, and the set `name` of layouts, as arguments of `sim.build_world`."""
         layouts = None
         if self.layouts == FAMILY:
             from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need

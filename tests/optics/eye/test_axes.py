@@ -99,7 +99,9 @@ def test_odd_modes_of_an_aberrometer(seed):
 
 def test_the_upper_half_of_a_myopic_pupil_blurs_upwards():
     """The half that an observer sees on top is open. Its rays cross the axis in front of the retina, hit it below the
-    axis, and appear above. The shift is 2 receptors upwards; with y down it was 2 receptors downwards."""
+    axis, and appear above. The image is shifted upwards by 2 receptors. If y pointed down, it would be shifted
+    downwards.
+    """
     upper = optics.difference(optics.Circle(), optics.Oblong(2.0, 1.0, (0.0, -0.5)))
     kernel = kernel_of(optics.Pupil(**LENS, aperture=upper, wavefront=optics.Zernike({(2, 0): 1.8})))
     middle = len(kernel) // 2
