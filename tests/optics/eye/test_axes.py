@@ -193,7 +193,7 @@ def test_a_source_angle_is_a_direction_of_travel_in_these_axes():
 
 
 def test_signals_are_convolutions_with_the_traced_kernel():
-    """A point of light and the upper half of a myopic pupil, to the end: the receptors above it respond."""
+    """A point of light is seen through the upper half of a myopic pupil, and the receptors above its image respond."""
     upper = optics.difference(optics.Circle(), optics.Oblong(2.0, 1.0, (0.0, -0.5)))
     pupil = optics.Pupil(**LENS, aperture=upper, wavefront=optics.Zernike({(2, 0): 1.5}))
     eye = optics.Eye(pupil, (RECEPTORS, RECEPTORS), 60.0, bands=1, receptors=(550,))
