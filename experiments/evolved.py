@@ -110,7 +110,7 @@ class Store:
 
 def conduct_table(store: Store) -> str:
     """Return a table of the conditions of the runs, with a row per run."""
-    header = ["run", "candidates", "generations", "worker hours", "rhabdom at"]
+    header = ["run", "candidates", "generations", "worker hours", "commits of rhabdom"]
     lines = [
         [
             *(f"{one.group}, seed {one.seed}", str(one.candidates), f"{one.generations} of {one.planned}"),
@@ -135,7 +135,8 @@ def null_table(store: Store, quantities: Quantities, phase: int | None = None) -
         if len(runs) > 1:
             lines.append([f"{group}, {len(runs)} seeds together", *_ps(store, runs, quantities, names)])
     searches = max((len(one.ends.split()) for one in store.drift), default=0)
-    return markdown_table([f"p under the null model (two-sided, at least {2 / (searches + 1):.2g})", *names], lines)
+    label = f"two-sided p under the null model ({2 / (searches + 1):.2g} is the smallest possible)"
+    return markdown_table([label, *names], lines)
 
 
 def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: Sequence[str]) -> list[str]:

@@ -167,7 +167,7 @@ def page(contents: Contents) -> Page:
             "formula": f"{land.low:.1f} + {land.high:.0f} exp(-({land.aperture:.2f}/a)^{land.light:.1f})"
             f" exp(-(b/{land.width:.2f})^{land.fall:.1f})",
             "lives": str(len(contents.lives)),
-            "spread": f"{SPREAD[0]:g} + {SPREAD[1]:g}",
+            "spread": f"{SPREAD[0]:g} plus {SPREAD[1]:g}",
             "misfit": f"{land.misfit:.2f}",
             "last": str(LAST),
             "check": f"{check.correlation:.2f} over {check.lived.size} animals",

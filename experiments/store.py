@@ -108,7 +108,7 @@ class Origin:
         took = f"{self.hours / (least or 1 / 3600):.2g} {self.whose} {unit}"
         commits = ", ".join(_short(commit) for commit in (*self.earlier, self.versions["commit"]))
         python = self.versions["python"]
-        software = ", ".join(filter(None, (f"rhabdom at {commits}", f"Python {python}", packages)))
+        software = ", ".join(filter(None, (f"rhabdom at commit {commits}", f"Python {python}", packages)))
         return f"{took} on {self.machine}; {software}."
 
 

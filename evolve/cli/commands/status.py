@@ -61,7 +61,7 @@ def listing(arguments: Namespace) -> int:
         say(json.dumps(found, indent=1, allow_nan=False, default=vars))
         return 0
     if not found:
-        say(f"{arguments.directory}: holds no runs")
+        say(f"{arguments.directory}: contains no runs")
     width = max((len(one["directory"]) for one in found), default=0)
     for one in found:
         say(f"{one['directory']:<{width}}  {_in_one_line(one)}")
@@ -159,7 +159,7 @@ def standing_lines(now: dict[str, Any]) -> list[str]:
         f"{count['evaluated']} of {count['planned']} candidates evaluated{failed}, {now['steps']:,} steps trained",
     ]
     if unchecked := now["lines_without_checksum"]:
-        lines.append(f"checksums: none in the first {unchecked} lines of the record, which a former version wrote")
+        lines.append(f"checksums: the first {unchecked} lines of the record have none (written by a former version)")
     if now["last_failure"]:
         lines.append(f"last failure: {now['last_failure']}")
     lines += episode_failure_lines(now["mishaps"])
