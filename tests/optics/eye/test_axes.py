@@ -73,7 +73,9 @@ def check(kernel, rays):
 
 
 def lead_of(modes):
-    """Zernike polynomials in Cartesian form, of the OSA's table; W in metres, coefficients in µm."""
+    """Return the lead (x, y) -> W [m] as a sum of Zernike polynomials of the OSA; modes: coefficients [µm] by (n,
+    m).
+    """
     table = {
         (1, -1): lambda x, y: 2 * y,
         (1, 1): lambda x, y: 2 * x,
