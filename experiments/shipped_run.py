@@ -1,4 +1,4 @@
-"""Make the run that `evolve demo` shows from a finished run of the quick preset:
+"""Make the shipped run, which `evolve demo` shows, from a finished run of the quick preset:
 
     evolve run detection --preset quick --seed N --out runs/shipped
     python -m experiments.shipped_run runs/shipped

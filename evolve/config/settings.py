@@ -99,7 +99,7 @@ class WorldConfig:
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return the height of the walls, the medium, and this set of layouts (None without a family)."""
+        """Return height of walls, medium, and the set `name` of layouts, as arguments of `sim.build_world`."""
         layouts = None
         if self.layouts == FAMILY:
             from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need

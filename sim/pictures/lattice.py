@@ -50,7 +50,7 @@ class Lattice:
     def between(self, differ: np.ndarray) -> np.ndarray:
         """Return the indices of pixels outside the lattice that may lie on an edge.
 
-        Such a pixel's nearest lattice pixel differs in colour from one of its neighbours in the lattice.
+        The pixel of the lattice nearest to such a pixel differs in colour from a neighbouring pixel of the lattice.
 
         differ: True for the pairs of neighbours whose colours differ, (m,)
         """

@@ -242,7 +242,7 @@ class EyeRenderer:
     # --- kernels
 
     def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
-        """Launch on these worlds the kernels that compute the receptors' sums, or another frozen kernel."""
+        """Launch the kernels for the receptors' sums in these worlds, or the kernel `frozen` if it is given."""
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 

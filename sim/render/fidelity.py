@@ -95,7 +95,7 @@ class Fidelity:
 
     @property
     def why(self) -> str:
-        """The reasons, one line per stage."""
+        """Reasons for the chosen levels, one line per stage."""
         return "\n".join(f"{level.stage}: {level.why}" for level in self.levels) or "as requested"
 
     def __str__(self) -> str:

@@ -60,7 +60,7 @@ class FidelityTrials:
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Return a function that maps rays per receptor to the root mean square error of signals.
 
-        It is the larger of the two populations' errors.
+        The error is computed for both populations of receptors (`sim.render.populations`), and the larger one counts.
 
         Raises:
             NoRaysError: raised by the returned function if a receptor has no rays.

@@ -181,7 +181,7 @@ def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
 
 
 def _wrapped(model: mujoco.MjModel, geom: int, triangles: Triangles, size: np.ndarray) -> Triangles:
-    """Return triangles with a cube texture."""
+    """Return the triangles with texture coordinates in the image of the geom's cube texture."""
     texture = surfaces.texture_id(model, geom)
     uniform = bool(model.mat_texuniform[model.geom_matid[geom]])
     towards = cube.directions(triangles.vertices, surfaces.geom_type(model, geom), size, uniform)

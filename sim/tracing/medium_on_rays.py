@@ -59,6 +59,9 @@ class MediumOnRays:
     def reflected_contrasts(
         self, reflectance: Sequence[Array], light: Sequence[Array], distances: Sequence[Array]
     ) -> tuple[list[Array], list[Array]]:
-        """Return the contrasts of a surface that reflects this light, and factors of 1 in place of its reflectances."""
+        """Return the contrasts of a surface that reflects this light, and 1 for each component.
+
+        The contrasts already include the reflectances, which callers replace by these factors of 1.
+        """
         sent = [r * e for r, e in zip(reflectance, light, strict=True)]
         return self.contrasts(sent, distances), [mi.Float(1)] * len(sent)

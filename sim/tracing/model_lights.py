@@ -96,7 +96,7 @@ class Lights:
         return len(self.found)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return positions and directions of lights, (world, light, 4 ROWS) float32; unused for headlights."""
+        """Return positions and directions of lights, (world, light, 4 ROWS) float32; rows of headlights are unused."""
         rows = np.zeros((poses.n, len(self), ROWS, 4), np.float32)
         for k, light in enumerate(self.found):
             if light.light >= 0:

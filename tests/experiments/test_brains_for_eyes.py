@@ -78,8 +78,9 @@ def test_the_brain_that_fine_eyes_need(least, found):
 
 
 def test_a_brain_whose_coarsest_eyes_fail_by_themselves_gains_nothing():
-    """The error falls from 0.99 to 0.48 with 4 units, but other brains miss 0.7 with the coarsest eyes, and 0.48 is
-    more than half of that."""
+    """The error falls from 0.99 to 0.48 with 4 units. This is more than half of 0.7, the error of other brains with the
+    coarsest eyes.
+    """
     lives = of_law(lambda acuity, units: (0.99 - 0.51 * (acuity > 0.2)) if units == 4 else 0.7 - 0.6 * (acuity > 0.2))
     assert needed(lives) == 16
 

@@ -103,8 +103,9 @@ def test_mean_is_over_the_last_generations_that_succeeded():
 
 
 def test_seeds_that_differ_make_the_interval_wide():
-    """Two seeds with different means and no spread within each: Student's factor for one degree of freedom is 12.7, and
-    candidates are not counted as independent."""
+    """Two seeds have different means, and no spread within each. The interval has Student's factor for one degree of
+    freedom, 12.7, because candidates of a seed do not count as independent.
+    """
     rows = [replace(ROW, seed=seed, index=i, fitness=1.0 + 2 * seed) for seed in (0, 1) for i in range(50)]
     found = last_mean(rows, lambda row: row.fitness)
     assert found.mean == 2.0

@@ -19,8 +19,9 @@ def test_exact_powers_are_found():
 
 @pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
-    """Theory gives 95 of 100 laws of 40 candidates; a bootstrap of pairs is slightly too narrow. The limit is 3.3
-    standard deviations of a count below 93."""
+    """The intervals of 95 of 100 laws with 40 candidates should contain the true exponent. A bootstrap of pairs is
+    slightly too narrow, so the limit is 3.3 standard deviations below a count of 93.
+    """
     chance = np.random.default_rng(1)
     held = 0
     for seed in range(100):

@@ -172,7 +172,7 @@ def _within(length: float, nodes: int) -> np.ndarray:
 
 
 def _evenly(n: int) -> np.ndarray:
-    """Return n directions (n, 3) on Fibonacci's spiral."""
+    """Return n evenly distributed directions (n, 3), which lie on a Fibonacci spiral."""
     i = np.arange(n) + 0.5
     z, azimuth = 1 - 2 * i / n, np.pi * (1 + np.sqrt(5)) * i
     r = np.sqrt(1 - z * z)

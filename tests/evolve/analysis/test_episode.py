@@ -130,7 +130,7 @@ def test_candidates_that_are_not_there_are_named(run, tmp_path):
 
 @pytest.mark.slow
 def test_an_agent_can_be_taken_out_of_its_run(run):
-    """The package's public names give the agent of a run, as in the tutorial."""
+    """The public names of the package are enough to obtain the agent of a run, as in the tutorial."""
     opened = evolve.Run.open(run.path)
     best = opened.best
     worlds = sim.make_vec_env(
@@ -168,8 +168,8 @@ def test_policies_of_another_animal_or_damaged_are_named(run):
 
 @pytest.mark.slow
 def test_perfect_eyes_are_shown_the_same_light():
-    """A tenth of the light on the course has been reflected more than once. An eye in dim light sees it, and so do the
-    episode's images.
+    """A tenth of the light on the course has been reflected more than once. An eye in dim light receives it, and the
+    images of the episode contain it.
     """
     config = small_config("navigation", noise_sigma=0.02)
     config = dataclasses.replace(config, eye=dataclasses.replace(config.eye, rays_per_receptor="auto"))
@@ -216,8 +216,8 @@ def test_replay_sums_up_and_writes_a_page(run, episode):
 
 
 def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
-    """The maze of the world is in the file and in the ground plan. Files from before the setting show the first
-    maze.
+    """The maze of the world is in the file and in the ground plan. Files that are older than this setting show the
+    first maze.
     """
     world = WorldConfig(mazes=2, unseen=True)
     columns, rest = of_first_form(dataclasses.replace(episode, task="maze", world=world))
@@ -247,7 +247,7 @@ def test_files_of_worlds_out_of_range_are_refused(episode, tmp_path):
 
 
 def test_archives_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch):
-    """The error follows from the archive's directory, before unpacking. A pipe is also refused."""
+    """The size is read from the directory of the archive, before anything is unpacked. A pipe is refused, too."""
     bomb = tmp_path / "bomb.npz"
     np.savez_compressed(bomb, returns=np.zeros(2**22))
     monkeypatch.setattr(episode_file, "MOST_BYTES", 2**20)
@@ -281,7 +281,7 @@ def test_an_episode_of_a_run_in_little_light_is_dark_throughout(run):
     ],
 )
 def test_an_episode_is_solved_if_the_first_thing_reached_is_a_goal(episode, tmp_path, goal, adversary, after, expected):
-    """The rule also holds for files of the first format, and if one action reaches both."""
+    """The rule also holds for files of the first format, and if one action reaches a goal and an adversary."""
     episode = cut(episode, len(goal))
     told = {"goal": np.array(goal), "adversary": np.array(adversary)}
     arrays, rest = of_first_form(dataclasses.replace(episode, reward_terms=episode.reward_terms | told), after)

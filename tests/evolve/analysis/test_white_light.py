@@ -62,7 +62,7 @@ DAYLIGHT_475 = 1.15392  # CIE D65 at 475 nm over that at 560 nm: 115.392 / 100
 
 
 def test_photons_count_in_image_quality():
-    """Photon noise lowers the quality as in the eye's own description."""
+    """Photon noise lowers the quality as much as in the eye's own table of limits."""
     animal, dusk = phenotype(relative_aperture=0.3, relief=LENS), EyeConfig(bands=2, illuminance=0.05)
     dim, bright = (eye_image_quality(animal, config) for config in (dusk, EyeConfig(bands=2)))
     assert dim < 0.9 * bright

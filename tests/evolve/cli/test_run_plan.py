@@ -62,7 +62,9 @@ def test_successive_halving_costs_what_its_stages_cost(tmp_path, paced):
 
 
 def test_passes_that_late_stages_spare_are_in_the_hours_and_in_the_speed(tmp_path, monkeypatch):
-    """The second rung, from step 4,178 on, makes 8 passes of 10. A whole training run makes 10, 9 and 6."""
+    """The second rung begins at step 4,178 and makes 8 passes over the samples instead of 10. A whole training run
+    makes 10, then 9, then 6 passes.
+    """
     settings = ("search.population=4", "search.generations=1", "search.rungs=2", "search.promoted=0.34", "workers=4")
     learning = ("learning.total_steps=12288", "learning.eval_interval=100000", "learning.decay_after=3277")
     pace = replace(PACE, pass_s=5e-5)

@@ -37,8 +37,8 @@ def test_starts_that_nothing_reads_are_named():
 
 
 def test_bands_too_few_for_the_colours_of_a_world_are_named():
-    """Four bands move the ultraviolet that a goal reflects into the range of pigments of 410 nm: 0.18 of white's
-    signal.
+    """Four bands are so wide that the ultraviolet light of a goal appears in the range of a pigment of 410 nm, with an
+    error of 0.18 of white's signal.
     """
 
     def notes(task, *settings):

@@ -182,7 +182,9 @@ def test_task_named_by_the_user_wins():
 
 
 def test_a_preset_made_for_a_task_wins_over_the_tasks_settings(monkeypatch):
-    """A preset for any task does not take precedence: navigators' eyes still have one row of receptors."""
+    """A preset that can be used with any task does not take precedence: navigators' eyes still have one row of
+    receptors.
+    """
     own = {"task": "navigation", "learning": {"gamma": 0.5}}
     monkeypatch.setattr("evolve.config.assemble.preset_sources", lambda name, scale: [Source("preset", own)])
     assert assemble(preset="any").learning.gamma == 0.5

@@ -115,8 +115,8 @@ def test_animals_on_record_that_name_no_encoder_have_one_of_16():
 
 
 def test_quick_preset_starts_behind_a_lens_in_focus():
-    """The relief of the start is the paraboloid h0 - r²/(2 f (n - 1)), to Rayleigh's quarter wave of optical path over
-    the pupil.
+    """The relief at the start agrees with the paraboloid h0 - r²/(2 f (n - 1)) to a quarter wave of optical path over
+    the pupil (Rayleigh's criterion).
     """
     config = assemble("detection", "quick")
     animal = develop(Genotype(config.genome).start, config)

@@ -156,7 +156,9 @@ def test_every_notebook_has_a_page():
 
 @pytest.mark.parametrize("name", MAKER.SOURCES)
 def test_notebooks_are_their_pages(name):
-    """Other tests run the pages' code, and so that of the notebooks. (If this fails: python docs/site/notebooks.py.)"""
+    """Other tests run the code of the pages, which is the code of the notebooks. (If this fails: python
+    docs/site/notebooks.py.)
+    """
     page = MAKER.SOURCES[name]
     stored = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4)
     assert stored == MAKER.notebook(page)

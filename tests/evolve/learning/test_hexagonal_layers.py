@@ -33,7 +33,9 @@ def test_every_ommatidium_is_in_a_neighbourhood_of_near_ones(directions):
 
 
 def test_neighbours_are_in_the_order_of_their_azimuths():
-    """Right, upper right, and so on to the left, for complete hexagons near the middle of a patch that looks ahead."""
+    """The order is right, upper right, upper left, left and so on, for complete hexagons near the middle of a patch
+    that looks ahead.
+    """
     patch, checked = hexagonal_patch(4, 3.0), 0
     for place in neighbourhoods(patch):
         step = patch[place[1:]] - patch[place[0]]

@@ -157,8 +157,8 @@ def test_success_is_what_holds_at_the_end(tmp_path):
 
 
 def test_what_fails_in_the_middle_of_a_life_is_counted(tmp_path):
-    """Every episode ends with its 11th action. This gives 2 in each of 8 worlds within 32 actions of learning, and 3
-    each in two evaluations during training and in the last one.
+    """Every episode fails at its 11th action. These are 2 episodes in each of 8 worlds during 32 actions of learning,
+    and 3 episodes in each of three evaluations, two during training and one at the end.
     """
     config, animal = small(named=written(tmp_path, "    def succeeded", FAILING))
     with pytest.warns(UserWarning, match=r"terminated, line \d+ of mine.py: KeyError: 'ball'; its episode ends here"):

@@ -52,7 +52,9 @@ def brightness(config):
 
 
 def test_older_runs_keep_their_light():
-    """The ratio is that of 128/255 and its light by IEC 61966-2-1, as the eye sees the floor alone."""
+    """The eye sees nothing but the floor. The ratio of the signals is therefore that of 128/255 to the linear light of
+    this level (IEC 61966-2-1).
+    """
     now = config_of()
     assert not older(now).world.encoded_textures
     assert from_text(to_toml(older(now))).world == older(now).world

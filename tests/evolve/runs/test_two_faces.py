@@ -35,7 +35,7 @@ def closed_form(monkeypatch):
 
 
 def values(assignments):
-    """Return settings in the form for Python."""
+    """Return settings "KEY=VALUE" in the form that `evolve.run` accepts, as a dictionary."""
     pairs = dict(text.split("=", 1) for text in assignments)
     return {key: json.loads(value) for key, value in pairs.items()}
 

@@ -89,7 +89,7 @@ def test_rungs_promote_the_fittest_after_costs(tmp_path):
 
 @pytest.mark.parametrize("settings", [(), ("search.steady_state=true",)])
 def test_the_null_model_subtracts_costs(settings, tmp_path):
-    """It equals the loop with random task fitness of the same spread, 1."""
+    """The null model equals the real loop with random task fitness of the same spread, 1."""
     config = tiny(f"seed={FIRST_SEED}", *PRICES, *settings)
     run = Run.create(tmp_path / "run", config)
     evolve(run, Chance(FIRST_SEED), Nobody())

@@ -179,7 +179,7 @@ def test_a_task_whose_file_name_is_no_text_is_refused_before_a_run_exists(name, 
 
 
 def test_settings_of_any_task_file_read_back_equal(tmp_path, monkeypatch):
-    """Names with line ends or backslashes are refused, as before."""
+    """Names of files with line ends or backslashes are refused."""
     monkeypatch.chdir(tmp_path)
     drawn = Random(random.randrange(2**32), 0)
     for number in range(20):

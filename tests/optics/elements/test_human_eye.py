@@ -175,7 +175,7 @@ def test_centered_moves_the_centroid_of_the_image_to_the_axis():
 
 
 def test_a_wavefront_over_the_pupil_itself_is_centered_too():
-    """The mean slope of c Z_3^1 = √8 c (3ρ³ - 2ρ) cos φ over its circle is √8 c / a."""
+    """The mean slope of c Z_3^1 = √8 c (3ρ³ - 2ρ) cos φ over its circle of radius a is √8 c / a."""
     eye = HumanEye(1e-3, Zernike({(3, 1): 0.2, (4, 0): 0.1}), centered=True)
     assert eye.pupil.wavefront.modes[1, 1] == pytest.approx(-math.sqrt(8) * 0.2 / 2)
     assert eye.pupil.wavefront.modes[1, -1] == pytest.approx(0, abs=1e-12)

@@ -1,4 +1,6 @@
-"""Reliefs: the gene's patch contains every paraboloid, maps are joined exactly, rows are y."""
+"""Reliefs: a B-spline patch represents every paraboloid exactly, splines through height maps are exact for cubics, and
+rows belong to y.
+"""
 
 import numpy as np
 import pytest

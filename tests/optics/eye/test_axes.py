@@ -73,7 +73,9 @@ def check(kernel, rays):
 
 
 def lead_of(modes):
-    """Zernike polynomials in Cartesian form, of the OSA's table; W in metres, coefficients in µm."""
+    """Return the lead (x, y) -> W [m] as a sum of Zernike polynomials of the OSA; modes: coefficients [µm] by (n,
+    m).
+    """
     table = {
         (1, -1): lambda x, y: 2 * y,
         (1, 1): lambda x, y: 2 * x,
@@ -99,7 +101,9 @@ def test_odd_modes_of_an_aberrometer(seed):
 
 def test_the_upper_half_of_a_myopic_pupil_blurs_upwards():
     """The half that an observer sees on top is open. Its rays cross the axis in front of the retina, hit it below the
-    axis, and appear above. The shift is 2 receptors upwards; with y down it was 2 receptors downwards."""
+    axis, and appear above. The image is shifted upwards by 2 receptors. If y pointed down, it would be shifted
+    downwards.
+    """
     upper = optics.difference(optics.Circle(), optics.Oblong(2.0, 1.0, (0.0, -0.5)))
     kernel = kernel_of(optics.Pupil(**LENS, aperture=upper, wavefront=optics.Zernike({(2, 0): 1.8})))
     middle = len(kernel) // 2
@@ -191,7 +195,7 @@ def test_a_source_angle_is_a_direction_of_travel_in_these_axes():
 
 
 def test_signals_are_convolutions_with_the_traced_kernel():
-    """A point of light and the upper half of a myopic pupil, to the end: the receptors above it respond."""
+    """A point of light is seen through the upper half of a myopic pupil, and the receptors above its image respond."""
     upper = optics.difference(optics.Circle(), optics.Oblong(2.0, 1.0, (0.0, -0.5)))
     pupil = optics.Pupil(**LENS, aperture=upper, wavefront=optics.Zernike({(2, 0): 1.5}))
     eye = optics.Eye(pupil, (RECEPTORS, RECEPTORS), 60.0, bands=1, receptors=(550,))

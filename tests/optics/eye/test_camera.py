@@ -20,7 +20,9 @@ def middle(picture):
 
 
 def test_electrons_of_white_are_those_of_its_irradiance():
-    """Lambertian white in daylight has the spectral irradiance π/4 (D/f)² of its radiance, on the area of a pixel."""
+    """The image of a white Lambertian surface has the spectral irradiance π/4 (D/f)² L, where L is the radiance of
+    white in daylight.
+    """
     electrons = middle(camera_image(WHITE, PUPIL, SENSOR))
     etendue = math.pi / 4 * SENSOR.pitch**2 * (0.5e-3 / 5e-3) ** 2
     bands = camera_eye(PUPIL, SENSOR).spectral_bands

@@ -73,7 +73,7 @@ def test_see_follows_central_differences(name):
 
 @pytest.mark.slow
 def test_kernel_follows_central_differences():
-    """The derivative of every cell of the kernel by the object's distance agrees."""
+    """The derivative of every cell of the kernel with respect to the object's distance agrees."""
     import drjit as dr
 
     z = types().Float64(2e-3)

@@ -169,7 +169,7 @@ def test_the_table_names_every_limit():
 
 
 def test_what_the_light_cannot_tell_is_one_named_line(monkeypatch):
-    """The rest of the table remains."""
+    """A value that cannot be computed is named in one line, and the rest of the table remains."""
 
     def refused(*_, **__):
         raise AccuracyError("tolerance = 0.02: contrasts have an error of up to 0.5")

@@ -13,7 +13,9 @@ KINDS = ("flat", "lens", "defocus", "relief")
 
 
 def random_case(rng, fresnel_numbers=(0.01, 30.0)):
-    """A pupil, wavelength, distance and window [m] that holds most of the light; NA 0.003 to 0.7."""
+    """Return a random pupil, a wavelength, a distance and the width of a window [m] with most of the light. The NA is
+    0.003 to 0.7.
+    """
     while True:
         wavelength, radius = rng.uniform(400e-9, 700e-9), 10 ** rng.uniform(-6, -4.3)
         low, high = np.log10(fresnel_numbers)

@@ -1,4 +1,6 @@
-"""Parts of a spectrum: obliquity, the limits of its taper, and the tapers that are tried."""
+"""Parts of the method of the angular spectrum: obliquity, the limits of the spectrum's taper, and the tapers that are
+tried.
+"""
 
 import math
 
@@ -20,7 +22,9 @@ METHODS = {"angular_spectrum": whole_spectrum, "split_angular_spectrum": split_s
 
 
 def problems():
-    """Pupils of some microns to a millimetre, with the sensor in front of their focus, in it and behind it."""
+    """Return problems for pupils of some microns to a millimetre, with the sensor in front of the focus, in it and
+    behind it.
+    """
     for radius in (5e-6, 40e-6, 1e-3):
         for distance in (3 * radius, 30 * radius):
             for focus in (0.7, 1.0, 30.0):

@@ -1,4 +1,4 @@
-"""Ray density and pinhole: shadows, power, order, and their limits."""
+"""The methods of ray density and of the pinhole: shadows, power, order of convergence, and limits."""
 
 import math
 

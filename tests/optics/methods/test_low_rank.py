@@ -1,5 +1,6 @@
-"""The rank of the slow part follows the tolerance: it is sufficient at every tolerance, and not larger than
-necessary."""
+"""The rank of the slow factor follows from the tolerance. It is sufficient at every tolerance, and not larger than
+necessary.
+"""
 
 import numpy as np
 import pytest

@@ -1,6 +1,6 @@
 """Strehl ratios of aberrated pupils: the relief carries the aberration, and the oracle gives the loss.
 
-f/20: the exact integral's weights differ from the paraxial ones by NA², 6e-4.
+The lens has f/20, so that the weights of the exact integral differ from the paraxial ones by NA² = 6e-4.
 """
 
 import numpy as np
@@ -92,7 +92,9 @@ class TestStrehlRatio:
         assert got == pytest.approx(reference.marechal_strehl(0.04), abs=3e-3)
 
     def test_balance_has_a_sign(self):
-        """W040 with W020 = -W040 is balanced; +W040 instead gives the worst case."""
+        """Spherical aberration W040 is balanced by the defocus W020 = -W040. Defocus of the opposite sign is the worst
+        case.
+        """
         right, wrong = (on_axis(aberrated(1.5 * (RHO**4 + sign * RHO**2))) for sign in (-1, 1))
         assert right == pytest.approx(reference.strehl_spherical(1.5, -1.5), abs=2e-3)
         assert wrong == pytest.approx(reference.strehl_spherical(1.5, 1.5), abs=2e-3)

@@ -1,4 +1,4 @@
-"""Large pupils and rules are summed in blocks, with the same result as at once."""
+"""Sums over large pupils and over many nodes are computed in blocks, with the same result."""
 
 import numpy as np
 import pytest

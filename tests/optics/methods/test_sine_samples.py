@@ -1,4 +1,6 @@
-"""Samples in sines: every aperture, on and off the axis, reaches the tolerance; many zones need few samples."""
+"""Samples that are equidistant in direction sines: every aperture reaches the tolerance on and off the axis, and many
+Fresnel zones need few samples.
+"""
 
 import dataclasses
 import math

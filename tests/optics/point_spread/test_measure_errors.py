@@ -143,7 +143,7 @@ def test_a_strehl_ratio_looks_again_at_one_wavelength_at_a_time(monkeypatch):
 
 @pytest.mark.slow
 def test_measures_carry_derivatives_through_what_they_look_at_again():
-    """Derivatives of power, Strehl ratio and encircled energy by the sensor distance, against central differences."""
+    """Derivatives with respect to the sensor distance agree with central differences."""
 
     def measured(z):
         result = optics.psf(LENS, [WAVELENGTH], z, dx=3e-6, shape=(9, 9), dtype="float64", tolerance=1e-8)

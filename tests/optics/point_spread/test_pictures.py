@@ -100,7 +100,9 @@ def test_what_stays_wrong_is_refused(told):
 
 
 def test_no_more_digits_are_asked_than_there_are(told):
-    """float32 can reach ten times its noise: a PSF that fails at that tolerance is not computed again."""
+    """The smallest tolerance of float32 is ten times its rounding noise. A PSF that fails the check at this tolerance
+    is not computed again.
+    """
     least = 10 * FLOAT_NOISE["float32"]
     checked = told(10 * least)
     with pytest.raises(optics.AccuracyError, match="in float32"):

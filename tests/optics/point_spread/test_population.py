@@ -1,4 +1,6 @@
-"""A population's PSFs with one plan, against the exact integral; unsuitable members take the ordinary way."""
+"""PSFs of a population with a common plan, against the exact integral. Members for which the plan is unsuitable are
+computed separately.
+"""
 
 import math
 

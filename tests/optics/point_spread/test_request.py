@@ -1,4 +1,4 @@
-"""One wavelength's method is tried for the next one, unless it has become expensive."""
+"""The method of one wavelength is tried first for the next wavelength, unless it has become expensive."""
 
 from dataclasses import replace
 

@@ -36,9 +36,9 @@ def by_directions(window, z, sine, jones, light):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.5, 0.9])
 def test_far_away_a_lens_in_focus_is_richards_and_wolfs(sine):
-    """Plane waves ignore the curvature of the waves, which has an effect of sin²θ/N at the Fresnel number N. At ten
-    times the distance, the exact field is ten times closer to Richards and Wolf's, with which the sum of plane waves
-    agrees at any distance.
+    """Plane waves ignore the curvature of the waves, which has an effect of sin²θ/N at the Fresnel number N. The sum of
+    plane waves agrees with Richards and Wolf's field at any distance. The exact field approaches it: at ten times the
+    distance, it is ten times closer.
     """
     jones, window = np.array([1, 0.5j]) / math.sqrt(1.25), {"dx": 0.05e-6, "shape": (41, 35)}
     off = {}

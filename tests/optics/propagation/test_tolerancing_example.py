@@ -1,4 +1,4 @@
-"""The example of tolerancing runs, and its criterion is Strehl's ratio."""
+"""The example of tolerancing runs, and its criterion is the Strehl ratio."""
 
 import runpy
 import sys

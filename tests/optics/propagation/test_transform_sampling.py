@@ -1,4 +1,6 @@
-"""Padding of a finite transform: light at Nyquist's frequency ends as if cut off, and blurs."""
+"""Padding of finite transforms. The spectrum of samples ends abruptly at the Nyquist frequency, which blurs the light
+there.
+"""
 
 import math
 

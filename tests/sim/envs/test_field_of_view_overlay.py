@@ -25,7 +25,7 @@ def ray(row, column):
 
 
 def points():
-    """Return depth and position at the eyes' height for each pixel that shows this plane."""
+    """Return depth and position of the point at the eyes' height, for each pixel that shows such a point."""
     found = {}
     for row in range(SIZE[0]):
         for column in range(SIZE[1]):

@@ -25,7 +25,9 @@ def test_equal_ommatidia_are_one_kind():
 
 
 def test_photons_are_those_of_the_same_eye_made_of_a_mount():
-    """A mount's `photons` belong to a signal of 1, which its guide reaches only with more light than white."""
+    """The `photons` of a mount's eye are those of a signal of 1, which a waveguide reaches only with more light than
+    that of white.
+    """
     eye = sim.CompoundEye(AHEAD, SMALL, photon_budget=BUDGET)
     fov = np.degrees(2 * np.arctan(GUIDE.diameter / 2 / SMALL.lens.object_focal_length()))
     mount = optics.Eye(
@@ -53,7 +55,9 @@ def test_a_facet_with_more_light_catches_more_photons_in_its_own_type():
 
 
 def test_a_wider_facet_with_the_same_focal_length_catches_more_photons():
-    """Its acceptance angle hardly changes, but its area is four times as large. The rhabdom accepts both cones."""
+    """Its acceptance angle hardly changes, but its area is four times as large. The rhabdom accepts the cone of light
+    from either facet.
+    """
     narrow, wide = (
         sim.CompoundEye(
             AHEAD, optics.Ommatidium(optics.FacetLens(d, 24e-6), optics.Waveguide(4e-6)), photon_budget=BUDGET

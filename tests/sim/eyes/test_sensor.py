@@ -108,7 +108,9 @@ def test_a_flipped_kernel_is_noticed(monkeypatch):
 
 
 def test_white_light_gives_the_kernels_power():
-    """Rows of weights sum to the power inside the kernel: a uniform scene gives exactly a² power."""
+    """The weights of a receptor sum to the power inside the kernel, so a uniform scene gives exactly a² times this
+    power.
+    """
     e = eye(pupil=optics.Pupil(aperture_radius=0.1 * L))
     sensor = build_sensor(e, 4)
     power = e.kernel(cells_per_receptor(e.resolution)).sum(axis=(1, 2))

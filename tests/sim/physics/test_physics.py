@@ -75,7 +75,9 @@ def test_free_motion_is_what_mujoco_does(task):
 
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
-    """Without islands and, in small models, bounding volumes, agents at walls and in corners move as in full MuJoCo."""
+    """Physics uses no constraint islands, and no bounding volumes in small models. Agents at walls and in corners move
+    as in full MuJoCo.
+    """
     world = build_world(task)
     lean = AgentPhysics(world, 1, closed_form=False)
     assert lean._model.opt.disableflags != world.model.opt.disableflags

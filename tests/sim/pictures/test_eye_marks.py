@@ -28,7 +28,9 @@ def test_an_eye_is_where_it_is():
 
 
 def test_rims_open_with_the_field():
-    """The eye is rolled, so that the field opens across the image. Its rims end 2 sin(fov / 2) m apart."""
+    """The eye is rolled, so that its field opens across the image. The lines along the edges of the field are 1 m long,
+    so their ends are 2 sin(fov / 2) m apart.
+    """
     rolled = AHEAD_RIGHT[:, [1, 0, 2]] * [1, -1, 1]
     for fov_deg in (40.0, 80.0):
         rows, _ = np.nonzero(drawn([0.0, 0.0, 0.0], rolled, fov_deg).sum(axis=2) > 100)

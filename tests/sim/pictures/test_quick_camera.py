@@ -101,8 +101,9 @@ def test_lights_from_elsewhere_do_not_agree(task):
 
 
 def test_other_models_look_as_in_slow_pictures_wherever_their_parts_are(mixture):
-    """The quick camera has four bands and the reference eight. This changes linear light by 2e-2 in the mean of all
-    colours: 3 levels in bright areas and 20 in dark ones. New poses do not cause new recordings.
+    """The quick camera has four bands and the reference eight. On average over all colours, linear light therefore
+    differs by 0.02, which is 3 of 255 levels in bright areas and 20 in dark ones. New poses do not cause new
+    recordings.
     """
     model, quick, mirror = mixture
     pictures = []

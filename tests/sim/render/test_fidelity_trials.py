@@ -26,7 +26,7 @@ def test_only_worlds_with_objects_have_a_population_near_objects():
 
 
 def test_areas_and_rays_agree_on_bounced_light_in_a_world_without_objects():
-    """The agent's own body is then the only body that reflects light. Areas with direct light only differ by 13 %."""
+    """The agent's own body is then the only body that reflects light. Areas in direct light would differ by 13 %."""
     scene = WorldScene(sim.build_world("maze"), EYES)
     trials, sampling = FidelityTrials(scene), scene.sampling(ONE_PSF)
     assert scene.areas(BOUNCE).places > 0

@@ -140,8 +140,8 @@ def _plain(values):
 
 
 def test_faces_are_those_of_opengl():
-    """Table 3.19 of the OpenGL 2.1 specification: the major axis selects the face; (s, t) = ((sc, tc) / |ma| +
-    1) / 2.
+    """The reference is table 3.19 of the OpenGL 2.1 specification. The coordinate ma with the largest absolute value
+    selects the face. With the other two, sc and tc, the position on the face is (s, t) = ((sc, tc) / |ma| + 1) / 2.
     """
     table = {
         0: ([1, 0.2, 0.3], (-0.3, -0.2)),

@@ -1,5 +1,6 @@
-"""Every limiting case of the domain gives its known value or a one-line error; the page detects a wrong value and a
-wrong error."""
+"""Every limiting case of the domain gives its known value or a one-line error. The bounds of the page detect wrong
+values and wrong errors.
+"""
 
 from pathlib import Path
 

@@ -1,5 +1,6 @@
-"""The page's comparison on models shipped with gymnasium; it detects moving geoms that stand still, and eyes turned
-aside."""
+"""The comparison of the page on models that are shipped with gymnasium. It detects moving geoms that are rendered as
+static, and eyes that look in a wrong direction.
+"""
 
 import importlib.util
 from pathlib import Path

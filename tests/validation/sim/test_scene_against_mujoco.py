@@ -1,5 +1,6 @@
-"""The page's comparison on two models shipped with gymnasium; it detects a mirror that does not follow, and a turned
-one."""
+"""The comparison of the page on two models that are shipped with gymnasium. It detects a mirror that does not follow
+the model's data, and one that is rotated.
+"""
 
 import importlib.util
 from pathlib import Path
