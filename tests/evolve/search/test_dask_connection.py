@@ -1,6 +1,7 @@
 """A scheduler without workers, one that ends, and one that never answers: each ends the wait after the patience."""
 
 import asyncio
+import itertools
 import socket
 import time
 from concurrent.futures import Future
@@ -154,7 +155,7 @@ def test_workers_are_listed_at_regular_intervals(monkeypatch, patience_s, interv
         found.check()
         found._question = None
         times.now += interval_s / 4
-    steps = {round(after - before, 6) for before, after in zip(asked, asked[1:], strict=False)}
+    steps = {round(after - before, 6) for before, after in itertools.pairwise(asked)}
     assert asked[0] == 1000.0, "the first question is not delayed"
     assert steps == {interval_s}
 
@@ -193,10 +194,14 @@ def test_a_silence_is_noted_once_and_ends_with_the_patience(monkeypatch, patienc
     found = connection([Client("running")], patience_s)
     found.note = lambda note: notes.append((times.now - began, note))
     found._start = lambda call: Future()
-    with pytest.raises(ExecutorError, match=rf"^tcp://host:1: waited {patience_s:g} s for an answer of the scheduler"):
+
+    def wait():
         while True:
             times.now += 0.25
             found.check()
+
+    with pytest.raises(ExecutorError, match=rf"^tcp://host:1: waited {patience_s:g} s for an answer of the scheduler"):
+        wait()
     assert times.now - began == patience_s
     [(after, note)] = notes
     assert after == noted_s

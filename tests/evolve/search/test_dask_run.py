@@ -23,8 +23,6 @@ distributed = pytest.importorskip("distributed")
 class Variable:
     """A variable of the scheduler."""
 
-    values = {}
-
     def __init__(self, name, client):
         self.name, self.client = name, client
 
@@ -37,7 +35,7 @@ class Variable:
 
 @pytest.fixture(autouse=True)
 def variables(monkeypatch):
-    monkeypatch.setattr(Variable, "values", {})
+    monkeypatch.setattr(Variable, "values", {}, raising=False)
     monkeypatch.setattr(distributed, "Variable", Variable)
     monkeypatch.setattr(dask_worker, "_software", dict)
     return Variable.values

@@ -94,9 +94,10 @@ def test_a_preparation_that_fails(messages):
 
 def test_a_preparation_comes_first(messages):
     prepared = []
-    assert messages(lambda value, progress: len(prepared), [(1,), (1,)], lambda: prepared.append(1)) == [
-        Message("done", 1)
-    ] * 2
+    assert (
+        messages(lambda value, progress: len(prepared), [(1,), (1,)], lambda: prepared.append(1))
+        == [Message("done", 1)] * 2
+    )
 
 
 def raising(error):

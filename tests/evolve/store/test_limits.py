@@ -153,7 +153,7 @@ def test_sizes_of_records_and_lines(tmp_path, monkeypatch):
     run = Run.create(tmp_path / "run", CONFIG)
     run.append(candidate(0))
     size = run.record.path.stat().st_size
-    for name, reason in (("LARGEST_RECORD", f"has {size:,} bytes"), ("LONGEST_LINE", "line 1: is damaged: it has more")):
+    for name, reason in (("LARGEST_RECORD", f"has {size:,} bytes"), ("LONGEST_LINE", "line 1: is damaged: it")):
         with monkeypatch.context() as patch:
             patch.setattr(record, name, size)
             assert Run.open(run.path).candidates == run.candidates

@@ -121,15 +121,15 @@ def test_files_that_cannot_be_read_or_written_are_named(five, monkeypatch):
     def full(*_):
         raise OSError(errno.EIO, "Input/output error")
 
-    with monkeypatch.context() as patch, pytest.raises(RunError, match=r"jsonl: cannot be written: Input/output error"):
-        patch.setattr("evolve.store.directory.sweep", full)
-        five.repair()
-    with monkeypatch.context() as patch, pytest.raises(RunError, match=r"toml: cannot be read: Input/output error"):
-        patch.setattr("evolve.store.directory.read", full)
-        five.repair()
-    with monkeypatch.context() as patch, pytest.raises(RunError, match=r"jsonl: cannot be written: Input/output error"):
-        patch.setattr("os.fsync", full)
-        five.repair()
+    for name, reason in (
+        ("evolve.store.directory.sweep", r"jsonl: cannot be written: Input/output error"),
+        ("evolve.store.directory.read", r"toml: cannot be read: Input/output error"),
+        ("os.fsync", r"jsonl: cannot be written: Input/output error"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(name, full)
+            with pytest.raises(RunError, match=reason):
+                five.repair()
     five.record.path.unlink()
     with pytest.raises(RunError, match=r"candidates\.jsonl: was changed by another process; nothing is added"):
         five.append(candidate(5))
@@ -194,13 +194,12 @@ def test_a_file_system_without_synchronised_folders_is_accepted(tmp_path, monkey
         raise OSError(number, "no")
 
     monkeypatch.setattr(regular_files.os, "fsync", sync)
-    try:
+    if passes:
         regular_files.sync_folder(tmp_path)
-    except OSError as error:
-        assert error.errno == number
-        assert not passes
-    else:
-        assert passes
+        return
+    with pytest.raises(OSError, match="no") as caught:
+        regular_files.sync_folder(tmp_path)
+    assert caught.value.errno == number
 
 
 def test_unknown_software_and_processors(monkeypatch):
