@@ -170,7 +170,7 @@ MAPS = SimpleNamespace(maps="height")
             {"knots": MAPS},
             [],
             "auto",
-            r"tolerance = 0.001: derivatives .* \(height\) need too many nodes: .*\(3e-05 m\) or the pupil \(radius 4e-05 m\)",
+            r"tolerance = 0.001: derivatives .* \(height\) need too many nodes: .*\(3e-05 m\) or .* \(radius 4e-05 m\)",
         ),
         ({"knots": MAPS}, [], "low_rank", "tolerance = 0.001: derivatives"),
         ({"pixelated": "pixels"}, [], "low_rank", "this method cannot sample a pixelated relief within its limits"),
