@@ -127,6 +127,7 @@ def test_a_fitness_that_is_not_finite_fails_the_candidate():
 
 @pytest.mark.parametrize("length", [LONGEST_FAILURE - 1, LONGEST_FAILURE, LONGEST_FAILURE + 1, 5000])
 def test_failures(length):
+    assert (LONGEST_FAILURE, KINDS, LONGEST) == (1000, 4, 300)
     text = "".join(chr(33 + k % 90) for k in range(length))
     found = shortened(text)
     assert Evaluation.failed(f" {text}\n ").failure == found

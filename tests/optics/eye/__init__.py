@@ -4,7 +4,7 @@ acuity: test_acuity.py
 band_choice: spectra/test_bands.py, test_sight_tolerance.py
 cell_integrals: test_cell_integrals.py
 eye: test_eye.py, test_kept_kernels.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
-eye_spec: test_eye.py, test_patches.py, test_axes.py, test_vertical_field.py
+eye_spec: test_eye.py, test_patches.py, test_axes.py, test_receptor_density.py, test_vertical_field.py
 geometry: test_patches.py, test_vertical_field.py
 immersion: elements/test_turbid_medium.py
 depth_range: test_occlusion.py, test_kernel_bank.py
