@@ -19,7 +19,7 @@ receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py,
 guided_field: test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retina: test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
-retinal_image: test_retinal_image.py
+retinal_image: test_retinal_image.py, test_receptor_density.py
 sensor_pixels: test_torch.py
 camera: test_camera.py
 receptor_density: test_receptor_density.py

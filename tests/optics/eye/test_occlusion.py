@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from optics import AccuracyError, Eye, MaskMap, Pupil
+from optics.eye import occlusion
 from optics.eye.occlusion import visible_layers
 
 S, RADIUS, FOCAL, CELL, N = 2, 300e-6, 2e-3, 4e-6, 12
@@ -198,3 +199,14 @@ def test_bad_depth_maps(wrong):
         eye(0.1).see(np.ones((1, SIDE, SIDE)), S, z=z)
     with pytest.raises(ValueError, match=r"^z has shape \(3, 4\): must be one distance or one per cell"):
         eye(0.1).see(np.ones((1, SIDE, SIDE)), S, z=np.full((3, 4), 0.1))
+
+
+@pytest.mark.parametrize("far", [0.0, 0.3, 0.7, 2.5])
+def test_layers_follow_from_differences_of_inverse_distances(far):
+    """A layer begins at a multiple of the least difference from the farthest cell, wherever this cell is."""
+    steps = np.array([[0.0, 0.9, 1.1, 1.9, 2.1, 0.5]])
+    least = occlusion.LEAST_SHIFT
+    assert occlusion.MOST_LAYERS > 2.1
+    layers = list(visible_layers((far + steps) * least, 1.0))
+    own = [np.flatnonzero(layer.cells & (layer.source == np.arange(6))).tolist() for layer in layers]
+    assert own == [[4], [2, 3], [0, 1, 5]]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import optics
+from optics.point_spread import strehl
 from tests.optics.device_types import Float64
 from validation import reference
 from validation.optics.random_cases import draw_case
@@ -99,6 +100,16 @@ def test_a_window_without_the_peak_has_no_strehl_ratio():
     beside = focus(0.3e-6, 9, centre=(2e-6, 0.0))  # the first dark ring is at 1.3 µm
     with pytest.raises(optics.AccuracyError, match="needs a window that contains the peak"):
         optics.strehl_ratio(beside)
+
+
+@pytest.mark.parametrize("shape", [(5, 6), (6, 5)])
+def test_a_peak_at_the_rim_is_noticed_on_all_sides(shape):
+    rows, columns = np.indices(shape)
+    rim = (rows == 0) | (rows == shape[0] - 1) | (columns == 0) | (columns == shape[1] - 1)
+    for place in np.ndindex(shape):
+        image = np.zeros(shape)
+        image[place] = 1
+        assert strehl._at_rim(image) == rim[place]
 
 
 def test_the_higher_of_two_lobes_is_found_between_samples():

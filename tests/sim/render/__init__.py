@@ -12,7 +12,7 @@ world_scene: test_batched_renderer.py
 reference_renderer: test_renderer_parts.py, test_reference_renderer.py, test_vertical_field.py
 fidelity: test_fidelity_levels.py, test_fidelity.py, eyes/test_depth_layers.py
 fidelity_choice: test_fidelity_choice.py, test_fidelity.py, test_model_fidelity.py
-world_fidelity: test_fidelity.py, eyes/test_depth_layers.py
+world_fidelity: test_world_fidelity.py, test_fidelity.py, eyes/test_depth_layers.py
 fidelity_stages: test_fidelity_levels.py, test_fidelity_choice.py, test_fidelity.py, eyes/test_depth_layers.py
 sample_choice: test_fidelity_levels.py, test_sample_choice.py, test_fidelity.py
 random_views: test_fidelity_trials.py, test_fidelity.py
