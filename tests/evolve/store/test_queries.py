@@ -235,6 +235,8 @@ def test_the_shipped_run_is_copied_once_and_only_where_nothing_else_is(tmp_path)
     times.pop(first.record.path)
     assert all(file.stat().st_mtime_ns == time for file, time in times.items())
     first.record.path.write_bytes(lines.replace(b"0", b"1", 1))
+    (tmp_path / "empty").mkdir()
+    assert copy_shipped_run(tmp_path / "empty").best == first.best
     (tmp_path / "thesis.tex").touch()
     for place in (path, tmp_path):
         with pytest.raises(RunError, match=f"^{place} holds other files: choose another directory with --out$"):

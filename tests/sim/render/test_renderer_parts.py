@@ -10,11 +10,13 @@ import pytest
 import optics
 import sim
 from sim.eyes.compound_eye import CompoundEye
+from sim.render import ray_kernel
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.labels import Labels
 from sim.render.light_factors import LightFactors
 from sim.render.pending_frame import FrameSlot, PendingFrame, settled
 from sim.render.prepared_scene import PreparedScene, _named
+from sim.render.ray_kernel import RayKernel
 from sim.render.receptor_noise import NoiseModel
 from sim.render.receptors_in_time import ReceptorsInTime
 from sim.render.reference_renderer import ReferenceRenderer, _pixels_per_cell
@@ -274,3 +276,18 @@ def test_compound_eyes_have_no_labels():
     scene = SimpleNamespace(eye=eye, mounts=(), model=None)
     with pytest.raises(ValueError, match=r"^depth, ids and flow: are defined on a flat retina"):
         Labels(scene, 1)
+
+
+@pytest.mark.parametrize("bands", range(1, 10))
+def test_weights_of_samples_are_read_in_fours(monkeypatch, bands):
+    given = []
+    for name in ("floats", "whole_numbers", "counted"):
+        monkeypatch.setattr(ray_kernel, name, lambda values: given.append(values) or values)
+    eyes = SimpleNamespace(directions=lambda ways, origins: (ways, origins))
+    kernel = RayKernel(SimpleNamespace(light="direct", inputs=None), eyes, 2, 3, None)
+    weights = RNG.random((7, bands))
+    found = kernel.inputs(np.zeros((7, 3)), None, SimpleNamespace(origins="origins", weights=weights)).weights
+    assert found.shape == (7, 4 * math.ceil(bands / 4))
+    np.testing.assert_array_equal(found[:, :bands], weights)
+    assert not found[:, bands:].any()
+    assert [7, 3, 2 * 3 * 7] in [list(one) for one in given if isinstance(one, list)]
