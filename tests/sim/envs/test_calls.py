@@ -226,3 +226,11 @@ def test_no_seeds_of_worlds_after_the_end():
     face.env.seed_worlds([1, 2])
     face.close()
     assert refused(RuntimeError, "seeds", face.env.seed_worlds, [1, 2]) == CLOSED
+
+
+def test_options_of_a_reset_are_refused():
+    face = made("Env")
+    face.env.reset(options={})
+    message = refused(ValueError, "options", lambda: face.env.reset(options={"seed": 3}))
+    assert message == "reset: options = {'seed': 3}: must be left out, reset has no options"
+    face.close()
