@@ -263,3 +263,30 @@ def test_workers_are_awaited(monkeypatch):
     found.require_worker()
     assert calls == ["check", "restore"] * 2
     assert times.slept == [0.05, 0.05]
+
+
+@pytest.mark.parametrize("state", ["answers", "lost", "slow", "raises"])
+def test_a_call_ends_with_its_answer_the_connection_or_its_time_limit(monkeypatch, state):
+    found, answer, checks = connection([Client("running")]), Future(), []
+    found._start = lambda call: answer
+
+    def wait(futures, timeout):
+        assert (futures, timeout) == ([answer], 0.5)
+        if len(checks) == 2 and state in ("answers", "raises"):
+            answer.set_result(7) if state == "answers" else answer.set_exception(OSError())
+        return SimpleNamespace(done={answer} if answer.done() else set())
+
+    def check():
+        checks.append(1)
+        if state == "lost" and len(checks) == 2:
+            found.client.status = "closed"
+
+    monkeypatch.setattr("concurrent.futures.wait", wait)
+    found.check = check
+    if state == "answers":
+        assert found.ask(None) == 7
+    else:
+        with pytest.raises(TimeoutError if state == "slow" else ConnectionLost):
+            found.ask(None, timeout=-1.0 if state == "slow" else 60.0)
+    assert len(checks) == (1 if state == "slow" else 2)
+    assert answer.done(), "a call without an answer is cancelled"

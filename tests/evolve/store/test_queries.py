@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from evolve.config.formats import OLDEST_CONTINUED
-from evolve.store import checksums, regular_files, versions
+from evolve.store import checksums, directory, regular_files, versions
 from evolve.store.candidate import Candidate
 from evolve.store.checksums import LISTED, harmed, list_checksums
 from evolve.store.directory import Run, RunError
@@ -248,3 +248,25 @@ def test_former_names_of_a_candidates_fields_still_work():
         assert candidate(0).mishaps == ()
     with pytest.warns(FutureWarning, match="the old name will be removed"):
         assert Candidate.of is not None
+
+
+def test_all_kinds_of_damage_are_in_one_line(run, monkeypatch):
+    assert run.notice is None
+    for name in ("lost", "config_change", "harmed"):
+        monkeypatch.setattr(directory, name, lambda *_, name=name: f"{name}!" if name != "lost" else None)
+    run.record.notice = "torn!"
+    assert run.notice == "torn!; config_change!; harmed!"
+
+
+def test_starts_of_a_run(tmp_path, monkeypatch):
+    """Commits are listed once, without unknown ones; a run comes from the animal of its first start."""
+    known = [{"commit": "b"}, {"commit": ""}, {}, {"commit": "a"}, {"commit": "b"}]
+    starts = [{"versions": one, **({"from": f"runs/a:{k}"} if k else {})} for k, one in enumerate(known)]
+    monkeypatch.setattr(versions, "_starts", lambda run: starts)
+    assert versions.commits(tmp_path) == ["b", "a"]
+    assert versions.origin(tmp_path) is None
+    assert versions.recorded(tmp_path) == {"commit": "b"}
+    starts.pop(0)
+    assert versions.origin(tmp_path) == "runs/a:1"
+    starts.clear()
+    assert (versions.commits(tmp_path), versions.origin(tmp_path), versions.recorded(tmp_path)) == ([], None, {})

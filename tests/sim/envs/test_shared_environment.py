@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import threadpoolctl
 
+from sim.envs import prepared_task
 from sim.envs.observation import Memory
 from sim.envs.one_environment import OneEnvironment
 from sim.envs.prepared_task import PreparedTask, _at_most
@@ -110,3 +111,19 @@ def test_a_prepared_task_in_another_mode_and_elsewhere():
     assert prepared.in_mode("test").task == "task in test"
     elsewhere = prepared.elsewhere("other")
     assert (elsewhere.task, elsewhere._scenes, prepared._scenes) == ("other", None, "scenes")
+
+
+def test_a_renderer_of_the_first_kind_of_eyes_of_the_first_agent(monkeypatch):
+    """The simulation may run the task with other eyes."""
+    asked = []
+
+    def renderers(*given):
+        asked.append(given)
+        return [SimpleNamespace(eyes={"a": "first", "b": "second"})]
+
+    monkeypatch.setattr(prepared_task, "renderers_for", renderers)
+    prepared = PreparedTask.__new__(PreparedTask)
+    prepared.task, prepared._scenes = SimpleNamespace(agents=lambda: ["one", "two"]), "scenes"
+    prepared.fidelities = ["fidelity of one", "fidelity of two"]
+    assert prepared.renderer("simulation") == "first"
+    assert asked == [("simulation", ["one"], ["fidelity of one"], "scenes")]
