@@ -1,4 +1,4 @@
-"""How a local executor takes the deaths of its workers, with stand-ins for processes."""
+"""Deaths of the workers of a local executor, with stand-ins for processes."""
 
 import os
 from collections import deque
