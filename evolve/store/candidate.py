@@ -172,9 +172,9 @@ class Candidate:
                 phenotype=Phenotype.from_json(record["phenotype"]),
                 fitness=-math.inf if record["fitness"] is None else real(record["fitness"], "fitness", _ANY),
                 returns=_reals(record, "returns", or_none=True, most=_MOST_RETURNS),
-                costs=_costs(record["costs"]),
+                costs=_not_negative(record["costs"], "costs"),
                 success_rate=_real_or_none(record["success_rate"], "success_rate", Interval(0, 1)),
-                seconds=real(record["seconds"], "seconds", Interval(0, 1e300)),
+                seconds=_not_negative(record["seconds"], "seconds"),
                 curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
                 failure=_text(record["failure"], "failure"),
                 policy=_checksum(record["policy"]),
@@ -213,10 +213,11 @@ _MOST_RETURNS = 10_000  # maximum number of evaluation episodes, see the setting
 _COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, "steps": 10**12, "rung": 9}
 
 
-def _costs(value: Any) -> float:
-    if (costs := real(value, "costs", _ANY)) < 0:
-        raise ValueError(f"costs = {costs}: must be 0 or more")
-    return costs
+def _not_negative(value: Any, name: str) -> float:
+    """Return a number of at least 0. The tolerance of `real` for rounding errors is too large for so wide a range."""
+    if (number := real(value, name, _ANY)) < 0:
+        raise ValueError(f"{name} = {number}: must be 0 or more")
+    return number
 
 
 def _reals(record: dict[str, Any], name: str, or_none: bool = False, most: int = _LONGEST) -> tuple[float, ...]:

@@ -27,7 +27,7 @@ from evolve.store.checksums import harmed
 from evolve.store.lock import LONGEST, RunLock
 from evolve.store.policies import lost
 from evolve.store.record import Record, RunError
-from evolve.store.regular_files import folder, opened, read, require_folder, require_regular
+from evolve.store.regular_files import folder, folders, opened, read, require_folder, require_regular
 from evolve.store.versions import CONFIG, config_change, record_start
 from evolve.store.versions import FILE as VERSIONS
 
@@ -65,7 +65,7 @@ class Run:
         """
         path = Path(path)
         try:
-            path.mkdir(parents=True, exist_ok=True)
+            folders(path)
             _require_no_run(path)  # checked first, because locking creates a file
             with RunLock(path):
                 _require_no_run(path)
@@ -115,7 +115,7 @@ class Run:
         path, tried = next_directory(config.task_name, preset), None
         while path != tried:  # a broken link seems to be free, but cannot be created: stop
             try:
-                path.mkdir(parents=True)  # fails if another process has created it
+                folders(path, exist_ok=False)  # fails if another process has created it
                 break
             except FileExistsError:
                 path, tried = next_directory(config.task_name, preset), path

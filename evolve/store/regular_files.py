@@ -6,6 +6,7 @@ through the link would overwrite that file. Opening a FIFO could block forever.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import stat
@@ -16,6 +17,7 @@ __all__ = [
     "StrangeFileError",
     "created",
     "folder",
+    "folders",
     "opened",
     "read",
     "require_folder",
@@ -98,6 +100,21 @@ def folder(path: Path) -> Path:
     path.mkdir(exist_ok=True)
     require_folder(path)
     return path
+
+
+def folders(path: Path, exist_ok: bool = True) -> None:
+    """Create a folder and its missing parents, so that their names survive a power failure.
+
+    exist_ok: False to refuse a path that exists
+
+    Raises:
+        OSError: a folder cannot be created, or the path exists and `exist_ok` is False.
+    """
+    missing = [place for place in (path, *path.parents) if not place.exists()]
+    path.mkdir(parents=True, exist_ok=exist_ok)
+    for place in missing:
+        with contextlib.suppress(PermissionError):  # a folder that may be written, but not read, cannot be synchronised
+            sync_folder(place.parent)
 
 
 def require_regular(path: Path) -> None:

@@ -8,11 +8,11 @@ null_model: test_null_model.py, test_priced_search.py
 same_search: test_same_search.py
 successive_halving: test_successive_halving.py
 job: test_local_executor.py, test_dask_executor.py
-local_executor: test_local_executor.py
-worker: test_local_executor.py
-dask_executor: test_dask_rounds.py, test_dask_executor.py, test_silent_cluster.py, test_dask_connection.py
+local_executor: test_worker_deaths.py, test_local_executor.py
+worker: test_worker.py, test_local_executor.py
+dask_executor: test_dask_rounds.py, test_dask_run.py, test_dask_executor.py, test_dask_connection.py
 dask_connection: test_dask_connection.py, test_silent_cluster.py
 signs_of_life: test_signs_of_life.py
 scheduler: test_scheduler.py, test_dask_connection.py, test_dask_executor.py
-dask_worker: test_dask_worker.py, test_dask_executor.py, learning/test_task_module.py
+dask_worker: test_dask_worker.py, test_dask_evaluation.py, test_dask_executor.py, learning/test_task_module.py
 """

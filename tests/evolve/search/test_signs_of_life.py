@@ -74,6 +74,9 @@ def test_workers_are_not_blamed_for_the_silence_of_the_scheduler():
     [
         ({}, "a worker (none is connected)"),
         ({"a": worker(1)}, "a heartbeat of worker a"),
+        ({name: worker(1) for name in "ab"}, "a heartbeat of workers a, b"),
+        ({name: worker(1) for name in "abc"}, "a heartbeat of workers a, b, c"),
+        ({name: worker(1) for name in "abcd"}, "a heartbeat of workers a, b, c and 1 more"),
         ({name: worker(1) for name in "abcde"}, "a heartbeat of workers a, b, c and 2 more"),
         ({"a": worker(1, "paused"), "b": worker(1)}, "a heartbeat of worker b"),
         (

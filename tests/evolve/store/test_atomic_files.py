@@ -72,3 +72,14 @@ def test_content_is_on_the_disk_before_the_name_and_the_name_before_anybody_is_t
     monkeypatch.setattr(Path, "replace", lambda path, target: (steps.append("name"), named(path, target)))
     write_whole(tmp_path / "file", b"whole")
     assert steps == ["5 bytes", "name", "folder"]
+
+
+def test_a_link_is_no_name_for_a_file(tmp_path):
+    """The content would replace the link, or change the file to which it leads."""
+    (tmp_path / "file").write_bytes(b"old")
+    (tmp_path / "link").symlink_to("file")
+    with pytest.raises(OSError, match="is a symbolic link: must be a regular file"):
+        write_whole(tmp_path / "link", b"new")
+    assert (tmp_path / "file").read_bytes() == b"old"
+    write_whole(tmp_path / "file", b"new")
+    assert (tmp_path / "file").read_bytes() == b"new"

@@ -12,6 +12,7 @@ import pytest
 from evolve.config.run_config import ConfigError
 from evolve.store.directory import Run, RunError, next_directory
 from evolve.store.lock import LockedError
+from evolve.store.regular_files import folders
 from evolve.store.versions import origin, record_start
 from tests.evolve.closed_form import tiny
 from tests.evolve.store.records import CONFIG, NOBODY, candidate
@@ -49,6 +50,40 @@ def test_file_in_the_way_and_unwritable_place_are_named(tmp_path):
     for path in (tmp_path / "file", tmp_path / "file" / "run", "/proc/run"):
         with pytest.raises(RunError, match="cannot be written: "):
             Run.create(path, CONFIG)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_the_names_of_new_directories_survive_a_power_failure(tmp_path, monkeypatch, given):
+    """The folders that contain them are synchronised before the first file is written."""
+    monkeypatch.chdir(tmp_path)
+    synced, sync = [], os.fsync
+
+    def fsync(descriptor):
+        synced.append(Path(os.readlink(f"/proc/self/fd/{descriptor}")))
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    run = Run.create(Path("runs/deep/run"), CONFIG) if given else Run.create_next(CONFIG, "quick")
+    containing = [*run.path.absolute().parents][: 3 if given else 2]
+    assert containing[-1] == tmp_path
+    assert synced[: len(containing)] == containing
+    synced.clear()
+    (tmp_path / "made").mkdir()
+    Run.create(tmp_path / "made", CONFIG)
+    assert tmp_path not in synced
+
+
+def test_a_folder_that_may_not_be_read_is_no_obstacle(tmp_path, monkeypatch):
+    """It cannot be synchronised."""
+
+    def refused(path):
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr("evolve.store.regular_files.sync_folder", refused)
+    folders(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+    with pytest.raises(FileExistsError):
+        folders(tmp_path / "a" / "b", exist_ok=False)
 
 
 def test_what_is_no_run_is_named(tmp_path):

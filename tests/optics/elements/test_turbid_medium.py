@@ -123,3 +123,10 @@ def test_air_and_perfect_lenses_do_not_change():
     assert optics.immersed(eye, None) is eye
     assert optics.immersed(eye, optics.fog(20)) is eye
     assert optics.immersed(perfect, WATER) is perfect
+
+
+def test_eyes_in_other_things_than_media_are_refused():
+    with pytest.raises(ValueError, match=r"^medium = 1\.33: must be .*optics\.sea_water\(1\), or None"):
+        optics.immersed(optics.Eye(), 1.33)
+    with pytest.raises(ValueError, match=r"^eye = 5: must be .*optics\.Eye\(\)"):
+        optics.immersed(5, None)

@@ -4,10 +4,10 @@ acuity: test_acuity.py
 band_choice: spectra/test_bands.py, test_sight_tolerance.py
 cell_integrals: test_cell_integrals.py
 eye: test_eye.py, test_kept_kernels.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
-eye_spec: test_eye.py, test_patches.py, test_axes.py, test_vertical_field.py
+eye_spec: test_eye.py, test_patches.py, test_axes.py, test_receptor_density.py, test_vertical_field.py
 geometry: test_patches.py, test_vertical_field.py
 immersion: elements/test_turbid_medium.py
-depth_range: test_occlusion.py, test_kernel_bank.py
+depth_range: test_depth_range.py, test_occlusion.py, test_kernel_bank.py
 kernel_bank: test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py, test_eye_robustness.py
 kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py, test_sight_tolerance.py
 layered_image: test_occlusion.py
@@ -19,7 +19,7 @@ receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py,
 guided_field: test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retina: test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
-retinal_image: test_retinal_image.py
+retinal_image: test_retinal_image.py, test_receptor_density.py
 sensor_pixels: test_torch.py
 camera: test_camera.py
 receptor_density: test_receptor_density.py

@@ -1,5 +1,6 @@
 """Receptors as waveguides: an eye with such receptors agrees with an ommatidium."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -8,6 +9,7 @@ import pytest
 
 import optics
 from optics import AccuracyError, Eye, Ommatidium, Pupil, Waveguide, snyder_acceptance
+from optics.eye import guided_field
 from optics.eye.guided_field import check_guide
 from optics.eye.receptive_field import beams_to, spot_of
 from optics.spectra.spectrum import daylight
@@ -214,3 +216,29 @@ def test_the_window_of_a_focused_guide_is_narrower_than_all_diffracted_light():
     near = replace(retina, distance=retina.distance / 2)
     half = spot_of(beams_to(LENS, near, math.inf, (0.0, 0.0)), near).half_of_rays
     assert half == pytest.approx(LENS.aperture_radius / 2, rel=0.2), "the cone of light at half the distance"
+
+
+@pytest.mark.parametrize(
+    ("shares", "windows"), [((0.995,), 1), ((0.98, 0.99), 2), ((0.5, 0.9, 0.999), 3), ((0.5,) * 9, 0)]
+)
+def test_a_window_is_widened_until_it_contains_the_light(monkeypatch, shares, windows):
+    """Each window is 1.5 times as wide as the one before, and at most as wide as the light and the waveguide."""
+    retina, waveguide = eye_of(Waveguide(1.4e-6), tolerance=1e-2)._retina(4), Waveguide(1.4e-6)
+    [beam] = beams_to(LENS, retina, math.inf, (0.0, 0.0))[:1]
+    spot = spot_of([beam], retina)
+    guide = guided_field.Guide(waveguide, FOCAL, 4)
+    rows = []
+
+    def accepted(beam, spot, guide, down, across):
+        rows.append(down.count)
+        return len(rows), shares[len(rows) - 1]
+
+    monkeypatch.setattr(guided_field, "_accepted", accepted)
+    assert guided_field._within(beam, spot, spot.pitch, retina, guide) == len(rows)
+    most = 2 * math.ceil((spot.half + guided_field._radius(waveguide, beam)) / retina.cell[0])
+    if windows:
+        assert len(rows) == windows
+    else:
+        assert rows[-1] == most > rows[-2]
+    for before, after in itertools.pairwise(rows):
+        assert after == most or abs(after - 1.5 * before) <= 3

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from optics import AccuracyError, Eye, MaskMap, Pupil
+from optics.eye import layered_image, occlusion
 from optics.eye.occlusion import visible_layers
 
 S, RADIUS, FOCAL, CELL, N = 2, 300e-6, 2e-3, 4e-6, 12
@@ -199,3 +200,26 @@ def test_bad_depth_maps(wrong):
         eye(0.1).see(np.ones((1, SIDE, SIDE)), S, z=z)
     with pytest.raises(ValueError, match=r"^z has shape \(3, 4\): must be one distance or one per cell"):
         eye(0.1).see(np.ones((1, SIDE, SIDE)), S, z=np.full((3, 4), 0.1))
+
+
+@pytest.mark.parametrize("far", [0.0, 0.3, 0.7, 2.5])
+def test_layers_follow_from_differences_of_inverse_distances(far):
+    """A layer begins at a multiple of the least difference from the farthest cell, wherever this cell is."""
+    steps = np.array([[0.0, 0.9, 1.1, 1.9, 2.1, 0.5]])
+    least = occlusion.LEAST_SHIFT
+    assert occlusion.MOST_LAYERS > 2.1
+    layers = list(visible_layers((far + steps) * least, 1.0))
+    own = [np.flatnonzero(layer.cells & (layer.source == np.arange(6))).tolist() for layer in layers]
+    assert own == [[4], [2, 3], [0, 1, 5]]
+
+
+@pytest.mark.parametrize(
+    ("hidden", "continued", "passing"), [(0.3, 0.0, 0.7), (0.3, 0.5, 0.4), (0.5, 0.5, 0), (0.6, 0.5, 0)]
+)
+def test_light_passes_the_part_of_the_pupil_that_is_not_covered(monkeypatch, hidden, continued, passing):
+    """Cells that hide nothing are dark, so that the rest of the pupil counts as the whole."""
+    cells = np.array([[True, continued > 0, False]])
+    layer = occlusion.Layer(np.arange(3), cells, np.array([[True, False, False]]))
+    monkeypatch.setattr(layered_image._Scene, "_coverage", lambda self, source, of: continued if of[0, 1] else hidden)
+    scene = layered_image._Scene.__new__(layered_image._Scene)
+    assert scene.passing(layer) == pytest.approx(passing)

@@ -16,15 +16,15 @@ modulation_transfer: test_modulation_transfer.py
 contrast: test_measures.py, test_measure_errors.py, test_modulation_transfer.py
 mixture: test_mixture.py
 pictures: test_pictures.py
-planner: test_planner.py
+planner: test_cost_formulas.py, test_planner.py
 population: test_population.py, test_population_members.py
 population_members: test_population_members.py
 psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
-request: test_request.py, test_psf.py
+request: test_cost_formulas.py, test_request.py, test_psf.py
 psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py
 through_focus: test_through_focus.py
 vector_focus: test_vector_focus.py, test_foci.py
-window_cost: test_window_cost.py, test_predicted_cost.py
+window_cost: test_cost_formulas.py, test_window_cost.py, test_predicted_cost.py
 white: test_white.py
 """

@@ -3,12 +3,16 @@ hold."""
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import drjit as dr
 import numpy as np
 import pytest
 
 import optics
+from optics.numerics.autodiff import number
+from optics.point_spread import strehl
+from optics.point_spread.window_loss import _fade
 from tests.optics.device_types import Float64
 from validation import reference
 from validation.optics.random_cases import draw_case
@@ -101,6 +105,16 @@ def test_a_window_without_the_peak_has_no_strehl_ratio():
     beside = focus(0.3e-6, 9, centre=(2e-6, 0.0))  # the first dark ring is at 1.3 µm
     with pytest.raises(optics.AccuracyError, match="needs a window that contains the peak"):
         optics.strehl_ratio(beside)
+
+
+@pytest.mark.parametrize("shape", [(5, 6), (6, 5)])
+def test_a_peak_at_the_rim_is_noticed_on_all_sides(shape):
+    rows, columns = np.indices(shape)
+    rim = (rows == 0) | (rows == shape[0] - 1) | (columns == 0) | (columns == shape[1] - 1)
+    for place in np.ndindex(shape):
+        image = np.zeros(shape)
+        image[place] = 1
+        assert strehl._at_rim(image) == rim[place]
 
 
 def test_the_higher_of_two_lobes_is_found_between_samples():
@@ -229,3 +243,54 @@ def test_rays_that_land_in_one_point_land_there():
     rays = seen.requests[0].problem.rays
     together = replace(rays, to_x=np.full(len(rays), 2e-6), to_y=np.full(len(rays), -1e-6))
     np.testing.assert_allclose(together.densest(), [(2e-6, -1e-6)] * 2, rtol=1e-12)
+
+
+@pytest.mark.parametrize("matrix", [[[2.0, 0.5], [0.5, 1.0]], [[1.0, -0.7], [-0.7, 3.0]], [[1.0, 0.0], [0.0, 1.0]]])
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.3, -0.4)])
+def test_the_vertex_of_a_paraboloid_is_exact(matrix, place):
+    """The intensity is 5 - (r - place)ᵀ B (r - place) / 2, with r in samples."""
+    rows, columns = np.indices((5, 6))
+    off = np.stack([columns - 2 - place[0], rows - 2 - place[1]])
+    image = 5 - np.einsum("iyx,ij,jyx->yx", off, np.array(matrix), off) / 2
+    result = SimpleNamespace(
+        tensor=image[None],
+        psf=image[None],
+        x=10 + np.arange(6) * 0.5,
+        y=20 + np.arange(5) * 0.5,
+        dx=0.5,
+        holds_cells=False,
+        cutoff=np.array([0.1]),
+        plan=SimpleNamespace(predicted_error=1e-3),
+    )
+    found = strehl._vertex(result, (2, 2))
+    assert number(found.value) == pytest.approx(5)
+    assert found.at == pytest.approx((11 + 0.5 * place[0], 21 + 0.5 * place[1]))
+    coarse = (2 * np.pi * 0.5 * 0.1) ** 4 / 170
+    around = np.linalg.norm(image) / image[2, 2]
+    assert found.error == pytest.approx(1e-3 * around + max(strehl.PARABOLOID_ERROR, coarse))
+
+
+@pytest.mark.parametrize(("n", "start"), [(200, 0.5), (201, 0.7)])
+def test_samples_fade_from_one_to_nothing(n, start):
+    """The fade is a squared cosine between the start and the side of the window."""
+    found = _fade(n, start)
+    away = np.abs(np.arange(n) - n // 2) / (n / 2)
+    assert (found[away <= start] == 1).all()
+    assert found[0] < 1e-3
+    middle = (1 + start) / 2
+    assert np.interp(middle, away[n // 2 :], found[n // 2 :]) == pytest.approx(0.5, abs=1e-3)
+    assert np.interp((3 * start + 1) / 4, away[n // 2 :], found[n // 2 :]) == pytest.approx(
+        np.cos(np.pi / 8) ** 2, abs=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("shares", "refused"), [((0.5, 0.5 + 9e-7), 0), ((0.5, 0.5 + 1.5e-6), 1), ((0.5, 0.25, 0.25), 1), ((1.0,), 1)]
+)
+def test_shares_of_wavelengths_sum_to_one(shares, refused):
+    result = optics.psf(LENS, [500e-9, 600e-9], FOCUS, dx=0.5e-6, shape=(9, 9))
+    if not refused:
+        assert result.mean(shares).wavelengths == pytest.approx([550e-9], rel=1e-5)
+        return
+    with pytest.raises(ValueError, match=r"^shares = .*: must be 2 numbers that sum to 1$"):
+        result.mean(shares)

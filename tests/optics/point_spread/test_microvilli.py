@@ -183,3 +183,12 @@ def test_signals_do_not_depend_on_samples():
 def test_bad_input_names_itself(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize(("name", "low", "high"), [("azimuth_deg", -360, 360), ("dichroic_ratio", 1, 1e12)])
+def test_limits_of_microvilli(name, low, high):
+    for value in (low, high):
+        assert getattr(optics.Microvilli(**{"azimuth_deg": 0.0, name: value}), name) == value
+    for value in (low - 0.5, high * 1.001):
+        with pytest.raises(ValueError, match=rf"^{name} = "):
+            optics.Microvilli(**{"azimuth_deg": 0.0, name: value})

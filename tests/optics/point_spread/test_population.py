@@ -12,6 +12,7 @@ from optics import Grid
 from optics.apertures.aperture import EDGE_REACH
 from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.interpolation import cubic_bsplines
+from optics.point_spread import population
 from optics.point_spread.population import (
     _sine,
     _splines_and_slopes,
@@ -187,3 +188,26 @@ def test_slopes_of_splines_are_their_differences():
     for k, slope in enumerate(slopes):
         ahead, behind = (cubic_bsplines((x + sign * step + 1) / 2)[k] for sign in (1, -1))
         np.testing.assert_allclose(slope, (ahead - behind) / (2 * step), atol=1e-8)
+
+
+@pytest.mark.parametrize("psfs", [1, 2, 5])
+def test_a_stack_is_no_larger_than_memory_allows(monkeypatch, psfs):
+    """Neither the samples of the pupils in a stack nor those of their windows exceed the limit."""
+    window, sizes, images = Grid.square(49, 0.5e-6), [], population._images
+
+    def counted(stack, samples, masks, window):
+        sizes.append((len(stack.members), samples.at.size**2))
+        return images(stack, samples, masks, window)
+
+    monkeypatch.setattr(population, "_images", counted)
+    pupils = members([next(eyes(1))] * 5)
+    whole = [image for _, image, _ in population_pictures(pupils, window, 1e-2)]
+    [(number, samples)] = sizes
+    assert number == 5
+    sizes.clear()
+    monkeypatch.setattr(population, "STACK", psfs * max(samples, 49 * 49) + 1)
+    found = [image for _, image, _ in population_pictures(pupils, window, 1e-2)]
+    assert [number for number, _ in sizes] == {1: [1] * 5, 2: [2, 2, 1], 5: [5]}[psfs]
+    np.testing.assert_allclose(found, whole, rtol=1e-5, atol=1e-6 * np.max(whole))
+    monkeypatch.setattr(population, "STACK", samples - 1)
+    assert list(population_pictures(pupils, window, 1e-2)) == []

@@ -220,3 +220,11 @@ def test_the_check_of_a_window_of_few_samples_may_take_a_larger_share_of_the_tim
     assert points(few, 0.01) == pytest.approx(points(few, 0.03) / 3, abs=1)
     assert points(many, 1e3) == effort.points
     assert points(3, 1e3) == 3
+
+
+@pytest.mark.parametrize(("brightness", "digits"), [(1.0, 0.0), (100.0, 0.0), (1e-4, 2.0), (0.01, 1.0), (0.1, 0.5)])
+def test_digits_by_which_a_window_is_darker_than_light_in_phase(brightness, digits):
+    beam = Beam(Pupil(5e-4), PointSource(), 550e-9, 2.5e-3)
+    task = Problem.from_beam(beam, Grid((3, 3), 1e-6), 1e-4, "float64")
+    in_phase = np.pi * 5e-4**2 / (550e-9 * 2.5e-3) ** 2
+    assert spot_check_module._darkness(beam, task, brightness * in_phase) == pytest.approx(digits, abs=1e-6)

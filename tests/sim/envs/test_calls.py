@@ -219,3 +219,18 @@ def test_finite_actions_of_any_size_and_type_are_limited(running):
                 seen = seen["Predator"]
             assert np.isfinite(seen["previous_action"]).all()
             assert seen["previous_action"].reshape(-1, N)[-1][0] == 1
+
+
+def test_no_seeds_of_worlds_after_the_end():
+    face = made("VecEnv")
+    face.env.seed_worlds([1, 2])
+    face.close()
+    assert refused(RuntimeError, "seeds", face.env.seed_worlds, [1, 2]) == CLOSED
+
+
+def test_options_of_a_reset_are_refused():
+    face = made("Env")
+    face.env.reset(options={})
+    message = refused(ValueError, "options", lambda: face.env.reset(options={"seed": 3}))
+    assert message == "reset: options = {'seed': 3}: must be left out, reset has no options"
+    face.close()

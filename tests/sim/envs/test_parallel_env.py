@@ -2,12 +2,14 @@
 
 import sys
 import warnings
+from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
 import pytest
 
 import sim
+from sim.envs.parallel_env import EncounterEnv
 from tests.sim.envs.hunt import Predator, Prey, hunt
 
 
@@ -119,3 +121,14 @@ def test_without_pettingzoo_one_line_says_what_to_install():
         pytest.raises(ImportError, match=r"^make_parallel_env needs PettingZoo: pip install 'rhabdom\[pettingzoo\]'$"),
     ):
         sim.make_parallel_env(hunt())
+
+
+@pytest.mark.parametrize(("mode", "expected"), [(None, None), ("rgb_array", "world"), ("eyes", ["prey", "hunter"])])
+def test_the_image_of_the_world_or_of_each_animal(mode, expected):
+    taken = {"rgb_array": ["world"], "eyes": ["prey", "hunter"]}
+    env = SimpleNamespace(
+        render_mode=mode,
+        _calls=SimpleNamespace(require_begun=lambda: None),
+        _pictures=SimpleNamespace(taken=lambda: taken[mode]),
+    )
+    assert EncounterEnv.render(env) == expected

@@ -133,3 +133,21 @@ def test_built_in_worlds_are_seen_at_edges_in_closed_form(traced):
     # Missed edges stay within the tolerance; the error of the first rays alone is ten times as large in some receptor.
     assert np.abs(found - right).max() < 0.005
     assert np.abs(coarse - right).max() > 0.05
+
+
+@pytest.mark.parametrize("place", [(1, 2), (0, 0), (3, 4)])
+@pytest.mark.parametrize("excess", [1.01, 0.99])
+def test_all_eight_neighbours_of_a_different_receptor_are_rendered_again(place, excess):
+    """Squares beyond the rim also have neighbours. Light counts as different from four times the noticed spread."""
+    beyond = np.ones((6, 7), bool)
+    beyond[1:-1, 1:-1] = False
+    rays = EdgeRays.__new__(EdgeRays)
+    rays._signals, rays._beyond, rays._noticed = [[0.5, 0.25]], beyond, 0.1
+    field = np.zeros((4, 5))
+    field[place] = excess * FIRST * 0.1
+    light = np.zeros((2, 1, beyond.size))  # receptors come first, and squares beyond the rim after them
+    light[0, 0, : field.size] = FIRST * field.ravel() / 0.75
+    light[1] = light[0]
+    rows, columns = np.indices((4, 5))
+    near = np.maximum(abs(rows - place[0]), abs(columns - place[1])) <= 1
+    np.testing.assert_array_equal(rays._beside_edges(light).reshape(4, 5), near if excess > 1 else np.zeros((4, 5)))

@@ -11,7 +11,7 @@ import sim
 from sim.eyes.depth_layers import ONE_PSF
 from sim.render import fidelity_stages
 from sim.render.fidelity import Level
-from sim.render.fidelity_choice import Samples, cheapest
+from sim.render.fidelity_choice import Samples, Shares, cheapest
 
 EYE = sim.Eyes(n_eyes=1, resolution=(5, 5)).eye()
 ALLOWED = 0.01
@@ -77,3 +77,13 @@ def test_one_psf_is_chosen_if_its_error_equals_the_allowed_one():
     assert bound > 0
     depth, level = fidelity_stages.depth(Distances(), eyes.eye(), bound)
     assert (depth, level.predicted_error) == (ONE_PSF, bound)
+
+
+@pytest.mark.parametrize("has_layers", [True, False])
+@pytest.mark.parametrize("light", [0.0, 0.1, 0.5])
+def test_samples_may_use_the_rest_of_the_allowed_error(has_layers, light):
+    """Squares of errors add up; omitted light counts with its error, but at most with its share."""
+    found = Shares(bands=0.3, depth=0.4, light=0.5).left(0.5, has_layers, light)
+    spent = 0.09 + 0.16 * has_layers
+    assert found.without_light == pytest.approx(0.5 * np.sqrt(1 - spent))
+    assert found.error == pytest.approx(0.5 * np.sqrt(1 - spent - min(2 * light, 0.5) ** 2))

@@ -1,5 +1,7 @@
 """Trials of sampling methods: the populations, the directions of random views, and the light of illuminated bodies."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -78,3 +80,57 @@ def test_rays_hit_a_ball_if_they_pass_its_centre_within_its_radius_and_in_front(
         expected |= (passes < radius) & (np.sum(ways * towards, axis=-1) > 0)
     assert 0.02 < expected.mean() < 0.5
     np.testing.assert_array_equal(on_objects(views, origins, ways, radii), expected)
+
+
+class Counted:
+    """A population of signals whose error is that of the number of rays, and which counts its trials."""
+
+    views = "views"
+
+    def __init__(self, receptors):
+        self.receptors = receptors
+
+    def rms(self, difference):
+        return float(np.abs(difference).max())
+
+
+@pytest.mark.parametrize(
+    ("pupil", "bands", "references"),
+    [
+        (None, 4, {1: 16, 2: 16, 3: 64, 300: 4096, 1e5: 4**9}),
+        ("pupil", 4, {1: 256, 20: 256, 40: 1024, 1e5: 4**9}),
+        (None, 2**20, {1: 4, 3: 16}),
+    ],
+)
+def test_references_have_several_times_as_many_rays_and_are_computed_once(pupil, bands, references):
+    """Their number is a power of four. It is at least 8 times that of the trial (behind a pupil, at least 4096 rays),
+    but needs no more than 2^23 weights unless it would be less than twice that of the trial."""
+    trials, asked = FidelityTrials.__new__(FidelityTrials), []
+    trials._eye = SimpleNamespace(pupil=pupil, bands=bands)
+    trials._eyes, trials._receptors = SimpleNamespace(resolution=(4, 5)), np.arange(3)
+    populations = [Counted(np.arange(3)), Counted(np.arange(2))]
+    trials._populations = lambda sampling: populations
+
+    def trial(rays, receptors):
+        asked.append((rays, len(receptors)))
+        return SimpleNamespace(directions=np.zeros((7, 3)), rays=rays, receptors=len(receptors))
+
+    sizes = []
+
+    def signals(one, depth, light, views, size=None):
+        assert (depth, light, views) == (sampling.depth, "bounce", "views")
+        sizes.append(size)
+        return np.full(5, one.receptors / one.rays)
+
+    trials._signals = signals
+    sampling = SimpleNamespace(depth=SimpleNamespace(count=2), trial=trial)
+    error = trials.errors(sampling, "bounce")
+    known = set()
+    for rays, reference in references.items():
+        assert error(rays) == pytest.approx(3 * abs(1 / rays - 1 / reference))
+        expected = [] if reference in known else [(reference, 3), (reference, 2)]
+        known.add(reference)
+        assert asked == [*expected, (rays, 3), (rays, 2)]
+        assert sizes == [None] * len(expected) + [35, 35]
+        asked.clear()
+        sizes.clear()
