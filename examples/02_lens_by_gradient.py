@@ -24,7 +24,7 @@ UNIT = 1e-6  # the optimiser works in µm
 
 
 def gathered(points: np.ndarray, spot: float) -> tuple[float, np.ndarray]:
-    """Negative log of the light within a Gaussian spot, and its gradient over the control points [per µm]."""
+    """Return the negative logarithm of the light within a Gaussian spot, and its gradient [1/µm] by control point."""
     import drjit as dr
     from drjit.llvm.ad import Float64, TensorXf64
 
@@ -56,7 +56,7 @@ def strehl(control_points: np.ndarray) -> float:
 
 
 def paraboloid() -> np.ndarray:
-    """Control points of the thin lens of the same focal length: curvature 1 / ((n - 1) f)."""
+    """Return the control points of a thin lens of the same focal length, whose curvature is 1 / ((n - 1) f)."""
     return optics.BSplineRelief.paraboloid(0.0, 1 / ((INDEX - 1) * FOCAL_LENGTH), RADIUS).control_points
 
 

@@ -15,16 +15,17 @@ WORLD = """
 <mujoco>
   <visual><headlight active="0"/></visual>
   <asset>
+    <texture name="sky" type="skybox" builtin="gradient" width="64" height="384" rgb1=".25 .45 .8" rgb2=".8 .85 .9"/>
     <texture name="tiles" type="2d" builtin="checker" width="64" height="64" rgb1=".75 .7 .6" rgb2=".35 .4 .35"/>
     <material name="tiles" texture="tiles" texrepeat="1 1" texuniform="true"/>
   </asset>
   <worldbody>
     <light type="directional" dir=".5 .4 -1" diffuse=".9 .9 .9"/>
     <geom type="plane" size="12 12 .1" material="tiles"/>
-    <geom type="cylinder" size=".25 1" pos="3 1.6 1" rgba=".9 .2 .1 1"/>
-    <geom type="cylinder" size=".25 1" pos="3 -.6 1" rgba=".1 .3 .9 1"/>
-    <geom type="box" size=".6 .3 .4" pos="1 3 .4" rgba=".9 .8 .2 1"/>
-    <geom type="sphere" size=".4" pos=".5 -2 .4" rgba=".2 .7 .3 1"/>
+    <geom type="cylinder" size=".25 1" pos="2 1.2 1" rgba=".9 .2 .1 1"/>
+    <geom type="cylinder" size=".25 1" pos="2 -.8 1" rgba=".1 .3 .9 1"/>
+    <geom type="box" size=".6 .3 .5" pos=".6 2 .5" rgba=".9 .8 .2 1"/>
+    <geom type="sphere" size=".5" pos=".5 -1.8 .5" rgba=".2 .7 .3 1"/>
     <body name="robot" pos="0 0 .15">
       <joint name="turn" axis="0 0 1"/>
       <geom type="ellipsoid" size=".3 .15 .1"/>
@@ -37,7 +38,7 @@ WORLD = """
 
 
 def fly_eyes(rings: int = 15, interommatidial_deg: float = 5.0) -> sim.CompoundEye:
-    """The left eye and its mirror image, with an acute zone within 30 degrees of straight ahead."""
+    """Return the left eye and its mirror image, with an acute zone within 30 degrees of straight ahead."""
     directions = sim.hexagonal_patch(rings, interommatidial_deg, azimuth_deg=70.0, elevation_deg=0.0)
     rhabdom = optics.Waveguide(1.9e-6)
     normal = optics.Ommatidium(optics.FacetLens(16e-6, radius_front=12e-6), rhabdom)
@@ -53,10 +54,10 @@ class Fly(sim.Task):
     model = WORLD
     eye = fly_eyes()
     mounts = (sim.Mount("robot", offset=(0.3, 0, 0.1)),)
-    fidelity = sim.Fidelity(16, bands=4)
+    fidelity = sim.Fidelity(16, bands=4, light="bounce")
 
     def rewards(self, data):
-        """No reward: this task only shows the eyes."""
+        """Return no terms, because this task only shows the eyes."""
         return {"none": 0.0}
 
 

@@ -1,8 +1,8 @@
 """A phase plate by gradient descent in PyTorch: the same image quality at three distances and three wavelengths.
 
 A lens is in focus at one distance of the sensor. The script optimises a plate in front of the lens, a map of 12 x 12
-heights. The share of the light on the middle 3 x 3 pixels becomes as equal and as large as possible at three distances.
-Each call of `optics.torch.psf` returns all nine PSFs, integrated over the pixels.
+heights. The aim is a share of the light on the middle 3 x 3 pixels that is large and equal at three distances. Each
+call of `optics.torch.psf` returns all nine PSFs, integrated over the pixels.
 
     python examples/07_three_distances_in_torch.py
 """
@@ -21,7 +21,7 @@ STEPS = 25
 
 
 def shares(heights_um: torch.Tensor) -> torch.Tensor:
-    """Share of the light on the middle 3 x 3 pixels, (distance, wavelength)."""
+    """Return the share of the light on the middle 3 x 3 pixels, (distance, wavelength)."""
     plate = optics.Pupil(RADIUS, optics.HeightMap(heights_um * 1e-6), thin_lens_focal_length=FOCAL_LENGTH)
     view = {"dx": PIXEL, "shape": (9, 9), "tolerance": 1e-2, "pixel_means": True}
     images = psf(plate, WAVELENGTHS, DISTANCES, **view)

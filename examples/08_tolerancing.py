@@ -23,7 +23,7 @@ PITCH, SIDE = 5e-6, 96
 
 
 def back_focal_length() -> float:
-    """Distance [m] of the image of a distant point behind the last lens, by paraxial ray tracing."""
+    """Return the distance [m] from the last lens to the image of a distant point, by paraxial ray tracing."""
     height, slope = 1.0, 0.0
     for f, spacing in zip(FOCAL_LENGTHS, (*SPACINGS, 0.0), strict=True):
         slope -= height / f
@@ -32,7 +32,7 @@ def back_focal_length() -> float:
 
 
 def system(decentres: np.ndarray, tilts: np.ndarray, spacings: np.ndarray) -> list:
-    """The lens with the given errors of its three elements, (3, 2) [m], (3, 2) [rad] and (3,) [m]."""
+    """Return the lens with the given errors of its three elements, (3, 2) [m], (3, 2) [rad] and (3,) [m]."""
     distances = (*SPACINGS, back_focal_length())
     elements: list = []
     for f, distance, decentre, tilt, error in zip(FOCAL_LENGTHS, distances, decentres, tilts, spacings, strict=True):
@@ -42,7 +42,7 @@ def system(decentres: np.ndarray, tilts: np.ndarray, spacings: np.ndarray) -> li
 
 
 def peak(elements: list, tolerance: float = 2e-2) -> float:
-    """Largest intensity of the image, for light of unit amplitude from a distant point on the axis.
+    """Return the largest intensity of the image, for light of unit amplitude from a distant point on the axis.
 
     The largest tilts at scale 2 cause an error of 1 %, so that a smaller tolerance would be refused.
     """
@@ -53,7 +53,7 @@ def peak(elements: list, tolerance: float = 2e-2) -> float:
 
 
 def ratios(scale: float, trials: int) -> np.ndarray:
-    """Ratios of random lenses to the nominal one. Each scale has the same random numbers."""
+    """Return the peaks of random lenses relative to the nominal lens. Each scale has the same random numbers."""
     rng = np.random.default_rng(0)
     nominal = peak(system(np.zeros((3, 2)), np.zeros((3, 2)), np.zeros(3)))
     found = [
@@ -71,7 +71,9 @@ def ratios(scale: float, trials: int) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--trials", type=int, default=10, help="random lenses for each scale of the tolerances")
+    parser.add_argument(
+        "--trials", type=int, default=10, help="number of random lenses for each scale"
+    )
     parser.add_argument("--out", help="save the yield curves to this file")
     arguments = parser.parse_args()
     start, curves = time.process_time(), {}

@@ -27,7 +27,7 @@ NEAR = 1.0  # [m] from the ball's centre: the ant's feet touch it
 
 
 def ant_and_ball(seen: bool = True) -> mujoco.MjSpec:
-    """Gymnasium's ant with position-controlled joints, on a plain floor, and a ball."""
+    """Return Gymnasium's ant with position-controlled joints, on a plain floor, and a ball."""
     spec = mujoco.MjSpec.from_file(str(ANT))
     spec.nuserdata, spec.option.timestep = 2, 0.02
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -91,7 +91,7 @@ class AntSeeks(sim.Task):
         return self.terminated(data)
 
     def apart(self, data):
-        """Distance to the ball [m]."""
+        """Return the distance to the ball [m]."""
         return float(np.linalg.norm(data.mocap_pos[0, :2] - data.qpos[:2]))
 
 
@@ -102,7 +102,7 @@ class Blindfold(AntSeeks):
 
 
 def walk(speed: float, turn: float, seconds: float = 6.0) -> tuple[float, float]:
-    """Speed [m/s] and turning rate [rad/s] of an ant with a constant action."""
+    """Return the speed [m/s] and turning rate [rad/s] of an ant with a constant action."""
     task = AntSeeks()
     model = task.model.compile()
     data, headings = mujoco.MjData(model), []

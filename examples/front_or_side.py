@@ -66,7 +66,9 @@ class Predator(sim.Task):
 
 
 def chase(observation):
-    """Turn towards blue areas: towards their mean position, left positive, over the half width of the field."""
+    """Return the turning rate towards blue areas: their mean position (left is positive) over the field's half
+    width.
+    """
     red, _, blue = np.moveaxis(observation["eyes"][:, -1, 0, :, 0], 1, 0)
     prey = np.clip(blue - red - 0.05, 0, None)
     leftwards = np.linspace(1, -1, prey.shape[1])
@@ -120,7 +122,7 @@ def from_predator(data):
 
 
 def always_ahead(episodes=256):
-    """Mean return with its standard error, and share that is not caught, of prey that always runs ahead."""
+    """Return the mean return, its standard error and the share not caught, for prey that always runs ahead."""
     worlds = sim.make_vec_env(seeing(Prey()), n_envs=episodes, seed=0)
     worlds.reset()
     returns, alive = np.full(episodes, np.nan), np.zeros(episodes)
@@ -139,7 +141,7 @@ def seeing(task):
 
 
 def lived(world, placement_range_deg, seed):
-    """Results, as in `always_ahead`, of prey trained as in a run, with this angle between its eyes."""
+    """Return the same results as `always_ahead` for prey that is trained with this angle between its eyes."""
     from rhabdom import evolve
     from rhabdom.evolve.config.assemble import assemble
     from rhabdom.evolve.learning.fitness import evaluate

@@ -53,7 +53,7 @@ SETTINGS = (
 # degrees high.
 CONTROL_WIDTHS, CONTROL_BRAIN, CONTROL_SEEDS = (4, 8), 64, range(1)
 IN_VAIN = {"navigation": "one row: finer eyes are lower"}
-GAIN = 0.5  # finer eyes count as better below this share of the coarsest eyes' error (a choice)
+GAIN = 0.5  # choice: finer eyes count as better if their error is below this share of the coarsest eyes' error
 SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # brains from small to large
 D = TypeVar("D", bound=Design)
 Errors = dict[tuple[int, int], float]  # by width and brain

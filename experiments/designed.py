@@ -87,8 +87,10 @@ class Design:
 class Trained(Design):
     """A design and the result of its training run.
 
-    fitness, success_rate: means over evaluation episodes · episodes: number of these episodes
-    steps: number of training steps · seconds: wall time of the worker
+    fitness, success_rate: means over evaluation episodes
+    episodes: number of these episodes
+    steps: number of training steps
+    seconds: wall time of the worker
     held_out, held_out_success_rate: means over episodes in the test set of layouts
     held_out_episodes: number of these episodes; 0: none were played
     """
@@ -198,7 +200,10 @@ def crossed(
 class Experiment:
     """A designed experiment.
 
-    name: name of page and data · text: help text · designs: all training runs · settings: settings of all of them
+    name: name of page and data
+    text: help text
+    designs: all training runs
+    settings: settings of all training runs
     page: function of the stored rows, their origin and the written answer
     tested: whether each trained animal also plays in the test set of layouts
     """

@@ -26,7 +26,8 @@ class Drift:
     The quantity is averaged over the candidates of the generation. The end of a phase has an additional row, in which
     the quantity is averaged over the last LAST generations.
 
-    median: median over the searches · low, high: ends of the range that contains 95 % of the searches
+    median: median over the searches
+    low, high: ends of the range that contains 95 % of the searches
     ends: results of all searches, separated by spaces, only in the additional rows
     """
 

@@ -26,14 +26,14 @@ TASKS = ("maze", "detection")
 SIGMA = 0.01  # standard deviation of a receptor's noise
 FOV_DEG = 45.0
 # Settings of the learner, the same in all tasks. The cost of contact rises and the learning rate falls within the
-# 151,552 training steps. Of three settings that were tried with one training run per animal, these gave the highest
-# fitness in the tasks and animals together.
+# 151,552 training steps. Three settings were tried with one training run per animal. These gave the highest fitness
+# over all tasks and animals.
 LEARNER = (
     *("learning.total_steps=150000", "learning.eval_interval=50000", "learning.gamma=0.95", "learning.n_epochs=8"),
     *("learning.first_speed=0.25", "learning.contact_ramp=75000", "learning.decay_after=75000"),
     "learning.least_return=0",
 )
-LAYOUTS = "world.layouts=family world.family_seed={seed}"  # of navigators; each training run has its own family
+LAYOUTS = "world.layouts=family world.family_seed={seed}"  # layouts of navigators; each training run has its own family
 RUNS = 8  # training runs of each animal in each task
 # Factors and their two levels: number of eyes, receptors across, angle over which eyes are spread, height of eyes.
 FACTORS = {
@@ -72,7 +72,7 @@ def controls() -> tuple[Control, ...]:
         Control("both over 45°", coarse, CAMERA),
         Control("both over 135°", COMPOUND, fine),
         Control("30 features in total", replace(COMPOUND, features=3), replace(CAMERA, features=15)),
-        Control("160 features in total", replace(COMPOUND, features=16), replace(CAMERA, features=80)),
+        Control("160 features in total", COMPOUND, replace(CAMERA, features=80)),  # ten eyes have 16 features each
         Control("one encoder for all eyes", *_both("wiring.shared_encoder=true")),
         Control("fine eyes blurred to 4 x 4, same inputs", COMPOUND, replace(CAMERA, own=blurred)),
         Control("fine eyes pooled to 4 x 4 inputs", COMPOUND, replace(CAMERA, own="wiring.pool_side=4")),

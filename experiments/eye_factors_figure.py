@@ -27,7 +27,8 @@ def draw(
 ) -> None:
     """Draw effects and comparisons.
 
-    found: effects by task · names: effects from top to bottom, with their labels
+    found: effects by task
+    names: effects from top to bottom, with their labels
     compared: controls from top to bottom, with the advantage of many coarse eyes by task, in standard deviations
     """
     tall = 1.6 + 0.36 * max(len(names), len(compared))

@@ -28,7 +28,7 @@ class Effects:
     of: effect of each set of one or two factors: the mean at the high level minus the mean at the low level; for two
         factors, half the difference of the first factor's effect between the second factor's levels
     spread: residual standard deviation, in units of the response
-    freedom: its degrees of freedom
+    freedom: degrees of freedom of the residual
     """
 
     of: Mapping[tuple[str, ...], Interval]
@@ -39,7 +39,8 @@ class Effects:
 def effects(levels: Mapping[str, Sequence[int]], blocks: Sequence[int], response: Floats) -> Effects:
     """Return the effects of the factors on the response.
 
-    levels: -1 or +1 for each run, by the name of the factor · blocks: block of each run, whose mean is removed
+    levels: -1 or +1 for each run, by the name of the factor
+    blocks: block of each run, whose mean is removed
     response: result of each run
 
     Interactions of three and more factors are fitted, so that they do not enter the residual, but are not returned.

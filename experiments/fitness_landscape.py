@@ -41,8 +41,10 @@ class Landscape:
     The first exponential is a factor for light, which is low for pupils with a small relative aperture a. The second is
     a factor for sharpness.
 
-    low: fitness without any useful signal · high: additional fitness with the sharpest and brightest image
-    aperture, light: scale and exponent of the factor for light · width, fall: scale and exponent of the blur
+    low: fitness without any useful signal
+    high: additional fitness with the sharpest and brightest image
+    aperture, light: scale and exponent of the factor for light
+    width, fall: scale and exponent of the factor for sharpness
     misfit: root mean square deviation of training runs from the surrogate, in units of SPREAD
     """
 

@@ -65,7 +65,9 @@ class Searched:
     """End of a search, summarised over the animals of its last generations.
 
     closed: mean relative aperture in the last generations before glass may change
-    aperture: mean relative aperture · power, blur: medians · fitness: mean expected fitness
+    aperture: mean relative aperture
+    power, blur: medians
+    fitness: mean expected fitness
     strehl: Strehl ratio of the animal with the median blur in the last generation
     """
 
@@ -138,7 +140,8 @@ class Check:
 class Told:
     """Contents of the page.
 
-    lives: training runs to which the surrogate was fitted · check: comparison with other training runs
+    lives: training runs to which the surrogate was fitted
+    check: comparison with other training runs
     """
 
     rows: Sequence[Searched]

@@ -26,7 +26,8 @@ TEMPLATES = Path(__file__).parent / "pages"
 class Figure:
     """A figure of a page.
 
-    name: name of its file without ".png" · draw: function that writes the file
+    name: name of its file without ".png"
+    draw: function that writes the file
     """
 
     name: str

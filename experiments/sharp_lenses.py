@@ -40,7 +40,8 @@ COLOR = "#0072B2"
 class Lens:
     """Quality of a lens.
 
-    strehl: Strehl ratio in white daylight · contrast: contrast above the noise, see experiments.best_pupil
+    strehl: Strehl ratio in white daylight
+    contrast: contrast above the noise, see experiments.best_pupil
     """
 
     strehl: float

@@ -12,6 +12,7 @@ import sys
 import tomllib
 from contextlib import redirect_stdout
 from functools import lru_cache
+from importlib import metadata
 from pathlib import Path
 from unittest import mock
 
@@ -110,13 +111,32 @@ AS_A_NOTEBOOK = DOCS / "tutorial" / "python.md"  # executed in tests/evolve/inte
 SESSIONS = [page for page in DOCUMENTS if CODE.search(page.read_text()) and page != AS_A_NOTEBOOK]
 
 
+def code_of(page):
+    return "".join(code for code, _ in CODE.findall(page.read_text()))
+
+
+# Pages whose code needs only optics and three packages. Their sessions can import no other package, except dependencies
+# of the three.
+MORE = re.compile(r"^ *(?:from rhabdom.*(?:sim|evolve)|(?:import|from) (?:torch|colour|matplotlib)\b)", re.MULTILINE)
+OPTICS_ALONE = [page for page in SESSIONS if not MORE.search(code_of(page))]
+OTHERS = sorted(set(metadata.packages_distributions()) - {"numpy", "scipy", "drjit", "optics", "rhabdom"})
+REFUSE = f"""
+import sys
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {OTHERS!r}:
+            raise ModuleNotFoundError(f"refused: {{name}}", name=name)
+sys.meta_path.insert(0, Refuse())
+"""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("document", SESSIONS, ids=name)
 def test_code_runs_and_prints_what_is_shown(document, tmp_path):
     """All code blocks of a page run in one session."""
     blocks = CODE.findall(document.read_text())
     session = "".join(f"{code}\nprint({END!r}, flush=True)\n" for code, _ in blocks)
-    child = run("-c", session, cwd=tmp_path)
+    child = run("-c", REFUSE + session if document in OPTICS_ALONE else session, cwd=tmp_path)
     assert child.returncode == 0, child.stderr
     for (code, shown), printed in zip(blocks, child.stdout.split(f"{END}\n"), strict=False):
         assert not shown or agrees(shown, printed), f"{code}\nprints\n{printed}\ninstead of\n{shown}"
@@ -130,6 +150,13 @@ def agrees(shown, printed):
     return same_words and all(math.isclose(float(a), float(b), rel_tol=0.05, abs_tol=2e-5) for a, b in pairs)
 
 
+def test_pages_about_optics_run_on_three_packages():
+    assert len(OPTICS_ALONE) > 10
+    assert DOCS / "tutorial" / "optics.md" in OPTICS_ALONE
+    assert "matplotlib" in OTHERS
+    assert "refused: torch" in run("-c", f"{REFUSE}import torch").stderr
+
+
 def test_outputs_that_differ_are_noticed():
     assert agrees("error 2.9e-06 of 12", "error 3.8e-06 of 12.1\n")
     assert not agrees("error 0.12", "error 0.13")
@@ -139,7 +166,7 @@ def test_outputs_that_differ_are_noticed():
 
 def test_code_imports_the_packages_from_rhabdom():
     """`import optics` imports another project's package if it comes first on Python's path."""
-    pages = {name(page): "".join(code for code, _ in CODE.findall(page.read_text())) for page in DOCUMENTS}
+    pages = {name(page): code_of(page) for page in DOCUMENTS}
     pages |= {name(path): path.read_text() for path in (ROOT / "examples").glob("*.py")}
     direct = re.compile(r"^ *(?:import|from) (?:optics|sim|evolve)\b.*", re.MULTILINE)
     assert {page: direct.findall(code) for page, code in pages.items() if direct.search(code)} == {}

@@ -63,13 +63,13 @@ EVOLUTION = (
 
 
 def episodes(task: str, mode: str, worlds: int) -> str:
-    """Hash of all observations, rewards and infos of 300 random actions, through a perfect lens."""
+    """Return the hash of all observations, rewards and infos of 300 random actions, through a perfect lens."""
     venv = sim.make_vec_env(task, sim.Eyes(n_eyes=2, resolution=(3, 5)), worlds, seed=5, mode=mode, memory=2)
     return _played(venv, STEPS)
 
 
 def user_episodes(task: str, worlds: int) -> str:
-    """Hash of observations, rewards and infos of random actions in a user task from `examples/`."""
+    """Return the hash of observations, rewards and infos of random actions in a user task from `examples/`."""
     return _played(sim.make_vec_env(_example(task)(), n_envs=worlds, seed=5, memory=2), USER_STEPS)
 
 
@@ -87,7 +87,7 @@ def _played(venv: Any, steps: int) -> str:
 
 
 def encounter() -> str:
-    """Episodes of prey and predator, both with random actions, as a PettingZoo environment."""
+    """Return episodes of prey and predator, both with random actions, as a PettingZoo environment."""
     prey, predator = (_example(name, "front_or_side") for name in ("Prey", "Predator"))
     hunter = type("Hunter", (predator,), {"rewards": lambda self, data: {"near": -abs(data.qpos[2] - data.qpos[0])}})
     solitary = type("Prey", (prey,), {"others": ()})
@@ -115,7 +115,7 @@ def _example(name: str, file: str | None = None) -> Any:
 
 
 def blurred_view() -> str:
-    """Hash of the agents' signals behind a pupil with a relief, in dim light."""
+    """Return the hash of the agents' signals behind a pupil with a relief, in dim light."""
     relief = optics.BSplineRelief(np.linspace(0, 4e-6, 16).reshape(4, 4))
     pupil = optics.Pupil(40e-6, height=relief, n=1.6)
     budget = optics.PhotonBudget(illuminance=200.0, integration_time=0.02)
@@ -183,7 +183,7 @@ def _frames(run: Path, task: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _numbers(page: str) -> list[str]:
-    """Standalone numbers in the visible text of a page, without those in words, paths or dates."""
+    """Return the standalone numbers in the visible text of a page, without those in words, paths or dates."""
     visible = re.sub(r"<[^>]+>", " ", re.sub(r"<(script|style)\b.*?</\1>", "", page, flags=re.DOTALL))
     return [word for word in visible.split() if re.fullmatch(r"[-−]?\d[\d.,]*%?", word)]
 

@@ -44,7 +44,8 @@ class Episode:
     action: in [-1, 1], (t, number)
     reward: reward of each action, (t,)
     reward_terms: terms of the reward by name, (t,) each; 0 in steps in which the task did not return the term
-    counted: for some terms, the title of the number of steps in which they are not 0; see `sim.BatchTask`
+    counted: titles of table rows, by term: a row shows the number of steps in which the term is not 0; see
+    `sim.BatchTask`
     beside: other entries of the observation by name, (t, number) each, such as "contact" or "feels"
     seconds: duration of one action [s]
     solved: True if the episode counts as solved

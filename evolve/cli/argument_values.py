@@ -1,13 +1,14 @@
-"""Values of arguments: whole numbers within a range."""
+"""Values of arguments, which are whole numbers within a range, and error messages in one line."""
 
 from __future__ import annotations
 
 import argparse
 
-__all__ = ["every", "searches", "seed"]
+__all__ = ["every", "one_line", "searches", "seed"]
 
 MOST_SEARCHES = 100_000  # as in evolve.report.gene_drift, whose import takes seconds
 MOST_EVERY = 1_000_000  # as in evolve.analysis.recorder
+LONGEST_MESSAGE = 1800  # maximum number of characters of an error message
 LONGEST = 4000  # maximum number of digits; Python converts at most 4,300
 
 
@@ -30,3 +31,9 @@ def searches(text: str) -> int:
     if not text.isdecimal() or len(text) > LONGEST or not 2 <= int(text) <= MOST_SEARCHES:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 2 to {MOST_SEARCHES:,}")
     return int(text)
+
+
+def one_line(text: str) -> str:
+    """Return a message without line breaks. The middle of a long message is omitted."""
+    text, half = " ".join(text.split()), LONGEST_MESSAGE // 2
+    return text if len(text) <= LONGEST_MESSAGE else f"{text[:half]} [...] {text[-half:]}"

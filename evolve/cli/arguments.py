@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
-from evolve.cli.argument_values import every, searches, seed
+from evolve.cli.argument_values import every, one_line, searches, seed
 from evolve.cli.photograph_arguments import add_photograph
 from evolve.runs.output import say
 
@@ -62,7 +62,7 @@ class Parser(argparse.ArgumentParser):
         said = re.sub(r" \(choose from (.*)\)", "", message)
         wrong = re.search(r"invalid choice: '(.*)'", said)
         hint = _nearest(wrong[1], _choices(message)) if wrong else ""
-        print(f"{self.prog}: error: {said}{hint} (see {self.prog} --help)", file=sys.stderr)
+        print(f"{self.prog}: error: {one_line(said)}{hint} (see {self.prog} --help)", file=sys.stderr)
         raise SystemExit(2)
 
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from importlib import import_module
 
+from evolve.cli.argument_values import one_line
 from evolve.cli.arguments import parse
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.notes import notes
@@ -21,8 +22,6 @@ from evolve.runs.output import results, silenced, voices
 from rhabdom.streams import open_closed_streams, repair_encodings
 
 __all__ = ["main"]
-
-LONGEST = 1800  # maximum number of characters of an error message
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -91,8 +90,7 @@ def _one_line(error: BaseException) -> str:
         return f"{error.filename}: {error.strerror}"
     if isinstance(error, MemoryError):
         return "not enough memory: close other programs, or use a machine with more memory"
-    text = " ".join(str(error).split())
-    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} [...] {text[-LONGEST // 2 :]}"
+    return one_line(str(error))
 
 
 def _is_users(error: BaseException) -> bool:

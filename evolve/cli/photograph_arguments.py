@@ -16,4 +16,6 @@ def add_photograph(command: ArgumentParser) -> None:
     command.add_argument("--width-deg", type=float, required=True, metavar="DEG", help=angle)
     ultraviolet = "ultraviolet reflectance of white surfaces, which no photograph contains, 0 to 1 (default: 1)"
     command.add_argument("--uv", type=float, default=1.0, metavar="SHARE", help=ultraviolet)
+    distance = "distance of the scene [m]: a number, or a .npy file with one for each pixel (default: infinity)"
+    command.add_argument("--depth", metavar="METRES", help=distance)
     command.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="output directory (default: this one)")

@@ -69,8 +69,8 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
     """Return the sets of receptors for which the error is computed.
 
     If the spectral genes determine the receptors, each open gene in turn takes values over its range, while the others
-    keep their start values. The largest error for any combination of genes may be larger. It is a third larger in the
-    preset `ultraviolet`, whose peaks lie far apart.
+    keep their start values. Other combinations of the genes may cause a larger error. In the preset `ultraviolet`,
+    whose peaks lie far apart, it is a third larger.
     """
     if config.eye.receptors != INHERITED:
         return [config.eye.receptors]

@@ -34,14 +34,14 @@ class WorldConfig:
     unseen: bool = setting(
         False,
         None,
-        "evaluate in other mazes than in training; they also serve for selection and early stopping: not held out",
+        "evaluate in mazes that training does not use; they also decide selection and early stopping: not held out",
     )
     course: str = setting("short", None, "navigation's course: short, or long (twice the length, half the actions)")
     evaluation_course: str = setting("short", None, "navigation's course in evaluation")
     layouts: str = setting(
         "fixed",
         None,
-        "layouts of navigation and maze: fixed, as course, mazes and unseen determine; or family: random courses or "
+        "layouts of navigation and maze: fixed (set by course, mazes and unseen); or family: random courses or "
         "mazes in three sets without a common layout, for training, selection (early stopping and fitness) and test",
     )
     family_seed: int = setting(0, Interval(0, 2**63 - 1), "seed of a family; the same layouts for all candidates")
@@ -148,7 +148,7 @@ class SearchConfig:
 class LearningConfig:
     """Settings of the training of each candidate by PPO."""
 
-    total_steps: int = setting(1_000_000, Interval(1, 10**10), "agent steps to train for")
+    total_steps: int = setting(1_000_000, Interval(1, 10**10), "number of agent steps in a training run")
     n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated in parallel")
     n_steps: int = setting(32, Interval(2, 10**6), "steps per world between updates")
     batch_size: int = setting(1024, Interval(2, 10**7), "samples per gradient step")
@@ -166,7 +166,7 @@ class LearningConfig:
     decay_after: int = setting(
         75_000,
         Interval(1, 10**10),
-        "steps after which learning slows down as 1/steps: first Adam's step size falls to half, then the passes do",
+        "steps after which learning slows down as 1/steps: first Adam's step size falls to half, then the passes fall",
     )
     gamma: float = setting(0.9, Interval(0, 1), "discount per step")
     gae_lambda: float = setting(

@@ -1,4 +1,4 @@
-"""Distribution of a policy's actions: normal, with means that no gradient moves further beyond the bounds."""
+"""Normal distribution of a policy's actions. Gradients never move its means further beyond the bounds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 
 class Within(torch.autograd.Function):
-    """Means of actions whose gradients never move them beyond the bounds -1 and 1.
+    """Means of actions. Their gradients never move them further beyond the bounds -1 and 1.
 
     Actions beyond the bounds are clipped. If the mean is far outside, all actions are clipped to the same value.
     Exploration then has no effect, and no gradient would move the mean back (Hausknecht and Stone 2016, section 5.2,
@@ -30,7 +30,7 @@ class Within(torch.autograd.Function):
 
 
 class Gaussian(DiagGaussianDistribution):
-    """SB3's distribution of actions, whose initial spread is not computed.
+    """SB3's distribution of actions, which here receives its initial logarithmic spread as a constant.
 
     Arithmetic on the "meta" device of `load_policy` would import torch's compiler, which takes a second.
     """

@@ -57,7 +57,7 @@ def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
 
 
 def require_test_set(config: RunConfig) -> None:
-    """Check that the mode "test" differs from the evaluation. User tasks may do so by themselves.
+    """Check that the mode "test" differs from the evaluation. User tasks pass, because they may define such a mode.
 
     Raises:
         ConfigError: the task has no layouts, or the run has fixed ones.

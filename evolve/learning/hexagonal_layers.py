@@ -74,7 +74,7 @@ def neighbourhoods(directions: np.ndarray) -> np.ndarray:
     """Return indices of neighbouring directions, (place, neighbour), with the central one first.
 
     The six neighbours are in the order of their azimuths around the centre, from right through up to left. Every
-    direction occurs.
+    direction is in at least one neighbourhood.
     """
     directions = np.asarray(directions, float)
     count = min(NEIGHBOURS, len(directions))

@@ -35,7 +35,7 @@ from evolve.learning.schedule import first_step_size, schedule
 from evolve.learning.training_rewards import RewardsInUnits, ramped_share
 from sim.tasks.batch_task import BatchTask
 
-# fraction of the distance by which, per rollout, log(unit of rewards) moves towards log(spread of returns)
+# In each rollout, log(unit of rewards) moves by this fraction of its distance to log(spread of returns).
 UNIT_RATE = 0.2
 SPEED = "speed"  # name of the command whose initial values follow from `learning.first_speed`
 VERDICTS = {True: 1, False: -1, None: 0}
@@ -168,7 +168,7 @@ class AdaptingPPO(PPO):
     def checkpoint(self, curve: list[tuple[int, float]], best: dict[str, torch.Tensor]) -> Checkpoint:
         """Return the state of training.
 
-        curve: learning curve so far · best: tensors of the policy at the best evaluation
+        curve, best: learning curve so far, and tensors of the policy at the best evaluation
         """
         now = {name: tensor.detach().clone() for name, tensor in learnt(self.policy).items()}
         adam = self.policy.optimizer.state_dict()

@@ -97,7 +97,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
 def _rows(runs: Sequence[Run]) -> dict[str, list[str]]:
     """Return the values of the runs' summaries as text, by name of the table's row.
 
-    Rows in which no run differs from a simpler one are omitted: the parts of fitness if no run has costs, and the
+    Rows that would repeat a simpler row in all runs are omitted: the parts of fitness if no run has costs, and the
     vertical acuity if it equals the horizontal one.
     """
     columns = [_column(run_summary(run)) for run in runs]

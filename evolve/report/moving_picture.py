@@ -1,11 +1,11 @@
-"""Export of an episode as a GIF or a video, with the world from above next to the signals of the animal's eyes."""
+"""Export of an episode as a GIF or a video, with the world next to the signals of the animal's eyes."""
 
 from __future__ import annotations
 
 import io
 import math
 from collections.abc import Iterator
-from itertools import chain, product
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -21,20 +21,23 @@ from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["require_ffmpeg", "write_gif", "write_mp4"]
 
-HEIGHT, ASIDE, GAP = 320, 150, 10  # height, maximum width of the column with the eyes, and gap before it [pixels]
+HEIGHT, ASIDE, GAP = 320, 320, 10  # height, maximum width of the part with the eyes, and gaps around eyes [pixels]
+INSET = 0.36  # height of the plan within a rendered image, relative to that of the image
 SMOOTH = 2  # factor by which the drawing is larger before it is reduced, so that edges are smooth
 SPEED = 2.0  # speed relative to real time
 LONGEST = 150  # maximum number of frames in a GIF, which limits its size, because noise hardly compresses
 FIELD = "#c9e0ef"  # colour of fields of view
 OWN = (INK, MUTED, PAPER, PANEL, ACCENT, VERMILLION, GREEN, FIELD)
-LEVELS = (0, 51, 102, 153, 204, 255)  # values of red, green and blue for the eyes' signals
+COLOURS = 64  # size of a GIF's palette; more colours would mainly store noise of receptors, and files would be larger
+SAMPLES = 8  # frames from which the palette's colours are chosen
 
 
 def write_gif(episode: Episode, path: Path) -> Path:
     """Write an episode as a GIF that repeats, completely or not at all, and return its path."""
     stride = max(1, -(-len(episode) // LONGEST))
-    palette = _palette()
-    first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in _frames(episode, stride))
+    frames = list(_frames(episode, stride))
+    palette = _palette(frames[:: -(-len(frames) // SAMPLES)])
+    first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in frames)
     content = io.BytesIO()
     pause = round(1000 * stride * episode.seconds / SPEED)
     first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
@@ -91,26 +94,33 @@ def _frames(episode: Episode, stride: int) -> Iterator[Image.Image]:
     return (_frame(_world(episode, time), eyes[time], aspect) for time in times)
 
 
-def _palette() -> Image.Image:
-    """Return the palette of the GIF: the colours of the drawing, and a cube of colours for the eyes' signals."""
+def _palette(samples: list[Image.Image]) -> Image.Image:
+    """Return the palette of the GIF: the colours of the drawing, and the most frequent colours of sample frames."""
     own = [int(name[i : i + 2], 16) for name in OWN for i in (1, 3, 5)]
-    cube = [level for colour in product(LEVELS, repeat=3) for level in colour]
+    strip = Image.fromarray(np.concatenate([np.asarray(picture) for picture in samples], axis=1))
+    frequent = strip.quantize(COLOURS - len(OWN), method=Image.Quantize.MEDIANCUT).getpalette() or []
     palette = Image.new("P", (1, 1))
-    palette.putpalette(own + cube)
+    palette.putpalette(own + frequent)
     return palette
 
 
 def _world(episode: Episode, time: int) -> Image.Image:
-    """Return an image of the world at one time: from above, if the task has a ground plan.
+    """Return an image of the world at one time: the latest rendered image, with the plan in its lower left corner.
 
-    Otherwise, the latest rendered image is returned; without rendered images, an image of width 0.
+    Without rendered images, the plan fills the image. Without both, the image has the width 0.
     """
-    plan, pictures = episode.plan, episode.pictures
-    if plan is None:
-        if pictures is None:
-            return Image.new("RGB", (0, HEIGHT))
-        picture = Image.fromarray(pictures.pixels[int(np.searchsorted(pictures.times, time, side="right")) - 1])
-        return picture.resize((round(picture.width * HEIGHT / picture.height), HEIGHT), Image.Resampling.LANCZOS)
+    pictures, above = episode.pictures, None if episode.plan is None else _from_above(episode, episode.plan, time)
+    if pictures is None:
+        return Image.new("RGB", (0, HEIGHT)) if above is None else above
+    view = Image.fromarray(pictures.pixels[int(np.searchsorted(pictures.times, time, side="right")) - 1])
+    view = view.resize((round(view.width * HEIGHT / view.height), HEIGHT), Image.Resampling.LANCZOS)
+    if above is not None:
+        small = above.resize((round(INSET * above.width), round(INSET * HEIGHT)), Image.Resampling.LANCZOS)
+        view.paste(small, (GAP, HEIGHT - GAP - small.height))
+    return view
+
+
+def _from_above(episode: Episode, plan: GroundPlan, time: int) -> Image.Image:
     x0, y0, x1, y1 = plan.bounds
     scale = SMOOTH * HEIGHT / (y1 - y0)
     width = round((x1 - x0) * scale / SMOOTH)
@@ -120,20 +130,26 @@ def _world(episode: Episode, time: int) -> Image.Image:
 
 
 def _frame(world: Image.Image, seen: np.ndarray, aspect: float) -> Image.Image:
-    """Return one frame, with the world on the left, and the signals of all eyes in a column on the right.
+    """Return one frame, with the world on the left, and the signals of all eyes on the right, row by row.
 
     aspect: width of a field of view divided by its height
     """
-    width = world.width
-    room = (HEIGHT - GAP * (len(seen) - 1)) / len(seen)
-    high = min(ASIDE / aspect, room)
+    columns = max(range(1, len(seen) + 1), key=lambda number: _eye_height(len(seen), number, aspect))
+    rows, high = -(-len(seen) // columns), _eye_height(len(seen), columns, aspect)
     shape = max(1, round(aspect * high)), max(1, round(high))
-    picture = Image.new("RGB", (width + GAP + shape[0], HEIGHT), PAPER)
+    picture = Image.new("RGB", (world.width + columns * (GAP + shape[0]), HEIGHT), PAPER)
     picture.paste(world, (0, 0))
     for number, one in enumerate(seen):
+        row, column = divmod(number, columns)
         grown = Image.fromarray(np.ascontiguousarray(one)).resize(shape, Image.Resampling.NEAREST)
-        picture.paste(grown, (width + GAP, round(number * (room + GAP))))
+        picture.paste(grown, (world.width + GAP + column * (shape[0] + GAP), round(row * (HEIGHT + GAP) / rows)))
     return picture
+
+
+def _eye_height(eyes: int, columns: int, aspect: float) -> float:
+    """Return the largest height of eyes in a number of columns [pixels]."""
+    rows = -(-eyes // columns)
+    return min((HEIGHT - GAP * (rows - 1)) / rows, (ASIDE - GAP * (columns - 1)) / columns / aspect)
 
 
 def _draw_world(draw: ImageDraw.ImageDraw, episode: Episode, plan: GroundPlan, time: int, scale: float) -> None:

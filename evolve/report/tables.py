@@ -163,7 +163,7 @@ def _acuities(animal: Phenotype) -> str:
 
 
 def _directions(candidates: Sequence[Candidate]) -> str:
-    """Return the order of the two acuities for a heading; "" if they are equal in all candidates."""
+    """Return ", horizontal × vertical" for the heading of acuities; "" if the two are equal in all candidates."""
     differ = any(len(set(_both_acuities(candidate.phenotype))) > 1 for candidate in candidates)
     return ", horizontal × vertical" if differ else ""
 

@@ -29,7 +29,7 @@ ALBUMIN = 0.940, 2e-14
 
 
 def _patch(pupil: Pupil, acuity: float, nodal_distance: float, side: int, receptors: Any) -> Eye:
-    """Return side · side receptors whose square lattice resolves `acuity` cycles per degree."""
+    """Return an eye with `side` x `side` receptors, whose square lattice resolves `acuity` cycles per degree."""
     whole("receptors_across", side, 1, MOST)
     width = side * nodal_distance * math.radians(1 / (2 * acuity))
     fov = 2 * math.degrees(math.atan(width / (2 * nodal_distance)))
@@ -59,11 +59,11 @@ def human(receptors_across: int = 60, pupil_diameter: float = 3e-3) -> Eye:
 
 
 def mouse(receptors_across: int = 40, pupil_diameter: float = 1e-3) -> Eye:
-    """Return a patch of a mouse's retina with the acuity that behaviour shows, 0.5 cycles/degree.
+    """Return a patch of a mouse's retina with the acuity found in behavioural tests, 0.5 cycles/degree.
 
     Source of the receptors, 360 and 508 nm: Abballe & Asari, PLoS ONE 17, e0262763, 2022. The acuity (Prusky et al.
-    2000) and 31 µm of retina per degree (Remtulla & Hallett 1985) are quoted; their articles have not been read. Mice
-    pool many receptors, so the patch has one receptor for each pool.
+    2000) and 31 µm of retina per degree (Remtulla & Hallett 1985) are quoted from later articles; the original articles
+    have not been read. Mice pool many receptors, so the patch has one receptor for each pool.
 
     receptors_across: pools along each side of the patch, 1 to 1000.
     pupil_diameter: diameter [m] of the pupil.
@@ -78,10 +78,10 @@ def mouse(receptors_across: int = 40, pupil_diameter: float = 1e-3) -> Eye:
 def eagle(receptors_across: int = 60) -> Eye:
     """Return the deep fovea of a wedge-tailed eagle, *Aquila audax*.
 
-    Source: Reymond, Vision Research 25, 1477, 1985 (abstract): the retina resolves 140 cycles/degree, and the smallest
-    pupil 157. At 550 nm, that pupil is 4.9 mm wide. No source has been read for the nodal distance of 22 mm, which does
-    not affect any angle. The pigment at 567 nm is that of long-wavelength cones of birds, because no pigment of an
-    eagle was found.
+    Source: Reymond, Vision Research 25, 1477, 1985 (abstract): the retina resolves 140 cycles/degree, and the optics
+    resolve 157 at the smallest pupil. At 550 nm, that pupil is 4.9 mm wide. No source has been read for the nodal
+    distance of 22 mm, which does not affect any angle. The pigment at 567 nm is that of long-wavelength cones of birds,
+    because no pigment of an eagle was found.
 
     receptors_across: receptors along each side of the patch, 1 to 1000.
 

@@ -63,7 +63,10 @@ class SoftAperture(ABC):
 
     @abstractmethod
     def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
-        """Transmittance at points (x, y), which are flat Dr.Jit Float64 arrays. It is differentiable in x and y."""
+        """Return the transmittance at points (x, y), which are flat Dr.Jit Float64 arrays.
+
+        It is differentiable in x and y.
+        """
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,10 +23,11 @@ COINCIDENT = 1e-11  # choice, radii: edges that are closer together count as one
 NEIGHBOURS = 1e-10  # choice, radii: pieces coincide only if their middles are closer together than this
 ASIDE = 1e-7  # choice, radii: an edge's two sides are tested at points at most this far from it
 PARALLEL = 1e-12
-# Choice: the final check compares along lines. Position on a piece where its line crosses it; largest number of lines.
+# Choices for the final check along lines: the position on a piece at which its line crosses it, and the largest
+# number of lines.
 ALONG, MOST_LINES = 0.3819660, 200
 NARROW = 1e-6  # choice, radii: narrower gaps are not compared with `contains`
-TOUCHING = 1e-9  # choice, squared, relative to the radius: a near miss counts as an intersection, which only adds a cut
+TOUCHING = 1e-9  # choice, squared, in radii: a near miss within it counts as an intersection, which only adds a cut
 
 Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -124,8 +125,8 @@ def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Cont
 
     Pieces of the boundary lie between open and closed areas. If several pieces coincide, only the first is kept.
 
-    Both sides of a piece are tested at points that are closer to the piece than any other edge, however narrow the gap
-    between the two edges.
+    Both sides of a piece are tested at points that are closer to this piece than to any other edge. The test therefore
+    works for arbitrarily narrow gaps.
     """
     aside = np.minimum(ASIDE, pieces.clearance(middle, COINCIDENT) / 2)[:, None]
     here, there = (contains(*(middle + sign * aside * left).T) for sign in (1, -1))

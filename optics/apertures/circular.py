@@ -120,7 +120,7 @@ class SoftAnnulus(SoftAperture):
 
 @lru_cache(maxsize=512)
 def disk_table(edge: SoftEdge, radius: float) -> Interpolant:
-    """Profile of a soft disk across its edge."""
+    """Return the profile of a soft disk across its edge."""
     ends = radius - edge.reach, radius + edge.reach
     return Interpolant.from_function(
         lambda rho: disk_profile(edge, radius, rho), ends, 2 * edge.cycles, edge.ripple / 4
@@ -128,7 +128,7 @@ def disk_table(edge: SoftEdge, radius: float) -> Interpolant:
 
 
 def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndarray:
-    """Transmittance of a soft disk at distances ρ from its axis, by quadrature. It is an even function of ρ.
+    """Return the transmittance of a soft disk at distances ρ from its axis, by quadrature. It is an even function of ρ.
 
     A(ρ) = ∫ g(r) r θ(ρ, r) dr, where g is the kernel. θ = 2 arccos((ρ² + r² - R²)/(2ρr)) is the angle over which a
     circle of radius r about the point lies inside the disk. The substitution r = lower + span sin²(πu/2) makes the
@@ -148,7 +148,9 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
 
 
 def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Nodes:
-    """Gauss-Legendre nodes along the radius, and equidistant nodes around each ring, with fewer on smaller rings.
+    """Return Gauss-Legendre nodes along the radius, and equidistant nodes around each ring.
+
+    Smaller rings have fewer nodes.
 
     The rule represents the edge exactly and converges spectrally. Over a full disk, the mean around a ring is a smooth
     function of r². For few cycles, a rule in r² therefore needs fewer nodes.
@@ -162,7 +164,7 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
 
 @lru_cache(maxsize=256)
 def _ring_rule(inner: float, outer: float, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Radii of the rings, their weights, and the number of nodes on each ring."""
+    """Return the radii of the rings, their weights, and the number of nodes on each ring."""
     digits += 0.3  # log10 2: each of the two rules, in radius and in angle, may contribute half the error
     span = outer - inner
     u, weight = gauss_legendre(gauss_legendre_count(cycles * span, digits))

@@ -72,7 +72,10 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Nodes along a pixel that make rows and columns as accurate as `nodes`; None if there would be too many."""
+        """Return the number of nodes along a pixel with which rows and columns are as accurate as `nodes`.
+
+        None: the number would be too large.
+        """
         if self.fixed is not None:
             return self.fixed
         turns = np.array(pi * cycles * self.widest)
@@ -84,7 +87,7 @@ class PixelatedAperture(Aperture):
 
     @cached_property
     def cut_share(self) -> float:
-        """Upper bound of the share of the area that lies in pixels that the edge cuts."""
+        """Upper bound of the fraction of the area that lies in pixels cut by the edge."""
         return min(1.0, float(np.prod(self._widths[self._cut], axis=1).sum()) / self.area)
 
     @property
@@ -93,12 +96,12 @@ class PixelatedAperture(Aperture):
         return float(self._widths.max())
 
     def rows(self, across: int) -> np.ndarray:
-        """Positions of the rows (and of the columns) of nodes in units of R, in ascending order, (count x across,)."""
+        """Return the ascending positions of the rows (and of the columns) of nodes in units of R, (count x across,)."""
         u, _ = gauss_legendre(across)
         return (self._centres[:, None] + (u - 0.5) * self._widths[:, None]).ravel()
 
     def weights(self, across: int) -> np.ndarray:
-        """Weights of the nodes [R²], (row, column)."""
+        """Return the weights of the nodes [R²], (row, column)."""
         return _weights(self, across)
 
     @cached_property

@@ -144,7 +144,7 @@ class Slit(Aperture):
         return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
-        """Tensor product of Gauss-Legendre nodes."""
+        """Return the tensor product of Gauss-Legendre nodes."""
         u, u_weight = gauss_legendre(gauss_legendre_count(cycles * self.width, digits + 0.3))
         v, v_weight = gauss_legendre(gauss_legendre_count(cycles * self.height, digits + 0.3))
         x, y = np.meshgrid((u - 0.5) * self.width, (v - 0.5) * self.height)

@@ -100,7 +100,7 @@ class _Line:
         self.count = dr.opaque(types.Index, half)
 
     def between(self, d: Array, start: Array, end: Array) -> Array:
-        """Contribution of the line from `start` to `end` at the signed distance d, which is positive inside."""
+        """Return the contribution of a line from `start` to `end` at the signed distance d (positive inside)."""
         import drjit as dr
 
         near = dr.abs(d) < self.reach
@@ -110,7 +110,7 @@ class _Line:
         return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
 
     def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
-        """W(d, s). `chord` is half the contribution of the whole chord; it is 0 if the line is out of reach."""
+        """Return W(d, s). `chord` is half the contribution of the whole chord; it is 0 if the line is out of reach."""
         import drjit as dr
 
         within = near & (dr.abs(s) < half)
@@ -120,7 +120,7 @@ class _Line:
         return dr.atan(slope) / (2 * pi) + through + dr.if_stmt((s, d, zero), within, self._integral, _nothing)
 
     def _integral(self, s: Array, d: Array, zero: Array) -> Array:
-        """Integral ∫ d H(r) dt from 0 to s."""
+        """Return the integral ∫ d H(r) dt from 0 to s."""
         import drjit as dr
 
         types = self.types
@@ -141,7 +141,7 @@ def _nothing(*arguments: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def radial_table(edge: SoftEdge) -> Interpolant:
-    """H(r) = G(r)/r², G = ∫₀^r g(r') r' dr'."""
+    """Return H(r) = G(r)/r², G = ∫₀^r g(r') r' dr'."""
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + edge.beta))
 
     def mean(r: np.ndarray) -> np.ndarray:
@@ -155,7 +155,10 @@ def radial_table(edge: SoftEdge) -> Interpolant:
 
 @lru_cache(maxsize=64)
 def _straight_table(edge: SoftEdge) -> Interpolant:
-    """Transmittance at a distance d inside a half-plane: 1 - ∫ g(r) r 2 arccos(d/r) dr from d to the reach."""
+    """Return the transmittance at a distance d inside a half-plane.
+
+    It is 1 - ∫ g(r) r 2 arccos(d/r) dr from d to the reach.
+    """
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + 2 * edge.beta))
 
     def inside(d: np.ndarray) -> np.ndarray:

@@ -21,8 +21,9 @@ RAYS_PER_MODE = 3  # choice
 # Choice: a central disk of 0.4 of the radius must contain at least 0.25 of the rays that an even distribution would
 # have there. Rays in concentric rings pass this test with any number of rings.
 CENTRE, FILLED = 0.4, 0.25
-# Choice: weight of the mean square over the whole circle, relative to that of the residual. It bounds the wavefront
-# where an ellipse or polygon leaves the circle dark, and changes modes of a full circle by less than 1e-6.
+# Choice: weight of the wavefront's mean square over the whole circle, relative to the mean square of the residual. It
+# bounds the wavefront where an ellipse or polygon leaves the circle dark, and changes modes of a full circle by less
+# than 1e-6.
 BOUNDED = 1e-3
 RMS_DIGITS = 8.0
 

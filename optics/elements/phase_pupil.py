@@ -20,7 +20,7 @@ from optics.numerics.autodiff import Scalar, is_differentiable
 
 __all__ = ["phase_pupil"]
 
-METRES_PER_RADIAN = 1e-9  # choice: height that stands for one radian; any would do
+METRES_PER_RADIAN = 1e-9  # choice: height that represents one radian; its value has no effect
 NOT_BOTH = {"height": "a pupil has a phase or a relief", "n": "a phase has no refractive index"}
 
 

@@ -17,7 +17,7 @@ from optics.apertures.polygonal import Polygon
 __all__ = ["Rim", "rim_around"]
 
 BETTER = 0.5  # choice: an oval is chosen if its residual is less than this part of the residual of a circle
-MUCH_BETTER = 0.1  # choice: the same for a Fourier series; those of square grids of samples fit by chance to a third
+MUCH_BETTER = 0.1  # choice: the same for a Fourier series; on square grids, it may reach a third by chance
 FULL = 0.8  # choice: part of a circle that the hull must fill. A hexagon fills 0.83, a square 0.64.
 LEAST_CORNERS = 8  # choice: corners of the hull that an oval, which has at least 5 parameters, needs
 EXACT = 1e-4  # choice, radii: a residual below this is always accepted
@@ -117,7 +117,8 @@ def _hull(points: np.ndarray) -> Any:
 def _cut(hull: Any, dark: np.ndarray, apart: float) -> np.ndarray:
     """Return the hull's corners after its edges were moved half way to dark samples or out to the rim of all samples.
 
-    apart: distance between samples. A dark sample limits an edge if it lies beyond it by at most NEXT times this.
+    apart: distance between samples. A dark sample limits an edge if it lies outside the edge and at most NEXT times
+    this distance away.
     """
     from scipy.spatial import HalfspaceIntersection
 

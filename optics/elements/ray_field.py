@@ -66,7 +66,7 @@ def rays_behind(beam: Beam, x: Array, y: Array) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class RayField(Mask):
-    """Mask with the amplitude w₀ + w₁ Ex + w₂ ξEx/R + w₃ Ey + w₄ ηEy/R, times that of the pupil's own mask.
+    """Mask with the amplitude w₀ + w₁ Ex + w₂ ξEx/R + w₃ Ey + w₄ ηEy/R, multiplied by the pupil's own mask.
 
     Ex and Ey are the field of the ray at the point (ξ, η) of the pupil, which has the radius R.
 

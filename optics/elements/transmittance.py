@@ -134,7 +134,7 @@ class MaskMap(Mask):
             )
 
     def _most(self) -> float:
-        """Largest amplitude of the mask within the circle."""
+        """Return the largest amplitude of the mask within the circle."""
         n = FINER * self._map.knots
         at = (np.arange(n) + 0.5) * 2 / n - 1
         return float(np.abs(self._map.on_grid(at)[np.hypot(*np.meshgrid(at, at)) <= 1]).max())

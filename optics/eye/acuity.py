@@ -70,7 +70,7 @@ def sampling_acuity(spacing_deg: float, lattice: str = "hexagon") -> float:
 def anatomical_acuity(density: float, nodal_distance: float, lattice: str = "hexagon") -> float:
     """Return the finest grating [cycles/degree] that a retina resolves, from its density of receptors.
 
-    Use the density of ganglion cells instead where several receptors share one.
+    If several receptors share a ganglion cell, use the density of ganglion cells instead.
 
     density: receptors per area [1/m²]. 1 per mm² is 1e6 per m².
     nodal_distance: posterior nodal distance [m]. A length x on the retina corresponds to the angle x/nodal_distance.

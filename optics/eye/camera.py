@@ -94,7 +94,7 @@ def camera_image(
     lens: a pupil, or an eye, which has its own receptors and noise.
     sensor: the sensor behind a pupil; None for an eye.
     depth: distance [m] of the scene along the axis: a number, or a map with one distance per cell (Y, X).
-    samples_per_pixel: cells of the scene per pixel along each axis. A defocused edge needs a few.
+    samples_per_pixel: cells of the scene per pixel along each axis. Defocused edges need more than one.
     field_zones: number of PSFs across the width of the field, or "auto", see `Eye.sight`. 1 uses the PSF on the axis.
     rng: random generator of the noise. None: no noise; electrons are their mean numbers.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens

@@ -19,8 +19,8 @@ __all__ = ["Tiles", "cell_integrals", "samples_per_cycle"]
 DEGREE = 7
 SHORT = 8 * DEGREE  # number of samples above which the middle ones lie far from both ends
 # With 3.1 samples per cycle of the highest frequency, the error of integrals over cells of any size is 3e-5 of their
-# root mean square. With more samples, it falls with the eighth power of the samples' distance. With fewer, it grows
-# tenfold for every 0.425 samples per cycle; see test_cell_integrals.py.
+# root mean square. With more samples, it falls with the eighth power of the samples' distance. It grows tenfold when
+# the number of samples per cycle is reduced by 0.425; see test_cell_integrals.py.
 FINE, FINE_TOLERANCE, ORDER = 3.1, 1e-4, 8
 FEWEST, PER_DECADE = 2.25, 0.425
 # Over cells that are at least a cycle wide, most of the aliasing of coarser samples averages out. Each row (cycles,

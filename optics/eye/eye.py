@@ -69,7 +69,7 @@ class Eye(EyeSpec):
         None: receptors are square, and the height of the retina follows from the number of rows.
     most_seconds: largest predicted time [s] of the PSF of a band. Pupils that need more are refused.
     dynamics: responses of the receptors over time, which environments compute. The methods of `Eye` return signals of
-        constant light (None: an observation is the signal at one time).
+        constant light. None: receptors respond without delay.
     tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
         receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.

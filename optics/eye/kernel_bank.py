@@ -6,7 +6,7 @@ spaced in inverse distance 1/z, because defocus is linear in 1/z, or they are th
 
     signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
 
-`occlusion` adds that near surfaces hide far ones.
+`occlusion` extends this sum to near surfaces that hide far ones.
 """
 
 from __future__ import annotations

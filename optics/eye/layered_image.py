@@ -61,8 +61,8 @@ class _Scene:
     def passing(self, layer: Layer) -> Array:
         """Return the fraction of the light from behind that passes a layer, (band, *shape).
 
-        Cells that hide nothing continue in a farther layer, which is dark behind them. The fraction therefore refers to
-        the part of the pupil that these cells leave.
+        Some cells of the layer hide nothing, because their surface continues in a farther layer. That layer is dark
+        behind them. The fraction is therefore relative to the part of the pupil that these cells do not cover.
         """
         import drjit as dr
 

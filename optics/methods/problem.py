@@ -127,7 +127,7 @@ class Problem:
 
     @cached_property
     def other_detail(self) -> float:
-        """The same without the maps whose derivatives are requested."""
+        """Bandwidth [1/m] as in `detail`, without the maps whose derivatives are requested."""
         assert self.knots is not None
         others = self.knots.without_maps(self.light.pupil)
         return others.bandwidth(self.light.wavelength, DETAIL_PART * self.tolerance)
@@ -139,7 +139,7 @@ class Problem:
 
     @property
     def phase_band_inside(self) -> float:
-        """The same over the disk alone, because a relief may be steep in the soft edge."""
+        """Highest spatial frequency [1/m] over the disk alone, because a relief may be steep in the soft edge."""
         return SLOPE_MARGIN * self.slopes.steepest_inside / self.light.wavelength + self.detail
 
     @cached_property
@@ -189,7 +189,7 @@ class Problem:
 
     @cached_property
     def _turning_slopes(self) -> np.ndarray:
-        """The same for the combined phase of pupil and path."""
+        """Slopes of the combined phase of pupil and path at the nodes of cells."""
         return self.slopes.spread(self._beyond_rim, (self.window, self.distance, self.medium_n))
 
     @property

@@ -121,8 +121,8 @@ def _drawn(image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the rows and columns of a grid of samples, and the probability with which each sample was drawn.
 
     Rows and columns are drawn at even steps of their cumulative probabilities. If the amplitude has the same error
-    everywhere, the error of the intensity is proportional to its square root. Other errors are next to the brightest
-    samples, or at the sides of the window, where phases change fastest.
+    everywhere, the error of the intensity is proportional to the square root of the intensity. Other errors are next to
+    the brightest samples, or at the sides of the window, where phases change fastest.
     """
     found = []
     for along in (1, 0):

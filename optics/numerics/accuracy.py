@@ -66,8 +66,9 @@ class Plan:
     padding: period of the pupil's transform divided by the number of its samples; 1 without a period.
     predicted_error: relative L2 error of the intensity over the window.
     scalar_error: upper bound on the error of scalar theory, for light of any polarisation. It depends on the steepest
-        ray and adds to `predicted_error`. All methods have it; only `optics.vector_focus` avoids it. The bound is valid
-        for windows that contain the brightest point of the light, but not for windows that are dark everywhere.
+        ray and adds to `predicted_error`. All methods of `optics.psf` have this error; only `optics.vector_focus`
+        avoids it. The bound is valid for windows that contain the brightest point of the light, but not for windows
+        that are dark everywhere.
     seconds: predicted time of a call with compiled kernels on two cores; 0 without a prediction.
     options: all methods that were compared.
     derivative_error: upper bound of the relative L2 error of derivatives, for a random functional of the PSF. None: the
@@ -109,7 +110,7 @@ class Plan:
 
 
 def above(error: float, tolerance: float) -> str:
-    """Return an error that exceeds a tolerance, with as many digits as show this: "0.002", but "0.0011" above 0.001."""
+    """Return the text of an error, with enough digits to show that it exceeds a tolerance: "0.0011" for 0.001."""
     shown = (f"{error:.{digits}g}" for digits in range(1, 17))
     return next((text for text in shown if float(text) > tolerance), f"{error!r}")
 

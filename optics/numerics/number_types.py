@@ -23,6 +23,8 @@ def readable(name: str, value: Any) -> Any:
     Raises:
         ValueError: masked elements, or a tensor on the device "meta", which contains no numbers.
     """
+    if type(value) is np.ndarray:
+        return value
     if isinstance(value, (list, tuple)):
         entries = [readable(name, entry) for entry in value]
         return value if all(old is new for old, new in zip(value, entries, strict=True)) else entries
@@ -75,6 +77,8 @@ def _half(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return next(filter(None, map(_half, value)), "")
     if isinstance(value, (np.ndarray, np.generic)):
+        if value.dtype.isbuiltin == 1:  # NumPy takes microseconds to compute a name
+            return "float16" if value.dtype.char == "e" else ""
         kind = value.dtype.name
     elif type(value).__module__.startswith("drjit"):
         return type(value).__name__ if type(value).__name__.endswith(DRJIT_HALF) else ""

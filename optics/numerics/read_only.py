@@ -6,6 +6,7 @@ An array that a function computes and does not store belongs to the caller, who 
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,13 @@ class ReadOnlyArrays:
     """Mixin for frozen dataclasses: the NumPy arrays in their fields are read-only; `array.copy()` is writable."""
 
     def __post_init__(self: Any) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name, None)
+        for name in _names(self.__class__):
+            value = getattr(self, name, None)
             if isinstance(value, np.ndarray):
-                object.__setattr__(self, field.name, read_only(full_precision(field.name, value)))
+                object.__setattr__(self, name, read_only(full_precision(name, value)))
+
+
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    """Return the names of the fields of a dataclass, which every step of a simulation needs."""
+    return tuple(field.name for field in fields(kind))

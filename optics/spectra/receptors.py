@@ -78,7 +78,7 @@ class Receptors:
         return replace(self, mosaic=None if mosaic is None else _mosaic(mosaic, len(self.types)))
 
     def layout(self, resolution: tuple[int, int]) -> np.ndarray | None:
-        """Type of every receptor, (h, w) int; None without a mosaic."""
+        """Return the type of every receptor, (h, w) int; None without a mosaic."""
         readable("resolution", resolution)
         if self.mosaic is None:
             return None

@@ -85,8 +85,8 @@ def make_vec_env(
     seed: seed of episodes and noise; None: a random seed
     memory: number of frames in an observation
     mode: "training", "evaluation" or "test". In evaluation, objects that the agent reached reappear elsewhere, and
-        reward terms have the weights of the fitness. "test" is an evaluation for final results; it differs from
-        "evaluation" only if a user task uses other worlds in this mode.
+        reward terms have the weights of the fitness. "test" is an evaluation for final results. It equals "evaluation",
+        unless a user task uses other worlds in this mode.
     rays_per_receptor: number of rays traced for each receptor, in direct light only. "auto": the cheapest fidelity
         whose error is small compared with the receptors' noise. It includes light that was reflected twice if this
         light changes signals noticeably. `sim.choose_fidelity(world, eyes, bands="own")` returns the same fidelity.
@@ -178,7 +178,9 @@ def in_bands(eyes: Eyes | Mapping[str, Eyes], bands: int) -> Any:
 def _require_eyes(eyes: Any) -> None:
     kinds = eyes.values() if isinstance(eyes, Mapping) else [eyes]
     if not kinds or not all(isinstance(of_kind, Eyes) for of_kind in kinds):
-        raise ValueError(f"eyes = {shown(eyes)}: must be sim.Eyes, several by name, or None, the default ones")
+        raise ValueError(
+            f"eyes = {shown(eyes)}: must be sim.Eyes, a mapping of names to sim.Eyes, or None for the default eyes"
+        )
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:

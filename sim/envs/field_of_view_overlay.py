@@ -178,7 +178,7 @@ def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field
 
 
 def _fan(eyes: Eyes) -> np.ndarray:
-    """Azimuths of the fan's rays, relative to the eye's axis."""
+    """Return the azimuths of the fan's rays, relative to the eye's axis."""
     half = np.radians(eyes.fov_deg) / 2
     return np.linspace(-half, half, FAN)
 
@@ -195,7 +195,7 @@ def _receptor_rays(eyes: Eyes) -> np.ndarray:
 
 
 def _radius(eyes: Eyes) -> float:
-    """Radius of an iris [m], small enough that eyes do not overlap."""
+    """Return the radius of an iris [m], small enough that eyes do not overlap."""
     apart = np.abs(np.diff(eyes.azimuths())).min(initial=np.pi)
     return float(min(IRIS, BODY_RADIUS * np.sin(apart / 2)))
 
@@ -211,7 +211,7 @@ def _dot(eye: np.ndarray, view: Viewpoint, size: tuple[int, int], radius: float)
 
 
 def _reach(azimuths: np.ndarray, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Distance to the first surface along these azimuths [m], ignoring the agent's own body."""
+    """Return the distance to the first surface along these azimuths [m], ignoring the agent's own body."""
     n = len(azimuths)
     rays = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(n)], axis=-1)
     hit, distance = np.full(n, -1, np.int32), np.full(n, -1.0)

@@ -46,7 +46,7 @@ def with_frames(
     scenes: see `renderers_for`
 
     Raises:
-        ValueError: two different numbers are stated.
+        ValueError: fidelities and `ReceptorDynamics.frames` specify different numbers.
     """
     kinds = [(kind, of) for agent, of in zip(task.agents(), fidelities, strict=True) if of for kind in agent.kinds]
     in_time = [(kind.eye, of[kind.name]) for kind, of in kinds if dynamics_of(kind.eye) is not None]

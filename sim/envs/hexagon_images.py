@@ -7,12 +7,13 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import KDTree
 
-from sim.envs.retina_images import BETWEEN, GAP, SIZE, hues_of, shares_of
+from sim.envs.retina_images import BETWEEN, GAP, hues_of, shares_of
 from sim.eyes.compound_eye import CompoundEye
 from sim.scene.color import encode_srgb
 
+SIZE = 480, 960  # choice: largest height and width of a map in pixels; hexagons of a thousand ommatidia stay visible
 RIM = 0.93  # choice: radius of a drawn hexagon, relative to a hexagon that touches its neighbours
-OUTER = 0.95  # choice: largest radius of a hexagon without neighbours on all sides, relative to the corner's radius
+OUTER = 0.95  # choice: largest radius of a hexagon at the map's edge, relative to its circumscribed circle
 ALONE = 0.05  # choice: radius [rad] of the hexagon of a single ommatidium
 
 
@@ -34,7 +35,7 @@ def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
 
 
 def _palette(eye: CompoundEye) -> np.ndarray:
-    """Linear sRGB of each signal, (ommatidium, channel, 3)."""
+    """Return the linear sRGB of each signal, (ommatidium, channel, 3)."""
     hues = hues_of(eye.receptors)
     types = np.arange(eye.channels)[None] if eye.types is None else eye.types
     mine = hues[types]
@@ -63,7 +64,10 @@ def _numbers(eye: CompoundEye) -> np.ndarray:
 
 
 def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.ndarray) -> np.ndarray:
-    """Return each pixel's distance from the border to the next ommatidium, relative to half their distance."""
+    """Return each pixel's distance from the border between the two nearest ommatidia, relative to half their distance.
+
+    The distance is 1 at the direction of the nearest ommatidium, and 0 on the border.
+    """
     if len(directions) == 1:
         return np.ones(number.shape)
     second = tree.query(ways, k=[2])[1][..., 0]

@@ -34,8 +34,8 @@ class OneEnvironment(VecEnv):
     def render(self, mode: str | None = None) -> np.ndarray | None:
         """Return the images of all worlds, tiled.
 
-        Stable-baselines3 passes modes that it does not support on to the individual environments. Here all worlds share
-        this environment, so it handles the mode "eyes" itself.
+        Stable-baselines3 forwards unsupported modes to the individual environments. Here all worlds share this
+        environment, so it handles the mode "eyes" itself.
 
         Raises:
             RuntimeError: before the first reset.

@@ -42,7 +42,7 @@ def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _palette(eye: Eye) -> np.ndarray:
-    """Linear sRGB of each signal, (channel, h, w, 3)."""
+    """Return the linear sRGB of each signal, (channel, h, w, 3)."""
     height, width = eye.resolution
     if eye.mosaic is not None:
         return hues_of(eye.receptors)[eye.mosaic][None]

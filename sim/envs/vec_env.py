@@ -28,10 +28,11 @@ class EyesVecEnv(OneEnvironment):
     alike and learn a single policy.
 
     Observations, rewards, endings and `info` are documented in docs/tasks.md. When an episode ends, its world starts
-    the next one automatically. The returned observation is then the first of the new episode, and
-    info["terminal_observation"] is the last of the old one. `reset_infos` contains the info of each episode's first
-    observation. A world's episodes depend only on the seed and on the world's index, not on the number of worlds. In an
-    encounter, the rows of the first animal in all worlds come first, followed by the rows of the second animal.
+    the next one automatically. The returned observation is then the first observation of the new episode, and
+    info["terminal_observation"] is the last observation of the old episode. `reset_infos` contains the info of each
+    episode's first observation. A world's episodes depend only on the seed and on the world's index, not on the number
+    of worlds. In an encounter, the rows of the first animal in all worlds come first, followed by the rows of the
+    second animal.
 
     simulation: the worlds
     renderers: renderers of every agent's eyes

@@ -22,8 +22,8 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     """The batched environment with Gymnasium's vector interface.
 
     Worlds restart in the step that ends their episode (`AutoresetMode.SAME_STEP`), as in Gymnasium's `SyncVectorEnv`.
-    The returned observation and info are then the first of the new episode. info["final_obs"] and info["final_info"]
-    contain the last observation and info of the old episode.
+    The returned observation and info are then those of the start of the new episode. info["final_obs"] and
+    info["final_info"] contain the last observation and info of the old episode.
 
     `reset` accepts one seed or, as Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, world i
     has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.

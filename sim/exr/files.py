@@ -41,7 +41,7 @@ SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 a
 # Default limit on the unpacked size of a file's pixels [bytes]. Sixteen eyes of 128 x 128 receptors in 64 bands need a
 # fifteenth of it.
 MOST_BYTES = 2**30
-LARGEST_HEADER = 2**24  # bytes of a file other than pixels
+LARGEST_HEADER = 2**24  # largest size of a file's contents apart from pixels [bytes]
 _HELD = "rhabdom"  # name of the attribute that stores all values other than channels, as JSON
 _HASH = "sha256"
 DIRECTIONS = ("direction_ahead", "direction_left", "direction_up")  # channels of viewing directions
@@ -99,7 +99,7 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can state any size
 
     Raises:
-        ExrError: the file is truncated, damaged, altered, too large, or without spectral channels; one line.
+        ExrError: the file is truncated, damaged, altered, too large, or has no spectral channels. One line.
         FileNotFoundError: the file does not exist.
     """
     import OpenEXR

@@ -134,7 +134,7 @@ class CompoundEye:
 
     @cached_property
     def kinds(self) -> tuple[tuple[optics.Ommatidium, ...], np.ndarray]:
-        """Different ommatidia, and the index of each direction's ommatidium among them, (n,)."""
+        """Distinct ommatidia, and for each direction the index of its ommatidium among them, (n,)."""
         if isinstance(self.ommatidium, optics.Ommatidium):
             return (self.ommatidium,), np.zeros(len(self), int)
         numbers: dict[optics.Ommatidium, int] = {}

@@ -12,7 +12,7 @@ from optics.numerics.autodiff import Array
 
 @dataclass(frozen=True)
 class DepthLayers:
-    """Distances for which an eye has a PSF, evenly spaced in inverse distance 1/z, in which defocus is linear.
+    """Distances z for which an eye has a PSF. They are evenly spaced in 1/z, because defocus is linear in 1/z.
 
     Light from a distance between two layers is divided between the two, linearly in 1/z. Light from beyond the first or
     last layer is attributed to that layer.

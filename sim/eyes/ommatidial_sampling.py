@@ -81,8 +81,8 @@ class _RayPattern:
 def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
     """Return rays at the centroids of a Voronoi tessellation of directions, by Lloyd's algorithm (1982).
 
-    Compared with importance weights at random points, the integrals over cells halve the error at edges, because bands
-    differ in their acceptance functions.
+    The weight of a ray is an integral over its cell. Importance weights at random points would double the error at
+    edges, because bands differ in their acceptance functions.
 
     seed: determines the initial points
     """
@@ -112,8 +112,8 @@ def _tests(places: np.ndarray, spread: float) -> np.ndarray:
 def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray, powers: np.ndarray) -> np.ndarray:
     """Return weights with which the signals of the test scenes are exact in every band.
 
-    All bands share the centroids of cells. Without the correction, a band with a wide acceptance function would see too
-    narrow a field.
+    All bands share the same rays. Without the correction, the rays would represent a wide acceptance function as too
+    narrow.
 
     at_rays, everywhere: test scenes at the rays and at the places of the table, (place, scene)
     powers: acceptance function of each band at the places of the table, (band, place)

@@ -17,7 +17,7 @@ from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 # the error that such cells cause.
 MIN_CELLS = 32
 # Chosen: smallest number of cells across a waveguide's diameter, and largest number of cells along a receptor's side.
-# If both cannot hold, the second applies.
+# If the two limits conflict, the second applies.
 CELLS_ACROSS, MOST_CELLS = 4, 64
 
 

@@ -66,8 +66,8 @@ class RowProduct:
 def _views_at_once(weights: np.ndarray) -> int:
     """Return the largest number of views in a product that one thread computes.
 
-    If even BLOCK / 8 views are too many for one thread, the result is BLOCK. Such products are large enough for
-    several threads.
+    The result is BLOCK if one thread cannot compute even BLOCK / 8 views. Such products are large enough for several
+    threads.
     """
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights.size <= ONE_THREAD), BLOCK)
 
@@ -148,8 +148,8 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
 
-    The largest number of rays is omitted that reduces each receptor's sum of weights by at most the fraction `share`.
-    The remaining weights are then scaled so that this sum is unchanged.
+    Rays are omitted until another ray would reduce a receptor's sum of weights by more than the fraction `share`. The
+    remaining weights are then scaled so that this sum is unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]

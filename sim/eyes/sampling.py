@@ -239,7 +239,7 @@ def _bounce_samples(draw: Draw) -> np.ndarray:
     return bounce_samples(len(draw)).astype(np.float32)
 
 
-# Factories of the sensors of one eye, for any number of rays: of eyes with a flat retina, and of all eyes.
+# Types that build the sensors of one eye for any number of rays: for eyes with a flat retina, and for all eyes.
 EyeSampling = BoxSampling | FieldSampling
 WorldSampling = EyeSampling | OmmatidialSampling
 

@@ -63,8 +63,9 @@ class AgentPhysics:
 
     threads: threads of MuJoCo's batched step, see `sim.physics.mujoco_batch`
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
-        obstacles are simulated in models of these obstacles alone (`local_contacts`). Either attribute is None if the
-        model does not allow the method. If False, MuJoCo simulates all agents in the whole world.
+        obstacles are simulated in models of these obstacles alone (`local_contacts`). The attribute `free_motion` or
+        `local_contacts` is None if the model does not support the method. If False, MuJoCo simulates all agents in the
+        whole world.
 
     Raises:
         ValueError: the model lacks the agent's joints, actuators or touch sensor, or an object could collide.
@@ -92,7 +93,7 @@ class AgentPhysics:
         path, speed = self.free_motion(agents.velocity, velocity)
         met = self.free_motion.obstacles_in_reach(agents.position, path)
         free = ~met.any(axis=1) & self.free_motion.obeys(velocity)
-        # Also false for NaN, so that MuJoCo handles these agents.
+        # The comparison is also false for NaN, so that MuJoCo simulates these agents.
         free &= (np.abs(agents.velocity) < UNSTABLE_SPEED).all(axis=-1)
         n = len(velocity)
         motion = Motion(agents.position[:, None] + path, speed, np.zeros(n, bool), np.zeros(n, bool))

@@ -145,7 +145,7 @@ class MujocoWorlds:
         mujoco.mj_forward(data.model, data)
 
     def _pass_frame(self, world: int) -> None:
-        """Advance a world to the next frame, and compute poses only, so that the physics is as without frames."""
+        """Advance a world to the next frame. Only poses are computed, so frames do not change the physics."""
         data = self.datas[world]
         mujoco.mj_step(data.model, data, self.substeps // self.frames)
         mujoco.mj_kinematics(data.model, data)

@@ -47,7 +47,10 @@ class Physics(Protocol):
         """Compute the poses after the task has started episodes in these worlds."""
 
     def adopt_changed_model(self) -> bool:
-        """Give each world its own model if the first episode's start changed the model; return whether it did."""
+        """Give each world its own model if the task changed the model at the start of the first episode.
+
+        Return True if the worlds now have their own models.
+        """
 
     def watch(self) -> None:
         """Store the settings of the model that a task must not change during a step."""

@@ -1,7 +1,7 @@
 """A mirror (`sim.mirror`) with fewer shapes: all static geoms of one material form one mesh.
 
-Every shape makes each launch of a kernel slower, and every geom each `sync`. The price is that static geoms cannot be
-identified in the image.
+Every shape slows down each launch of a kernel, and every geom slows down each `sync`. In merged meshes, single static
+geoms cannot be identified in the image.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from optics.spectra.receptors import receptors_of
 from optics.spectra.srgb import decode_srgb, ink_radiance
 from sim.pictures.receptor_mosaic import ReceptorMosaic
 
-__all__ = ["ANIMALS", "read_photograph", "see_photograph"]
+__all__ = ["ANIMALS", "read_depth", "read_photograph", "see_photograph"]
 
 CAMERA = ("eagle", "goldfish", "human", "jumping_spider", "mouse")
 ANIMALS = (*sorted(animals.COMPOUND), *CAMERA)
@@ -61,8 +61,31 @@ def read_photograph(path: str | Path) -> np.ndarray:
     return pixels / 255.0
 
 
+def read_depth(text: str) -> Any:
+    """Return the distance [m] that a text states: a number, or the name of a .npy file with one number per pixel.
+
+    Raises:
+        ValueError: the text is neither, or the file contains no array of numbers.
+        OSError: the file cannot be read.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        if not text.endswith(".npy"):
+            raise ValueError(f"depth = {text}: must be a distance [m], or a .npy file of distances") from None
+    try:
+        return np.load(text, mmap_mode="r", allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise ValueError(f"{text}: {error}: must be an undamaged .npy file of distances [m]") from None
+
+
 def see_photograph(
-    photograph: Any, animal: str, width_deg: float, uv: float = 1.0, progress: Progress | None = None
+    photograph: Any,
+    animal: str,
+    width_deg: float,
+    uv: float = 1.0,
+    depth: Any = None,
+    progress: Progress | None = None,
 ) -> ReceptorMosaic:
     """Return the signals of an animal's receptors for a photograph, which covers a part of its visual field.
 
@@ -77,20 +100,25 @@ def see_photograph(
     width_deg: angular width of the photograph, in [0.1, 120].
     uv: fraction of ultraviolet light, in [0, 1], that a white surface reflects. A photograph does not contain it. Below
         400 nm, the reflectances of `srgb_basis` are multiplied by it.
+    depth: distance [m] of the scene along the axis, a number or one for each pixel (y, x). Eyes are focused at
+        infinity, so near surfaces are blurred, and they hide parts of far ones (`optics.Eye.see`). None: infinity.
+        Compound eyes accept None only, because their small facets are in focus at all distances.
     progress: function that is called with the completed fraction. None: no calls.
 
     Raises:
-        ValueError: an argument outside its range, an image with another shape, or a field with more than 40,000
-            ommatidia.
+        ValueError: an argument outside its range, an image or depth with another shape, a field with more than 40,000
+            ommatidia, or the depth of a scene for a compound eye.
+        AccuracyError: the depth varies too much for the kernels of one image; see `optics.Eye.see`.
     """
     one_of("animal", animal, ANIMALS)
     width = in_range("width_deg", width_deg, 0.1, 120.0)
     linear = decode_srgb(_checked(photograph))
+    z = _checked_depth(depth, linear.shape[:2], animal)
     in_range("uv", uv, 0.0, 1.0)
     report = progress or (lambda share: None)
     if animal in animals.COMPOUND:
         return _compound(linear, animal, width, uv, report)
-    return _camera(linear, animal, width, uv, report)
+    return _camera(linear, z, animal, width, uv, report)
 
 
 def _checked(photograph: Any) -> np.ndarray:
@@ -101,6 +129,20 @@ def _checked(photograph: Any) -> np.ndarray:
     if not (np.isfinite(pixels).all() and pixels.min() >= 0 and pixels.max() <= 1):
         raise ValueError(f"photograph holds {shown(float(pixels.max()))}: must lie in [0, 1], so divide bytes by 255")
     return pixels
+
+
+def _checked_depth(depth: Any, shape: tuple[int, ...], animal: str) -> np.ndarray:
+    """Return the distances [m] of all pixels, (y, x)."""
+    if depth is None:
+        return np.full(shape, math.inf)
+    if animal in animals.COMPOUND:
+        raise ValueError(f"depth: the facets of a {animal} are in focus at all distances, so depth must be None")
+    found = reals("depth", depth)
+    if found.ndim and found.shape != shape:
+        raise ValueError(f"depth has shape {found.shape}: must be that of the photograph, {shape}, or a single number")
+    if not (found > 0).all():
+        raise ValueError("depth: must hold positive distances [m], or infinity")
+    return np.broadcast_to(found, shape)
 
 
 def _height_deg(linear: np.ndarray, width_deg: float) -> float:
@@ -159,7 +201,9 @@ def _by_angle(plane: np.ndarray, width: float) -> Callable[[np.ndarray, np.ndarr
     return radiance
 
 
-def _camera(linear: np.ndarray, animal: str, width_deg: float, uv: float, report: Progress) -> ReceptorMosaic:
+def _camera(
+    linear: np.ndarray, depth: np.ndarray, animal: str, width_deg: float, uv: float, report: Progress
+) -> ReceptorMosaic:
     patch: optics.Eye = getattr(animals, animal)()
     nodal = float(patch.sensor_distance)
     sensor_width = 2 * nodal * math.tan(math.radians(width_deg) / 2)
@@ -171,7 +215,9 @@ def _camera(linear: np.ndarray, animal: str, width_deg: float, uv: float, report
     scene = np.einsum("yxc,bc->byx", cells, ink_radiance(eye.spectral_bands, eye.receptors, uv))
     report(0.1)
     padded = np.pad(scene, ((0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN)), mode="edge")
-    signals = np.asarray(eye.see(padded, CELLS)) / float(eye.white_signal)
+    z = np.pad(_nearest(depth, (rows * CELLS, columns * CELLS)), MARGIN, mode="edge")
+    distances: Any = z if np.ptp(1 / z) else float(z[0, 0])
+    signals = np.asarray(eye.see(padded, CELLS, z=distances)) / float(eye.white_signal)
     report(1.0)
     return ReceptorMosaic(animal, signals, _peaks(eye.receptors), width_deg, hexagons=False)
 
@@ -182,6 +228,16 @@ def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
     planes = [Image.fromarray(plane.astype(np.float32)) for plane in np.moveaxis(linear, -1, 0)]
     return np.stack([np.asarray(plane.resize(size[::-1], Image.Resampling.BOX)) for plane in planes], axis=-1)
+
+
+def _nearest(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Return the distance in the middle of each cell (y, x). Means would lie between the distances of two surfaces."""
+    rows, columns = (
+        ((np.arange(wanted) + 0.5) * known / wanted).astype(int)
+        for wanted, known in zip(size, depth.shape, strict=True)
+    )
+    found: np.ndarray = depth[np.ix_(rows, columns)]
+    return found
 
 
 def _peaks(receptors: optics.Receptors) -> tuple[float, ...]:

@@ -133,8 +133,7 @@ class EyeRenderer:
     # --- signals and labels
 
     def signals(self, poses: Placed, light: np.ndarray | None = None) -> np.ndarray:
-        """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32: a² sum_b
-        weights[channel, b] radiance_b.
+        """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
         poses: poses of every world: a list of their MjData after mj_forward or mj_step, or `sim.Poses`, arrays stacked
             over worlds. The MjData of a single world need not be in a list. For built-in worlds, a state is also

@@ -43,7 +43,7 @@ class PendingFrame:
         return values
 
     def then(self, what: Callable[[np.ndarray], np.ndarray]) -> PendingFrame:
-        """Return a frame whose values are computed from the values of this frame when they are waited for."""
+        """Return a frame whose `wait` applies the function `what` to the values of this frame."""
         return PendingFrame(lambda: what(self.wait()))
 
 

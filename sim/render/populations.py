@@ -16,7 +16,7 @@ from sim.render.random_views import RandomViews, near_views, on_objects, random_
 from sim.render.world_scene import WorldScene
 
 RECEPTORS = 24  # chosen: largest number of receptors of a population
-LEAST_WEIGHT = 1e-3  # weight of a receptor that sees an object in no view, relative to one that sees it in one
+LEAST_WEIGHT = 1e-3  # weight of a receptor that sees no object, relative to one that sees an object in a single view
 ON_OBJECT = 0.02  # a receptor sees an object that fills more than this fraction of its field
 
 

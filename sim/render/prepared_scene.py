@@ -42,7 +42,7 @@ class PreparedScene:
     spectra, groups: see `sim.mirror`
     varied: see `sim.ModelRenderer`
     tracer: method of tracing rays, see `sim.BatchedRenderer`
-    stand: the body that the eyes are fixed to, if they stand upright on one; None: derived from the mounts
+    stand: the body that carries the eyes, if all eyes stand upright on one body; None: derived from the mounts
     medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the
         facets of a compound eye keep the index in front of them. None: clear air
 

@@ -105,7 +105,10 @@ class RayKernel:
         return KernelInputs(counted(lanes), sizes, along, self.tracer.inputs, more, weights)
 
     def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
-        """Return sums over `reduced` neighbours among `lanes` lanes, flat (layer, component, world, eye, sum)."""
+        """Return sums over groups of `reduced` adjacent lanes, flat (layer, component, world, eye, sum).
+
+        lanes: total number of lanes
+        """
         layers = self.layers(scenes, frame, inputs)
         if len(layers) == 1:
             out = layers[0]
@@ -134,7 +137,7 @@ class RayKernel:
         return [component * share for share in shares for component in components]
 
     def seen(self, scenes: Any, frame: Frame, inputs: KernelInputs, lane: Lane) -> tuple[EyeRay, Any]:
-        """Return a lane's ray, and its surroundings."""
+        """Return the ray of a lane, and the geometry of the lane's world in the tracer's form."""
         seen = self.eyes.ray(frame.eyes, inputs.along, lane, dr.gather(mi.UInt32, inputs.sizes, 0))
         return seen, self.tracer.around(scenes, frame.things, inputs.tables, lane.world)
 

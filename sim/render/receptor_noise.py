@@ -145,7 +145,7 @@ class NoiseModel:
         return shot, NoiseModel(self.sigma) if self.sigma > 0 else None
 
     def largest(self, brightest: float) -> float:
-        """Return the standard deviation of a signal that is twice the brightest."""
+        """Return the standard deviation of the noise in a signal of 2 * `brightest`."""
         shot = 0.0 if self.photons is None else 2 * brightest / float(self.photons.min())
         return math.sqrt(self.sigma**2 + shot)
 

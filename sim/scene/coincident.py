@@ -17,7 +17,7 @@ from sim.scene import shapes, surfaces
 
 _TYPES = mujoco.mjtGeom
 _CURVED = (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_ELLIPSOID, _TYPES.mjGEOM_CAPSULE, _TYPES.mjGEOM_CYLINDER)
-POINTS = 120  # points on each geom that are compared with other geoms
+POINTS = 120  # number of points on each geom that are compared with other geoms
 # Surfaces that are closer than APART count as coincident, and LIFT separates them. Both are in units of `_scale`. At a
 # distance of 20 times the size of a geom, rounding errors are a tenth of LIFT, and a third for Mitsuba's cylinder.
 APART, LIFT = 5e-6, 5e-5

@@ -28,7 +28,7 @@ class ModelSnapshot:
 
     geoms: visible geoms
     hidden: geoms that are invisible only because their alpha is 0
-    moving: geoms that rays can hit at any pose
+    moving: geoms that the renderer can show in any pose
     resizable: geoms whose sizes may differ
     varied: geoms that may differ, with the ids of the materials that each may have (`appearances.varied_geoms`)
     """

@@ -44,7 +44,7 @@ LONG = 30
 class Part:
     """One Mitsuba shape of a geom: a plugin with the pose `local` (4, 4) in the geom's frame, or triangles.
 
-    mirrors: True if the geom's mirror reflection, if it has one, applies to this part
+    mirrors: True if a mirror reflection of the geom applies to this part
     """
 
     plugin: str = ""

@@ -39,7 +39,7 @@ class Triangles:
         return self if self.uv is None else replace(self, uv=self.uv * repeat)
 
     def lifted(self, distance: float) -> Triangles:
-        """Return the same triangles with all faces moved outwards by about a distance, or more, without gaps."""
+        """Return the same triangles with all faces moved outwards by about `distance` or more, without gaps."""
         if distance == 0:
             return self
         _, place = np.unique(self.vertices, axis=0, return_inverse=True)
@@ -67,7 +67,9 @@ class Triangles:
 
 
 def join(parts: list[Triangles]) -> Triangles:
-    """Return one mesh of several. Either all or none have texture coordinates, and either all or none have normals."""
+    """Join several meshes into one. Either all or none have texture coordinates, and either all or none have
+    normals.
+    """
     offsets = np.cumsum([0] + [len(p.vertices) for p in parts[:-1]])
     uvs = [p.uv for p in parts if p.uv is not None]
     normals = [p.normals for p in parts if p.normals is not None]

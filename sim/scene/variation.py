@@ -131,8 +131,8 @@ class Variation:
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
         """Return the factors of `light` at all combinations of the ends of its ranges, (case, band).
 
-        The largest factor over all bands is among them. Within the ranges, the factor of a single band may be larger,
-        by a third for ranges from warm to cold light.
+        They include the largest factor over all bands. In a single band, values inside the ranges may give a larger
+        factor, by a third for ranges from warm to cold light.
         """
         names = self.of_light
         ends = [self.ranges[name] for name in names]

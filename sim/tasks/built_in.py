@@ -60,7 +60,7 @@ class AgentEvents:
         return self.goal | self.adversary
 
     def within(self, worlds: np.ndarray) -> AgentEvents:
-        """Return a copy of the events without those of worlds for which `worlds` (n,) is False."""
+        """Return a copy of the events without the events of worlds for which `worlds` (n,) is False."""
         return AgentEvents(
             progress=np.where(worlds, self.progress, 0.0),
             goal=self.goal & worlds,

@@ -28,8 +28,8 @@ SHARED = ("substeps", "episode_steps")  # settings of the world that must be equ
 class Frozen:
     """An animal that does not learn. The task of a learning animal in the same world lists it in `others`.
 
-    task: task that defines the animal's eyes and actions, and when it ends an episode; the rewards and the `others` of
-        this task are not used
+    task: task that defines the animal's eyes and actions, and the condition on which it ends an episode; the rewards
+        and the `others` of this task are not used
     policy: an object with the method `predict` of stable-baselines3 (a learner, or the return value of
         `evolve.load_policy`), or a function. The function receives the observations of all worlds, as in
         `make_vec_env`, and returns the actions (world, number). None: the actions are zeros, and the animal's eyes are

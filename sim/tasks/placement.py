@@ -1,4 +1,4 @@
-"""Random starting positions of the agent and the objects, which are never within reach of each other."""
+"""Random starting positions of the agent and the objects, such that the agent starts out of reach of all objects."""
 
 from __future__ import annotations
 

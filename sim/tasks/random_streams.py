@@ -158,7 +158,7 @@ def _roots(seed: Any, n: int) -> tuple[Any, list[tuple[Any, int]]]:
     """Return the entropy of all streams, and for each world the entropy and the index from which its streams derive.
 
     seed: one seed, from which the worlds derive different streams by their indices; or a tuple with a seed for each
-        world. With the latter, a world has the streams of the first world of a batch with this seed
+        world. In the second case, a world has the same streams as the first world of a batch with this world's seed
     """
     if isinstance(seed, tuple):
         return seed, [(own, 0) for own in seed]

@@ -39,8 +39,8 @@ TERMS = ("progress", "goal", "adversary", "contact")
 class RewardWeights:
     """Weights of the terms.
 
-    The weight of progress is per metre, that of goal and adversary per object reached, and that of contact per action
-    in which the agent touched a wall.
+    Progress is weighted per metre, goal and adversary per reached object, and contact per action in which the agent
+    touched a wall.
     """
 
     progress: float

@@ -34,6 +34,7 @@ class Simulation:
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     physics: physics of the worlds
     agents: agents in each world, learners first
+    task_name: name of the task in messages
     rows: number of learners in all worlds together
     steps: number of actions taken in the present episode of each world, (n,)
     varied: current values of the varied quantities in each world, by name
@@ -58,6 +59,7 @@ class Simulation:
         if n < 1:
             raise ValueError(f"n_envs = {n!r}: must be at least 1")
         self.task, self.n, self.agents = task, n, task.agents()
+        self.task_name = " and ".join(agent.name for agent in self.agents)
         self.least_return = -math.inf if least_return is None else least_return
         self.episode_steps = task.episode_steps if episode_steps is None else episode_steps
         self.variation = Variation(task.vary) if task.vary else None
@@ -118,11 +120,6 @@ class Simulation:
         self._feel(self.task.all_proprioception(self.physics, worlds), worlds)
         self.physics.check(self.task_name)
         self.begun = True
-
-    @property
-    def task_name(self) -> str:
-        """Name of the task in messages."""
-        return " and ".join(agent.name for agent in self.agents)
 
     def step(self, actions: np.ndarray) -> Step:
         """Take one action in all worlds; `actions`: values in [-1, 1] of all agents, (n, value)."""

@@ -2,9 +2,9 @@
 
 A few walls are intersected one by one. If there are more, a ray walks through a grid in which each wall fills whole
 cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Light is traced in
-components, which are usually the bands. There are fewer components if all lights share one spectrum, and the materials'
-spectra are combinations of a few spectra: each of these is a component. After two reflections, the spectrum of light is
-a product of two materials' spectra, so all bands are traced, unless all materials are grey.
+components, which are usually the bands. There are fewer components if all lights share one spectrum and the materials'
+spectra are linear combinations of a few spectra. Each of these few spectra is then a component. After two reflections,
+the spectrum of light is a product of two materials' spectra, so all bands are traced, unless all materials are grey.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ class _Hit:
 class ClosedFormTables:
     """Arrays that are the same in all worlds.
 
-    texels: reflectance, one array per component · faces: see `face_rows`
+    texels: reflectance, one array per component
+    faces: see `face_rows`
     cells: grid in which the walls stand; None: walls are intersected one by one
     """
 
@@ -75,11 +76,13 @@ class ClosedForm:
     basis: (component, band): contribution of each component to each band
     world, walls, footprints, lights, components: the parts of the scene
     medium: water or air between surfaces and eyes; None: clear air
-    faces: textures of walls and floor, see `face_rows` · sphere_textures: maps to the texels, and the texels' places
+    faces: textures of walls and floor, see `face_rows`
+    sphere_textures: maps to the texels, and the texels' places
 
     Raises:
-        NoClosedForm: walls that lie on no grid. With more than direct light also: walls of several heights, walls lower
-            than a body, bodies that may change their height, and a texture on the body that carries the eyes.
+        NoClosedForm: walls that lie on no grid. If light is reflected more than once, also: walls of several heights,
+            walls lower than a body, bodies that may change their height, and a texture on the body that carries the
+            eyes.
     """
 
     name = "closed_form"
@@ -142,8 +145,11 @@ class ClosedForm:
         return sent if self.medium is None else self.medium.through(sent, hit.t), hit.t
 
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
-        """Return the light that walls and floor reflect towards the origin of each ray, per component. They receive
-        direct light, which the sphere at `shade` may block, and the additional irradiance `more`, if given."""
+        """Return the light that walls and floor reflect towards the origin of each ray, per component.
+
+        Walls and floor receive direct light, which the sphere at `shade` may block, and the additional irradiance
+        `more`, if given.
+        """
         hit = self._hit(ray, [], self.inputs)
         light = self._irradiance(hit, [shade], self.inputs, [radius])
         if more:

@@ -15,7 +15,9 @@ GREY = 1e-4
 class Components:
     """Factors of radiance_b = sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
 
-    reflectance: (texel, component) · levels: of the lights (light, component) · basis: (component, band)
+    reflectance: (texel, component)
+    levels: levels of the lights, (light, component)
+    basis: (component, band)
     """
 
     reflectance: np.ndarray
@@ -37,7 +39,7 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 
 
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components in which reflection multiplies light by a texel, component by component."""
+    """Return components for which a reflection multiplies each component of the light by the texel's component."""
     grey = texels.mean(axis=1, keepdims=True)
     if np.abs(texels - grey).max() <= GREY:
         few = components_of(np.tile(grey, texels.shape[1]), irradiance)

@@ -13,7 +13,7 @@ from optics import BandMedium
 from optics.numerics.autodiff import Array
 
 FARTHEST = 1e9  # [m] replaces an infinite distance
-LEAST = 1e-6  # [1/m] smallest coefficient, with which nothing is visible through FARTHEST
+LEAST = 1e-6  # [1/m] smallest coefficient; a path of length FARTHEST is then opaque
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class MediumOnRays:
         """Return the contrasts (L - V) exp(-c d) between surfaces and the veiling light, per component.
 
         radiance: share · L
-        distances: exp(-c d) is averaged over them [m]
+        distances: distances d [m], over which exp(-c d) is averaged
         share: fraction of an area that the surface fills
         """
         near = [dr.minimum(d, FARTHEST) for d in distances]

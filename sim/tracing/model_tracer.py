@@ -101,8 +101,8 @@ class RowBuffers:
 class _SurfaceHit:
     """First hits of rays.
 
-    si: interaction for the BSDF · colors, glow: factors of its reflectance and of its emission, per chunk of bands
-    which: number of the mover, or the number of movers for none · seen: True for a hit · active: traced rays
+    si: interaction for the BSDF · colors, glow: factors of reflectance and emission, per LANES bands
+    which: index of the mover, or the number of movers without a hit on one · seen: True for a hit · active: traced rays
     point, normal: in the world; the normal points to the ray's origin · t: distance [m] · direction: of the ray
     """
 

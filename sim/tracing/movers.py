@@ -37,7 +37,7 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray. t: distance [m], infinite without a hit · which: number of the mover
 
-    normal: unit vector in the world · uv: texture coordinates of meshes and planes
+    normal: unit vector in the world's frame · uv: texture coordinates of meshes and planes
     """
 
     t: Array
@@ -265,7 +265,7 @@ def _of_primitive(primitive: Primitive) -> Callable[..., Array]:
 
 def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
     """Return the distance to mover k along a ray [m]. A branch skips the intersection if a ray misses the sphere around
-    the mover, as most rays and their neighbours do. The origin of an absent mover is NaN, so all rays miss it."""
+    the mover, which most rays do. The origin of an absent mover is NaN, so all rays miss it."""
 
     def within() -> Array:
         frame = _frame(there, k)

@@ -129,7 +129,7 @@ class Course:
     def fall(self, start: Cell) -> tuple[float, Cell]:
         """Return the largest necessary decrease of the distance from a start [m], and the cell before this decrease.
 
-        An agent may be in any cell ahead of the start. From each such cell, it takes the path to the goal on which the
+        Every cell ahead of the start is considered. From each, the agent takes the path to the goal on which the
         distance from the start decreases least. The result is the largest of these decreases.
         """
         ease = self._ease(start)

@@ -95,7 +95,7 @@ def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[flo
 
 
 def set_wall_height(spec: mujoco.MjSpec, height: float) -> None:
-    """Change the height of all walls [m]. They go on standing on the floor."""
+    """Change the height of all walls [m]. The walls still stand on the floor."""
     for geom in spec.worldbody.geoms:
         if geom.name.startswith("wall"):
             geom.pos[2] = geom.size[2] = height / 2

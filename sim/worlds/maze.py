@@ -47,8 +47,8 @@ def add_layout(spec: mujoco.MjSpec, mazes: Sequence[np.ndarray], rngs: Sequence[
 def draw_maze(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
     """Return the walls of a maze without dead ends, boolean (row, column).
 
-    A depth-first walk connects all rooms into a tree. Every dead end then gets a second opening. An agent that
-    follows a corridor therefore never has to turn back.
+    A depth-first walk connects all rooms into a tree. Every dead end then gets a second opening, so that an agent in a
+    corridor never has to turn back.
     """
     walls = np.ones(shape, dtype=bool)
     walls[1, 1] = False

@@ -47,7 +47,7 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3
 def _center_line(row: int, shape: tuple[int, int], rng: np.random.Generator) -> list[Cell]:
     """Return the cells of a centre line from the west end of a row to the column before the east border.
 
-    The distance from every cell of the line to the later ones falls by at most MOST_FALL along the line.
+    For every cell of the line, the distance to the later cells falls by at most MOST_FALL along the line.
     """
     line, last = [(row, 1), (row, 2), (row, 3)], _EAST
     while line[-1][1] < shape[1] - 2:
@@ -68,7 +68,7 @@ def _straight(cell: Cell, step: Cell, length: int, shape: tuple[int, int]) -> li
 
 
 def _hardly_falls(line: list[Cell]) -> bool:
-    """Return whether the distance from each cell to the later ones falls by at most MOST_FALL along the line."""
+    """Return whether, for each cell, the distance to the later cells falls by at most MOST_FALL along the line."""
     cells = np.array(line, float) * CELL
     apart = np.linalg.norm(cells[:, None] - cells[None], axis=-1)
     later = np.triu(apart)  # row: start, column: cell on the way

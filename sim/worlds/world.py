@@ -29,8 +29,8 @@ from sim.worlds.layout_family import TASKS_WITH_LAYOUTS, LayoutSet
 
 MOST_SEED = 2**128  # largest allowed seed; the seeds that NumPy draws have 128 bits
 MOST_MAZES = 100_000  # largest allowed number of mazes; fewer already exhaust the memory
-# [m] smallest and largest allowed height of walls. Lower walls would end below the top of the agent, and higher ones
-# are no different for its eyes.
+# [m] smallest and largest allowed height of walls. Lower walls would end below the top of the agent, and still higher
+# walls look the same to its eyes.
 WALL_HEIGHTS = (2 * BODY_RADIUS, 100.0)
 _FIELDS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 

@@ -1,5 +1,6 @@
 """The same animals in both tasks: finished training runs are stored, and the interaction agrees with closed forms."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -128,17 +129,33 @@ def test_p_is_uniform_where_nothing_matters():
     assert abs(np.mean(np.array(found) < 0.1) - 0.1) < 3 * np.sqrt(0.1 * 0.9 / 200)
 
 
+ASKED = crossed([ANIMAL, replace(ANIMAL, n_eyes=1)], ("navigation",), (0.01,), (0,))
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """Train the first of the requested animals; return its rows and the file that stores them."""
+    path = tmp_path_factory.mktemp("trained") / "lives.csv"
+    return train_all(ASKED[:1], TINY, path, workers=1), path
+
+
+@pytest.fixture
+def trained(stored, tmp_path):
+    """Return the rows of the first animal, and a copy of the file."""
+    rows, path = stored
+    shutil.copytree(path.parent, tmp_path, dirs_exist_ok=True)
+    return rows, tmp_path / path.name
+
+
 @pytest.mark.slow
-def test_what_has_been_trained_is_not_trained_again(tmp_path, capsys):
-    path = tmp_path / "lives.csv"
-    asked = crossed([ANIMAL, replace(ANIMAL, n_eyes=1)], ("navigation",), (0.01,), (0,))
-    first = train_all(asked[:1], TINY, path, workers=1)
+def test_what_has_been_trained_is_not_trained_again(trained, capsys):
+    first, path = trained
     assert first == read_rows(Trained, path)
     assert not first[0].failed
     assert first[0].steps == 64
     assert first[0].episodes == 2
     capsys.readouterr()
-    both = train_all(asked, TINY, path, workers=1)
+    both = train_all(ASKED, TINY, path, workers=1)
     assert both[0] == first[0]
     assert capsys.readouterr().out.count("of 2") == 1, "only the second design is trained"
     assert Origin.read(path.with_suffix(".json")).whose == "worker"
@@ -162,16 +179,14 @@ def test_trained_animals_are_tested_in_layouts_that_no_selection_has_used(tmp_pa
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kept", "earlier"), [(True, ("a" * 40,)), (False, ())])
-def test_rows_that_are_kept_keep_the_version_that_made_them(tmp_path, kept, earlier):
-    path = tmp_path / "lives.csv"
-    asked = crossed([ANIMAL, replace(ANIMAL, n_eyes=1)], ("navigation",), (0.01,), (0,))
-    train_all(asked[:1], TINY, path, workers=1)
+def test_rows_that_are_kept_keep_the_version_that_made_them(trained, kept, earlier):
+    path = trained[1]
     made = path.with_suffix(".json")
     former = Origin.read(made)
     replace(former, versions={**former.versions, "commit": "a" * 40}).write(made)
     if not kept:
         path.unlink()
-    train_all(asked, TINY, path, workers=1)
+    train_all(ASKED if kept else ASKED[:1], TINY, path, workers=1)
     assert Origin.read(made).earlier == earlier
 
 

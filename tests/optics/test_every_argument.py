@@ -12,7 +12,8 @@ import optics
 from optics import Eye, Pupil
 from tests.optics.walked_eyes import LENS, OF_EYES, OF_FACETS, SCENE
 from tests.optics.walked_lenses import OF_LENSES
-from tests.optics.walked_light import OF_MEASURES, OF_PARTS, OF_PSFS, OF_PUPILS, OF_SHAPES
+from tests.optics.walked_light import OF_MEASURES, OF_PARTS, OF_PSFS
+from tests.optics.walked_pupils import OF_PUPILS, OF_SHAPES
 from tests.walked_arguments import Walk, missing
 
 TABLE = {**OF_SHAPES, **OF_PUPILS, **OF_PSFS, **OF_MEASURES, **OF_EYES, **OF_FACETS, **OF_LENSES, **OF_PARTS}

@@ -20,7 +20,6 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 MODULES = {"stable-baselines3": "stable_baselines3", "tomli-w": "tomli_w", "pillow": "PIL"}
 MODULES |= {"imageio-ffmpeg": "imageio_ffmpeg"}
 THROUGH_OTHERS = {"cma"}  # used, but imported by nevergrad
-OPTICS_ALONE = {"numpy", "scipy", "drjit"}
 
 
 def declared(requirements: list[str]) -> set[str]:
@@ -52,36 +51,6 @@ def test_what_is_demanded_is_what_is_imported():
 def test_the_doctor_asks_for_what_is_demanded_and_no_more():
     assert set(doctor.PACKAGES) == {"rhabdom"} | declared(PROJECT["dependencies"])
     assert set(versions.PACKAGES) <= set(doctor.PACKAGES)
-
-
-@pytest.mark.slow
-def test_optics_alone_runs_its_tutorial_on_three_packages():
-    """The tutorial and the how-to pages that need only optics run with three packages. All other packages are refused,
-    except dependencies of the three."""
-    paths = [ROOT / "docs/tutorial/optics.md", *sorted((ROOT / "docs/how_to").glob("*.md"))]
-    more = re.compile(r"^from rhabdom import .*(sim|evolve)", re.MULTILINE)
-    pages = [page for page in (path.read_text() for path in paths) if not more.search(page)]
-    blocks = re.findall(r"```python\n(.*?)```", "".join(pages), re.DOTALL)
-    blocks = [block for block in blocks if not any(f"import {more}" in block for more in ("torch", "colour"))]
-    assert len(blocks) > 20
-    others = sorted(set(metadata.packages_distributions()) - OPTICS_ALONE - {"optics", "rhabdom"})
-    assert "matplotlib" in others
-    refuse = f"""
-import sys
-class Refuse:
-    def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] in {others!r}:
-            raise ModuleNotFoundError(f"refused: {{name}}", name=name)
-sys.meta_path.insert(0, Refuse())
-"""
-    child = subprocess.run(
-        [sys.executable, "-c", refuse + "\n".join(blocks)], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert child.returncode == 0, child.stderr
-    refused = subprocess.run(
-        [sys.executable, "-c", f"{refuse}import torch"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    assert "refused: torch" in refused.stderr
 
 
 def gpl() -> set[str]:

@@ -28,7 +28,10 @@ EYES = sim.Eyes(n_eyes=2, resolution=(15, 15), placement_range_deg=45.0, noise_s
 
 
 def behind(a: float, focus: float | None = None) -> sim.Eyes:
-    """Eyes with a pinhole of relative aperture a, or a lens in it with `focus` times the correct focal length."""
+    """Return eyes with a pinhole of relative aperture a, or with a lens in it.
+
+    focus: focal length of the lens relative to the correct one; None: no lens
+    """
     focal_length = None if focus is None else focus * EYES.eye().sensor_distance
     return replace(EYES, optics=optics.Pupil(a * EYES.sensor_width / 2, thin_lens_focal_length=focal_length))
 
@@ -44,7 +47,7 @@ CASES = {
 
 
 def moments(world: sim.World) -> WorldState:
-    """Worlds in which all agents face an object 0.6 to 4 m ahead."""
+    """Return worlds in which all agents face an object 0.6 to 4 m ahead."""
     simulation, random = Simulation(task_of(world), WORLDS, 0), np.random.default_rng(0)
     simulation.reset()
     for _ in range(STEPS):
@@ -57,14 +60,14 @@ def moments(world: sim.World) -> WorldState:
 
 
 def seen_in(renderer: sim.BatchedRenderer, state: WorldState, truth: np.ndarray) -> np.ndarray:
-    """Mask of the signals that contain an object, which change if all objects are moved away."""
+    """Return the mask of the signals that contain an object, which change if all objects are moved away."""
     away = replace(state, objects=state.objects + np.array([100.0, 0.0, 0.0]))
     found: np.ndarray = np.abs(renderer.signals(away) - truth) > SEEN * renderer.eye.throughput
     return found
 
 
 def rows(world: sim.World, name: str, eyes: sim.Eyes, state: WorldState) -> list[str]:
-    """Table rows for one eye."""
+    """Return the table rows for one eye."""
     bounced = sim.Fidelity(TRUE, eyes.bands, light="bounce")
     tracer = sim.BatchedRenderer(world, eyes, WORLDS, bounced)
     truth = tracer.signals(state)

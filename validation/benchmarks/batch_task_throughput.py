@@ -36,7 +36,7 @@ def task(module: str) -> Any:
 
 
 def rate(venv: EyesVecEnv, actions: np.ndarray, seconds: float) -> float:
-    """Steps of all worlds per second."""
+    """Return the steps of all worlds per second."""
     start, steps = time.perf_counter(), 0
     while time.perf_counter() - start < seconds:
         venv.step(actions[steps % len(actions)])

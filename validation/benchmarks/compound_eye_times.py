@@ -36,14 +36,14 @@ class Ant(AntSeeks):
 
 
 def mounts() -> list[sim.Mount]:
-    """Mounts in the directions of the ommatidia."""
+    """Return mounts in the directions of the ommatidia."""
     ahead, left, up = Ant.eye.directions.T
     angles = np.degrees([np.arctan2(left, ahead), np.arcsin(up)]).T
     return [sim.Mount("torso", *pair, offset=PLACE) for pair in angles.tolist()]
 
 
 def of_one_receptor() -> tuple[optics.Eye, np.ndarray]:
-    """An ommatidium as an eye with one receptor, and the signal of each type for white."""
+    """Return an ommatidium as an eye with one receptor, and the signal of each type for white."""
     guide, lens = OMMATIDIUM.rhabdom, OMMATIDIUM.lens
     eye = optics.Eye(
         lens.pupil(),
@@ -58,7 +58,7 @@ def of_one_receptor() -> tuple[optics.Eye, np.ndarray]:
 
 
 def cpu_time(call: Callable[[], object]) -> float:
-    """Median CPU time [s] of a call."""
+    """Return the median CPU time [s] of a call."""
     times = []
     for _ in range(WARM_UP + LOOKS):
         start = time.process_time()
@@ -68,7 +68,7 @@ def cpu_time(call: Callable[[], object]) -> float:
 
 
 def fewest(signals: Callable[[int, sim.Poses], np.ndarray], few: sim.Poses) -> tuple[int, float]:
-    """Fewest rays whose error in a few worlds is at most half of the noise, and the error."""
+    """Return the fewest rays whose error in a few worlds is at most half of the noise, and the error."""
     truth = signals(TRUE, few)
     for rays in RAYS:
         error = float(np.sqrt(np.square(signals(rays, few) - truth).mean()))
@@ -79,7 +79,11 @@ def fewest(signals: Callable[[int, sim.Poses], np.ndarray], few: sim.Poses) -> t
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table. rays: per ommatidium · times: CPU times [s] of a single world and of all worlds, (2,)"""
+    """A row of the table.
+
+    rays: rays per ommatidium
+    times: CPU times [s] of a single world and of all worlds, (2,)
+    """
 
     rays: int
     times: np.ndarray
@@ -103,7 +107,7 @@ def report(name: str, renderer: Callable[[int, int], sim.ModelRenderer], white: 
 
 
 def whole_steps(rays: int) -> float:
-    """Steps of all worlds per CPU second."""
+    """Return the steps of all worlds per CPU second."""
     Ant.fidelity = sim.Fidelity(rays, 4)
     worlds = sim.make_vec_env(Ant(), n_envs=WORLDS)
     worlds.reset()

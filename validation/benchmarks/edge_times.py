@@ -46,7 +46,7 @@ THINGS = """
 
 
 def moments(model: mujoco.MjModel) -> list[mujoco.MjData]:
-    """States with random joint positions."""
+    """Return states with random joint positions."""
     random, found = np.random.default_rng(0), []
     for _ in range(WORLDS):
         data = mujoco.MjData(model)
@@ -57,7 +57,7 @@ def moments(model: mujoco.MjModel) -> list[mujoco.MjData]:
 
 
 def rows(name: str, text: str) -> list[str]:
-    """Table rows for one world."""
+    """Return the table rows for one world."""
     model = mujoco.MjModel.from_xml_string(text)
     datas, mount = moments(model), sim.Mount("head", offset=(0.2, 0, 0))
 

@@ -28,7 +28,7 @@ PROGRAMS = {
 
 
 def milliseconds(program: str) -> float:
-    """CPU time [ms] of a process."""
+    """Return the CPU time [ms] of a process."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, "-c", program], env=environment, check=True)

@@ -59,7 +59,7 @@ class Operation:
 
 
 def operations(types: Precision) -> Iterator[Operation]:
-    """Operations for the constants of the cost model that can be measured separately."""
+    """Yield operations for the constants of the cost model that can be measured separately."""
     flop = 1 / cost.MATMUL_FLOPS[types.dtype]
     yield Operation(
         f"flop of a matrix product, {types.dtype}",
@@ -112,7 +112,7 @@ def _random(n: int, types: Precision) -> Field:
 
 
 def _dft(n: int, types: Precision) -> None:
-    """Two complex products of n x n matrices."""
+    """Compute two complex products of n x n matrices."""
     dr.eval(by_whole_matrices(_random(n, types), n + 0.5, (n, n), -1))
 
 
@@ -125,7 +125,7 @@ def _fourier(n: int, types: Precision) -> None:
 
 
 def _fft_sample(n: int) -> float:
-    """Predicted seconds per sample of n x n, as in `fourier.predicted_seconds`."""
+    """Return the predicted seconds per sample of n x n, as in `fourier.predicted_seconds`."""
     return 2 * (5 * np.log2(n + 1) / cost.FFT_FLOPS + cost.FFT_LINE_SAMPLE) + 2 * cost.FFT_COPY
 
 
@@ -158,7 +158,7 @@ def _profile(n: int, types: Precision) -> None:
 
 
 def seconds(run: Callable[[], object], repeats: int) -> float:
-    """Median duration [s] of warm calls."""
+    """Return the median duration [s] of warm calls."""
     found = []
     for _ in range(repeats + 2):
         start = time.perf_counter()
@@ -169,7 +169,7 @@ def seconds(run: Callable[[], object], repeats: int) -> float:
 
 
 def fitted(operation: Operation, repeats: int) -> tuple[float, float]:
-    """Seconds per call and per unit: the line through the times, each weighted by its size."""
+    """Return seconds per call and per unit: the line through the times, each weighted by its size."""
     times = np.array([seconds(lambda n=n: operation.run(n), repeats) for n in operation.sizes])
     counts = np.array([operation.count(n) for n in operation.sizes], dtype=np.float64)
     terms = np.column_stack([np.ones_like(counts), counts]) / times[:, None]

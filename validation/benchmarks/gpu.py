@@ -51,7 +51,7 @@ def relief(radius: float) -> Any:
 
 
 def one_picture(side: int, radius: float, dtype: str) -> Callable[[], Callable[[], Any]]:
-    """PSF of a pupil with glass that approximates a lens."""
+    """Prepare the PSF of a pupil with glass that approximates a lens."""
 
     def make() -> Callable[[], Any]:
         import optics
@@ -64,7 +64,7 @@ def one_picture(side: int, radius: float, dtype: str) -> Callable[[], Callable[[
 
 
 def many_pictures(count: int) -> Callable[[], Callable[[], Any]]:
-    """PSFs of a population."""
+    """Prepare the PSFs of a population."""
 
     def make() -> Callable[[], Any]:
         import optics
@@ -77,7 +77,7 @@ def many_pictures(count: int) -> Callable[[], Callable[[], Any]]:
 
 
 def gradient() -> Callable[[], Any]:
-    """Gradient of the light on the axis over the sixteen heights of a relief."""
+    """Prepare the gradient of the light on the axis with respect to the sixteen heights of a relief."""
     import drjit as dr
 
     import optics
@@ -98,7 +98,7 @@ def gradient() -> Callable[[], Any]:
 
 
 def whole_plane(side: int) -> Callable[[], Callable[[], Any]]:
-    """A field propagated from plane to plane by the angular spectrum."""
+    """Prepare the propagation of a field from plane to plane by the angular spectrum."""
 
     def make() -> Callable[[], Any]:
         import optics
@@ -112,7 +112,7 @@ def whole_plane(side: int) -> Callable[[], Callable[[], Any]]:
 
 
 def kernel() -> Callable[[], Any]:
-    """Receptive kernel, four bands."""
+    """Prepare the receptive kernel of an eye in four bands."""
     from sim import Eyes
     from sim.eyes.receptive_fields import cells_for
     from validation.benchmarks.sim_throughput import with_pupil
@@ -122,7 +122,7 @@ def kernel() -> Callable[[], Any]:
 
 
 def looks(worlds: int, lens: bool, samples: str) -> Callable[[], Callable[[], Any]]:
-    """Signals of two eyes of 15 x 15 receptors in every world, without noise."""
+    """Prepare the signals of two eyes of 15 x 15 receptors in every world, without noise."""
 
     def make() -> Callable[[], Any]:
         import sim
@@ -143,7 +143,7 @@ def looks(worlds: int, lens: bool, samples: str) -> Callable[[], Callable[[], An
 
 
 def steps(worlds: int) -> Callable[[], Callable[[], Any]]:
-    """A step of all worlds: physics on the processor, rendering and noise on the device."""
+    """Prepare a step of all worlds: physics on the processor, rendering and noise on the device."""
 
     def make() -> Callable[[], Any]:
         import sim
@@ -173,7 +173,7 @@ CASES = (
 
 
 def measured(case: Case) -> dict[str, Any]:
-    """Seconds of the first call and of later ones, and the result of the first."""
+    """Return the seconds of the first call and of later ones, and the result of the first."""
     call = case.make()
     begun = time.perf_counter()
     values = np.asarray(call())
@@ -205,12 +205,12 @@ def child(place: str, names: list[str], out: Path) -> None:
 
 
 def chosen(names: list[str]) -> list[Case]:
-    """Cases whose names contain one of these words; all cases for an empty list."""
+    """Return cases whose names contain one of these words; all cases for an empty list."""
     return [case for case in CASES if not names or any(name in case.name for name in names)]
 
 
 def row(name: str, found: dict[str, dict[str, Any]], arrays: dict[str, Any]) -> str:
-    """Table row; the reason for a failure replaces the time."""
+    """Return the table row; the reason for a failure replaces the time."""
     cpu, gpu = (found[place][name] for place in PLACES)
     if "failed" in gpu or "failed" in cpu:
         return f"| {name} | {cpu.get('failed', 'works')} | {gpu.get('failed', 'works')} | | |"

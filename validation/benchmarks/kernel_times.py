@@ -27,14 +27,14 @@ VIEWS_DEG = (45.0, 20.0, 10.0)
 
 
 def eyes(count: int, fov_deg: float, scale: str, seed: int) -> list[optics.Eye]:
-    """Eyes of random genotypes."""
+    """Return eyes of random genotypes."""
     config = assemble(preset="lens", scale=scale, assignments=[f"genome.fov_deg.start={fov_deg}"])
     rng, dimension = np.random.default_rng(seed), Genotype(config.genome).dimension
     return [develop(rng.random(dimension), config).eyes(config.eye).eye() for _ in range(count)]
 
 
 def seconds(eye: optics.Eye) -> float | None:
-    """CPU time; None if refused."""
+    """Return the CPU time; None if refused."""
     start = time.process_time()
     try:
         eye.kernel(cells_for(eye))

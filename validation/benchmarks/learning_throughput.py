@@ -47,7 +47,7 @@ class Learner:
 
 
 def training_rate(learner: Learner, steps: int, seed: int) -> float:
-    """Agent-steps per second of one training in this process."""
+    """Return agent-steps per second of one training in this process."""
     import sim
     from evolve.learning.policy import Brain
     from evolve.learning.ppo import Worlds, train
@@ -77,7 +77,7 @@ def training_rate(learner: Learner, steps: int, seed: int) -> float:
 
 
 def machine_rate(learner: Learner, steps: int) -> float:
-    """Agent-steps per second of one such training per core, side by side."""
+    """Return agent-steps per second of one such training per core, side by side."""
     cores = os.cpu_count() or 1
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(cores, mp_context=context, initializer=prepare_device) as pool:
@@ -85,7 +85,7 @@ def machine_rate(learner: Learner, steps: int) -> float:
 
 
 def results(case: Case, steps: int) -> dict[str, float]:
-    """Agent-steps per second by name."""
+    """Return agent-steps per second by name."""
     rates = measure(case, 64, 1.0)["agent_steps_per_second"]
     found = {"mujoco": rates["mujoco"], "environment": rates["step"]}
     for lens, memory in ((False, 1), (False, 5), (True, 1), (True, 5)):
@@ -95,7 +95,7 @@ def results(case: Case, steps: int) -> dict[str, float]:
 
 
 def missed(task: str, rates: dict[str, float]) -> list[str]:
-    """Description of the bound if it is missed."""
+    """Return the description of the bound if it is missed."""
     ratio = rates["training, perfect lens, memory 1"] / rates["mujoco"]
     return [f"{task}: {ratio:.3g}x mujoco.Renderer, must be {BARS[task]:g}x"] if ratio < BARS[task] else []
 

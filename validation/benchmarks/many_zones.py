@@ -20,7 +20,7 @@ WAVES = 0.08  # [µm] of a mode of second order; higher ones have smaller coeffi
 
 
 def lens(fresnel_number: float, aperture: float, rng: np.random.Generator) -> optics.Pupil:
-    """A lens with a random wavefront."""
+    """Return a lens with a random wavefront."""
     tangent = aperture / np.sqrt(1 - aperture**2)
     radius = fresnel_number * WAVELENGTH / tangent
     modes = {(n, m): WAVES * rng.normal() / (n - 1) for n in range(2, ORDER + 1) for m in range(-n, n + 1, 2)}
@@ -28,7 +28,7 @@ def lens(fresnel_number: float, aperture: float, rng: np.random.Generator) -> op
 
 
 def seconds(pupil: optics.Pupil, dx: float, tolerance: float) -> tuple[optics.PSFResult, float]:
-    """The PSF, including planning, and its CPU time."""
+    """Return the PSF, including planning, and its CPU time."""
     for _ in range(2):
         choose.cache_clear()
         start = time.process_time()
@@ -38,7 +38,7 @@ def seconds(pupil: optics.Pupil, dx: float, tolerance: float) -> tuple[optics.PS
 
 
 def off(result: optics.PSFResult, rng: np.random.Generator) -> float:
-    """Relative difference from the direct sum."""
+    """Return the relative difference from the direct sum."""
     places = SIDE // 2 + np.round(rng.normal(size=(16, 2)) * 8).astype(int)
     ask = {"shape": (1, 1), "method": "rayleigh_sommerfeld", "tolerance": 1e-6, "dtype": "float64"}
     exact = [

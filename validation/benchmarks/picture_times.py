@@ -23,7 +23,7 @@ EYES = {"maze": sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_ran
 
 
 def walk(task: str, eyes: sim.Eyes) -> tuple[sim.World, list[WorldState]]:
-    """States of an agent that turns slowly as it moves."""
+    """Return the states of an agent that turns slowly as it moves."""
     env = sim.make_env(task, eyes, rays_per_receptor=1)
     env.reset(seed=1)
     states = []
@@ -34,7 +34,7 @@ def walk(task: str, eyes: sim.Eyes) -> tuple[sim.World, list[WorldState]]:
 
 
 def milliseconds(camera: FollowCamera, states: list[WorldState]) -> float:
-    """Median CPU time [ms] of a rendering."""
+    """Return the median CPU time [ms] of a rendering."""
     spent = []
     for state in states:
         start = time.process_time()

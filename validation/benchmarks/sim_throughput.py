@@ -73,14 +73,14 @@ SETTLED = 256  # steps: an episode. Before, physics touches new walls and builds
 
 
 def with_pupil(eyes: sim.Eyes) -> sim.Eyes:
-    """The same eyes behind an open pupil one quarter as wide as the retina, with a lens in focus."""
+    """Return the same eyes behind an open pupil one quarter as wide as the retina, with a lens in focus."""
     focal_length = eyes.eye().sensor_distance
     pupil = optics.Pupil(aperture_radius=eyes.sensor_width / 8, thin_lens_focal_length=focal_length)
     return replace(eyes, optics=pupil)
 
 
 def seconds(call: Callable[[], Any], budget: float) -> float:
-    """Median duration of a call: a few calls to warm up, then calls for `budget` seconds, at least five."""
+    """Return the median duration of a call: a few calls to warm up, then calls for `budget` seconds, at least five."""
     for _ in range(WARM_UP):
         call()
     times: list[float] = []
@@ -90,7 +90,7 @@ def seconds(call: Callable[[], Any], budget: float) -> float:
 
 
 def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
-    """Agent-steps per second of one case, and ratios to MuJoCo's renderer."""
+    """Return agent-steps per second of one case, and ratios to MuJoCo's renderer."""
     world = sim.build_world(case.task, eyes=case.eyes)
     rng = np.random.default_rng(0)
     state = Simulation(task_of(world), n_envs, 0).reset()
@@ -187,7 +187,10 @@ def _duration(call: Callable[[], Any]) -> float:
 
 
 def _mitsuba_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float) -> float:
-    """Agent-steps/s of Mitsuba in a plain script: the scene is edited and rendered for every eye of one world."""
+    """Return Mitsuba's agent-steps per second in a plain script.
+
+    The script edits and renders the scene for every eye of one world.
+    """
     height, width = eyes.resolution
     mirror = sim.mirror(world.model)
     data = mujoco.MjData(world.model)
@@ -203,7 +206,7 @@ def _mitsuba_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float) -
 
 
 def _mujoco_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float, shadows: bool) -> float | None:
-    """Agent-steps/s of mujoco.Renderer with the eyes' resolution; None without OpenGL."""
+    """Return agent-steps/s of mujoco.Renderer with the eyes' resolution; None without OpenGL."""
     height, width = eyes.resolution
     try:
         renderer = mujoco.Renderer(world.model, height, width)
@@ -260,7 +263,7 @@ def _table(result: dict[str, Any]) -> str:
 
 
 def _missed(result: dict[str, Any]) -> list[str]:
-    """Bounds that this result misses; they are set for 64 worlds."""
+    """Return bounds that this result misses; they are set for 64 worlds."""
     ratios = result["ratio_to_mujoco"]
     if result["n_envs"] != 64 or not ratios:
         return []

@@ -18,8 +18,9 @@ the times for physics and for rendering.
 
 - Rendering per world is at least twice as fast as with a single world. Measured ratios are 2.7 to 3.7, because the
   worlds of a batch share one kernel launch.
-- A whole step takes at most 1.25 times as long as physics and rendering alone. Measured ratios are at most 1.17. The
-  ratio exceeds 1 because physics and rendering displace each other's data from the processor's caches.
+- A whole step takes at most 1.25 times the sum of the times for physics alone and rendering alone. Measured ratios are
+  at most 1.17. The ratio exceeds 1 because, within a step, physics and rendering displace each other's data from the
+  processor's caches.
 
 **Limits.** Absolute rates depend on the machine and on the code.
 
@@ -92,7 +93,7 @@ class Row:
 
 
 def environments() -> dict[str, Callable[[int], EyesVecEnv]]:
-    """Functions, by name, that make an environment of a number of worlds."""
+    """Return functions, by name, that make an environment of a number of worlds."""
     eyes = sim.Eyes(n_eyes=2, resolution=RESOLUTION, fov_deg=FOV_DEG)
     ours = {
         name: lambda n, name=name: sim.make_vec_env(name, eyes, n, fidelity=sim.Fidelity(4, bands=4))
@@ -107,7 +108,7 @@ def environments() -> dict[str, Callable[[int], EyesVecEnv]]:
 
 
 def parts_of(env: EyesVecEnv) -> dict[str, Callable[[], object]]:
-    """Measured parts: one step of all worlds each."""
+    """Return the measured parts: one step of all worlds each."""
     random = np.random.default_rng(0)
 
     def action() -> np.ndarray:
@@ -128,7 +129,7 @@ def parts_of(env: EyesVecEnv) -> dict[str, Callable[[], object]]:
 
 
 def timed(part: Callable[[], object], steps: int) -> float:
-    """CPU seconds of one step."""
+    """Return the CPU seconds of one step."""
     began = time.process_time()
     for _ in range(steps):
         part()
@@ -186,7 +187,7 @@ def broken_bounds(rows: list[Row]) -> list[str]:
 
 
 def draw_figure(rows: list[Row], path: Path) -> None:
-    """Steps over the number of worlds, a panel for each model."""
+    """Draw steps over the number of worlds, a panel for each model."""
     from matplotlib.figure import Figure
 
     names = list(dict.fromkeys(row.name for row in rows))

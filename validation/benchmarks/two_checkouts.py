@@ -37,7 +37,7 @@ def _example(name: str, task: str) -> Any:
 
 
 def _humanoid() -> Any:
-    """Gymnasium's humanoid (MIT) with two eyes; its reward is irrelevant here."""
+    """Return Gymnasium's humanoid (MIT) with two eyes; its reward is irrelevant here."""
     import optics
     import sim
 
@@ -58,7 +58,7 @@ def _humanoid() -> Any:
 
 
 def cases() -> dict[str, Callable[[], Any]]:
-    """Environments to step, by name."""
+    """Return environments to step, by name."""
     import optics
     import sim
 
@@ -106,7 +106,7 @@ def serve() -> None:
 
 
 def rate(venv: Any, actions: Any, seconds: float) -> float:
-    """Steps of all worlds per second."""
+    """Return the steps of all worlds per second."""
     start, steps = perf_counter(), 0
     while perf_counter() - start < seconds:
         venv.step(actions[steps % len(actions)])

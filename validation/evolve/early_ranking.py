@@ -1,8 +1,8 @@
 """Early ranking: does fitness after little training predict final fitness?
 
 Does the order of animals after part of a training run predict their order after all of it? After half of the training,
-the rank correlation with the final order is 0.86. The order after less training is a poor predictor: the correlation is
-0.64 after an eighth of the training and -0.33 after a quarter.
+the rank correlation with the final order is 0.86. The order after less training does not predict the final order well:
+the correlation is 0.64 after an eighth of the training and -0.33 after a quarter.
 
 **Method.** Successive halving (`search.rungs`, `evolve.search.successive_halving`) trains the whole generation for a
 short time and continues only with the better animals. The parts of such a training run are called rungs. Successive
@@ -10,16 +10,17 @@ halving saves time only if the early order resembles the final order. For this t
 x 1 to 15 x 15 receptors behind a perfect lens are drawn from the genome. They learn detection over four rungs, as in an
 evolutionary run, but no animal is stopped at a rung.
 
-**First table.** The table compares the order of the animals on each rung with their order on the last rung, with
-fitness from the same number of episodes on both. Cells state Spearman's rank correlation, and its 90 % confidence
-interval from a bootstrap over animals. In the column "32 episodes", animals are ordered by the fitness that a run uses,
-from the evaluation episodes of each rung. In the column "128 episodes", they are ordered by the fitness of the same
-policies in more episodes, in other worlds. The last line compares the two measures of fitness on the last rung.
+**First table.** The table compares the order of the animals after each rung with their order after the last rung. Cells
+state Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over animals. In the column "32
+episodes", the fitness of both rungs comes from the 32 evaluation episodes that a run uses. In the column "128
+episodes", it comes from 128 episodes of the same policies in other worlds. The last line compares the two measures of
+fitness after the last rung.
 
 **Second table.** The table lists possible schedules of successive halving, applied to these animals as one generation.
 "CPU time" is relative to training all animals to the end. The last two columns state the final rank of the animal that
-the schedule selects as the best. The final rank is the rank on the last rung, by 128 episodes. The two columns differ
-in the number of episodes, 32 or 128, from which the schedule decides which animals continue.
+the schedule selects as the best. The final rank is the rank after the last rung by the fitness in 128 episodes. The
+schedule decides which animals continue, from the fitness in 32 episodes (first of these columns) or in 128 episodes
+(second).
 
 **Result.** Two rungs save a fifth of the time if half of the animals continue to the second rung. Schedules that select
 animals earlier save more time but may lose the best animal. Successive halving is off by default. Thirty-two episodes
@@ -90,7 +91,7 @@ class Row:
 
 
 def animals(count: int) -> list[Phenotype]:
-    """The first `count` of a sequence of random animals."""
+    """Return the first `count` of a sequence of random animals."""
     found = []
     for number in range(count):
         chance = np.random.default_rng([2, number])
@@ -111,7 +112,7 @@ def animals(count: int) -> list[Phenotype]:
 
 
 def config(animal: Phenotype) -> RunConfig:
-    """Configuration of a run of detection with RUNGS rungs and enough rays for this animal's eyes."""
+    """Return the configuration of a run of detection with RUNGS rungs and enough rays for this animal's eyes."""
     rays = max(1, RAYS // (animal.resolution[0] * animal.resolution[1]))
     settings = (f"learning.total_steps={TOTAL}", f"learning.eval_interval={TOTAL // 2 ** (RUNGS - 1)}")
     optics = ("eye.optics=false", f"eye.rays_per_receptor={rays}")
@@ -121,7 +122,7 @@ def config(animal: Phenotype) -> RunConfig:
 
 
 def climbed(number: int, animal: Phenotype) -> list[Row]:
-    """Rows of an animal on all rungs, from the first to the last."""
+    """Return the rows of an animal on all rungs, from the first to the last."""
     run, rows = config(animal), []
     worlds = sim.make_vec_env(
         run.task,
@@ -180,13 +181,13 @@ def store(count: int, path: Path) -> None:
 
 
 def columns(rows: Sequence[Row], name: str) -> np.ndarray:
-    """One column of the rows, (animal, rung)."""
+    """Return one column of the rows, (animal, rung)."""
     values = [getattr(row, name) for row in sorted(rows, key=lambda row: (row.animal, row.budget))]
     return np.array(values).reshape(-1, RUNGS)
 
 
 def correlation(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """Spearman's rank correlation, and the ends of its 90 % confidence interval."""
+    """Return Spearman's rank correlation, and the ends of its 90 % confidence interval."""
     draws = np.random.default_rng(0).integers(len(a), size=(2000, len(a)))
     (whole,), drawn = _of_ranks(a[None], b[None]), _of_ranks(a[draws], b[draws])
     low, high = np.quantile(drawn[np.isfinite(drawn)], [0.05, 0.95])
@@ -194,7 +195,7 @@ def correlation(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
 
 
 def _of_ranks(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Pearson's correlation of the ranks of each row; NaN for constant rows."""
+    """Return Pearson's correlation of the ranks of each row; NaN for constant rows."""
     x, y = (rankdata(values, axis=1) - (values.shape[1] + 1) / 2 for values in (a, b))
     with np.errstate(invalid="ignore"):
         return (x * y).sum(axis=1) / np.sqrt((x**2).sum(axis=1) * (y**2).sum(axis=1))
@@ -235,7 +236,7 @@ def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") 
 
 
 def table(rows: Sequence[Row]) -> str:
-    """A line per rung, then a line per variant of successive halving."""
+    """Return a line per rung, then a line per variant of successive halving."""
     fitness, many, spent = (columns(rows, name) for name in ("fitness", "fitness_many", "cpu_seconds"))
     lines = [f"{len(fitness)} animals", f"{'steps':>9}{'CPU time':>10}{f'{FEW} episodes':>26}{f'{MANY} episodes':>26}"]
     share = spent.cumsum(axis=1).sum(axis=0) / spent.sum()
@@ -252,7 +253,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def verdicts(rows: Sequence[Row]) -> list[str]:
-    """Descriptions of the bounds that the stored training runs violate."""
+    """Return the descriptions of the bounds that the stored training runs violate."""
     many = columns(rows, "fitness_many")
     return [] if len(many) >= 16 else [f"{len(many)} animals are too few"]
 
@@ -262,7 +263,7 @@ def _shown(found: tuple[float, float, float]) -> str:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Fitness on each rung over fitness on the last, by MANY episodes."""
+    """Draw the fitness on each rung over the fitness on the last rung, both from MANY episodes."""
     import matplotlib
 
     matplotlib.use("agg")

@@ -1,14 +1,15 @@
 """Fewer epochs late in training: less CPU time at the same return
 
 Do fewer epochs late in training save time without loss of return? Yes: they save 8 % of the CPU time in detection, 8 %
-in tracking and 16 % in navigation. In the same order, the mean returns change by +4.2 ± 1.6, +6.9 ± 3.0 and -0.0 ± 0.2.
+in tracking and 16 % in navigation. The mean returns in these tasks change by +4.2 ± 1.6, +6.9 ± 3.0 and -0.0 ± 0.2,
+respectively.
 
 **Method.** An epoch is one pass over the samples of an update. After `decay_after` training steps, the change of the
 weights per update has to fall in inverse proportion to the number of steps. There are two ways to achieve this: smaller
 optimiser steps in the same number of epochs, or optimiser steps of the same size in fewer epochs. The second way moves
 the weights about as far in less time. Both ways first reduce the optimiser step. After 150,000 training steps, it is
-half as large as at first. Until then both ways are identical to the last bit. From then on, one way reduces the
-optimiser step further. The other way reduces the number of epochs instead, until `least_epochs` (3) of 10 are left.
+half as large as at first. Until then both ways are bit-identical. From then on, the first way reduces the optimiser
+step further. The second way reduces the number of epochs instead, from 10 to 3 (`least_epochs`).
 
 Each row compares the same training runs (task, seed, eyes) with a constant and with a falling number of epochs. All
 runs have 500,000 steps, a receptor noise of σ = 0.01, eyes 45° wide with perfect lenses, and networks of 64 units. In
@@ -24,10 +25,10 @@ the number of epochs.
 
 **Bounds.** No task's mean return falls by more than two standard errors, and CPU time falls by at least a twentieth.
 
-**Limits.** The saving is limited, because over a whole training run of this length only three in ten epochs are
-omitted. Everything else takes as long as before, including the ten evaluations of a training run. Navigation is learnt
-after 150,000 steps and the return cannot rise further, so only the time differs there. In a training run of a million
-steps, updates have five epochs on average.
+**Limits.** The saving is limited, because only three of ten epochs are omitted over a whole training run of this
+length. Everything else takes as long as before, including the ten evaluations of a training run. In navigation, the
+animals have learnt the task after 150,000 steps and the return cannot rise further, so only the time differs. In a
+training run of a million steps, updates have five epochs on average.
 
 Training runs take minutes each, so their results are stored (`docs/validation/data/fewer_epochs.csv`). The page is
 written from the stored results.
@@ -125,7 +126,7 @@ def write(lives: Sequence[Life], path: Path) -> None:
 
 
 def pairs(lives: Sequence[Life], task: str) -> list[tuple[Life, Life]]:
-    """Pairs of training runs for every seed that was trained in both ways: constant epochs, and fewer epochs."""
+    """Return pairs of training runs for every seed that was trained in both ways: constant epochs, and fewer epochs."""
     found = {(life.seed, life.least_epochs): life for life in lives if life.task == task}
     seeds = sorted({seed for seed, _ in found})
     both = [(found.get((seed, THROUGHOUT)), found.get((seed, FEWER))) for seed in seeds]
@@ -157,7 +158,7 @@ def compared(both: Sequence[tuple[Life, Life]]) -> Comparison:
 
 
 def table(lives: Sequence[Life]) -> str:
-    """A line per task."""
+    """Return a line per task."""
     lines = [f"{'task':12}{'runs':>6}{'return':>16}{'difference':>14}{'goal first':>16}{'CPU s':>14}{'saved':>7}"]
     for task in EYES:
         both = pairs(lives, task)
@@ -177,7 +178,7 @@ def table(lives: Sequence[Life]) -> str:
 
 
 def verdicts(lives: Sequence[Life]) -> list[str]:
-    """Descriptions of the bounds that the stored training runs violate."""
+    """Return the descriptions of the bounds that the stored training runs violate."""
     broken = []
     for task in EYES:
         both = pairs(lives, task)
@@ -193,13 +194,16 @@ def verdicts(lives: Sequence[Life]) -> list[str]:
 
 
 def passes_until(task: str, least_epochs: int, evaluations: int) -> np.ndarray:
-    """Mean number of epochs in the updates before each evaluation, (evaluation,)."""
+    """Return the mean number of epochs in the updates before each evaluation, (evaluation,)."""
     learning = assemble(task, assignments=(*SETTINGS, f"learning.least_epochs={least_epochs}")).learning
     return np.array([mean_passes(learning, n * INTERVAL, (n + 1) * INTERVAL) for n in range(evaluations)])
 
 
 def seconds(task: str, cpu: tuple[float, float], evaluations: int) -> np.ndarray:
-    """CPU time until each evaluation, (way, evaluation), assuming equal times for all epochs and for all other work."""
+    """Return the CPU time until each evaluation, (way, evaluation).
+
+    All epochs are assumed to take the same time, and so is all other work per step.
+    """
     passes = np.array([passes_until(task, least, evaluations) for least in (THROUGHOUT, FEWER)])
     (old, new), saved = passes.mean(axis=1), cpu[0] - cpu[1]
     per_pass = saved / (old - new)
@@ -207,7 +211,7 @@ def seconds(task: str, cpu: tuple[float, float], evaluations: int) -> np.ndarray
 
 
 def draw(lives: Sequence[Life], path: Path) -> None:
-    """A panel per task: return over CPU time, training runs thin and their means thick."""
+    """Draw a panel per task: return over CPU time, training runs thin and their means thick."""
     import matplotlib
 
     matplotlib.use("agg")

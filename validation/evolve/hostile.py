@@ -62,7 +62,7 @@ PROMISES = (
 
 
 def failures(promise: Promise, trials: int, seed: int, stage: Stage) -> list[str]:
-    """Descriptions of the failed trials."""
+    """Return the descriptions of the failed trials."""
     chances = (random.Random(f"{promise.trial.__name__} {seed} {number}") for number in range(trials))
     return [wrong for chance in chances if (wrong := promise.trial(chance, stage)) is not None]
 

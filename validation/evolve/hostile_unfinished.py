@@ -22,13 +22,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 
 def quickly(phenotype: Any, config: Any, seed: int, policy: Path, progress: Any) -> Evaluation:
-    """Evaluation that takes no time."""
+    """Return an evaluation without any training, so that it takes no time."""
     write_whole(policy, b"policy")
     return Evaluation(phenotype.fov_deg, (phenotype.fov_deg,), 0.5, 4096, 0.01)
 
 
 def while_it_is_deleted(phenotype: Any, config: Any, seed: int, policy: Path, progress: Any) -> Evaluation:
-    """Evaluation that takes no time and deletes the run before or after it."""
+    """Return an evaluation without any training, and delete the run before or after it."""
     if seed % 2:
         shutil.rmtree(policy.parents[2])
     outcome = quickly(phenotype, config, seed, policy, progress)
@@ -54,7 +54,7 @@ def _begin(stage: Stage, evaluate: str, seed: int, *options: str, **streams: Any
 
 
 def reader_leaves(chance: random.Random, stage: Stage) -> str | None:
-    """`evolve run | head -1`, with and without `--json` and `2>&1`: the run must continue to its end."""
+    """Run `evolve run | head -1`, with or without `--json` and `2>&1`: the run must continue to its end."""
     reader, writer = os.pipe()
     err = chance.choice((writer, subprocess.DEVNULL))
     child = _begin(
@@ -79,7 +79,7 @@ def run_is_deleted(chance: random.Random, stage: Stage) -> str | None:
 
 
 def _main() -> int:
-    """`evolve`, with an evaluation that takes no time and without report."""
+    """Run the command `evolve` with an evaluation that takes no time, and without a report."""
     import validation.evolve.hostile_unfinished as here
     from evolve.cli import main
     from evolve.cli.commands import run as command

@@ -11,21 +11,23 @@ finds the goal first in a third of the episodes. Eyes with many receptors use on
 the single receptor uses 96 rays.
 
 **First table.** "CPU s" is the CPU time of one thread, for rollouts and updates but without the evaluations. "update"
-is the fraction of this time that the updates take. Brackets contain the 95 % confidence interval of the last evaluation
-(Wilson). "return" is the undiscounted return per training episode. The animal with a single receptor stays at chance:
-if it reaches an object at all, this object is the goal in one of three cases.
+is the fraction of this time that the updates take. Brackets contain the 95 % confidence interval (Wilson) of the
+fraction in the last evaluation. "return" is the undiscounted return per training episode. The animal with a single
+receptor often reaches no object. If it reaches one, this object is the goal in one of three cases, as expected by
+chance.
 
 **Second table.** For the maze, the table states the distance from the start at which an episode ends, and the return of
 the episode. The return is 0.25 per metre of this distance, minus 1 for every action in contact with a wall. The fitness
-is 1.5 per metre, minus 2 for every such action. Means have 95 % confidence intervals. The stated width of the interval
-of the fitness is an upper bound, so the actual interval may be narrower.
+is 1.5 per metre, minus 2 for every such action. Means have 95 % confidence intervals. The stated interval of the
+fitness may be wider than the actual one, because only an upper bound of its width is known.
 
-An animal that stands still earns 0, and an animal with one eye learns little more than to stand still. Animals with ten
-eyes travel. They travel farther than a hand-written controller that receives the true distances of the walls in eleven
-directions and steers towards the largest free space. At 1.5 m/s, that controller travels 21.8 m, with 2.6 actions in
-contact and a return of 2.8 ± 0.9. At 5 m/s it travels 25.6 m, with a return of -14. The return of the animals with ten
-eyes is about 0, because every action in contact costs as much as four metres earn. Their fitness, which selection uses,
-is above 0.
+An animal that stands still has a return of 0, and an animal with one eye learns little more than to stand still.
+Animals with ten eyes learn to travel through the maze. For comparison, a hand-written controller receives the true
+distances of the walls in eleven directions and steers towards the largest free space. The animals with ten eyes travel
+farther than this controller. At 1.5 m/s, that controller travels 21.8 m, with 2.6 actions in contact and a return of
+2.8 ± 0.9. At 5 m/s it travels 25.6 m, with a return of -14. The return of the animals with ten eyes is about 0, because
+an action in contact with a wall costs as much as four metres of progress earn. Their fitness, on which selection is
+based, is above 0.
 
 **Settings.** All settings that are not listed here are the defaults of the task.
 
@@ -40,10 +42,10 @@ is above 0.
 **Bounds.** Two eyes of 15 x 15 receptors solve detection and tracking. A single receptor is not better than chance. In
 the maze, animals with ten eyes have a higher fitness and travel farther than animals with one eye.
 
-**Limits.** If a row states few steps, the training run was stopped at this point. It does not mean that learning was
-finished. In the rows "with tanh" for tracking and the maze, the learner did not limit the means of actions. In the maze
-row "with tanh", contact had its full cost only after 500,000 steps. `docs/measurements/learning.md` lists other
-settings that were tried.
+**Limits.** Some rows have few steps because the training run was stopped early, and not because learning was finished.
+In the rows "with tanh" for tracking and the maze, the learner did not limit the means of actions. In the maze row "with
+tanh", contact had its full cost only after 500,000 steps. `docs/measurements/learning.md` lists other settings that
+were tried.
 
 Training runs take minutes each, so their results are stored (`docs/validation/data/learning_curves.csv`). The page is
 written from the stored results.
@@ -95,7 +97,7 @@ CHANGES: tuple[dict[str, Any], ...] = (
 
 
 def _settings(changes: dict[str, Any]) -> Case:
-    """Detection with two eyes and the default settings except for these changes."""
+    """Return the case of detection with two eyes and the default settings, except for these changes."""
     name = ", ".join(f"{key} {value:g}" for key, value in changes.items()) or "detection, 2 x (15 x 15)"
     return Case(name, PAIR, learning=replace(LearningConfig(), **changes))
 
@@ -129,7 +131,7 @@ def store(case: Case, seed: int, path: Path) -> None:
 
 
 def trainings(rows: Sequence[Row]) -> dict[str, list[list[Row]]]:
-    """Rows by case, in the order of CASES and then FORMER, and by seed."""
+    """Return rows by case, in the order of CASES and then FORMER, and by seed."""
     found: dict[str, list[list[Row]]] = {}
     for name in (*CASES, *FORMER):
         seeds = sorted({row.seed for row in rows if row.case == name})
@@ -139,12 +141,12 @@ def trainings(rows: Sequence[Row]) -> dict[str, list[list[Row]]]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Training runs in tasks with a goal, then those in the maze."""
+    """Return the table of training runs: first the tasks with a goal, then the maze."""
     return "\n".join(seeking(rows)) + "\n\n" + "\n".join(travelling(rows))
 
 
 def travelling(rows: Sequence[Row]) -> list[str]:
-    """A line per training run in the maze: final results, with 95 % confidence intervals of the means."""
+    """Return a line per training run in the maze: final results, with 95 % confidence intervals of the means."""
     head = f"{'case':32}{'seed':>5}{'steps':>12}{'CPU s':>7}{'return':>16}{'fitness':>14}{'distance [m]':>14}"
     lines = [head + f"{'contacts':>10}{'goal':>7}{'update':>8}"]
     for name, runs in trainings(rows).items():
@@ -160,7 +162,7 @@ def travelling(rows: Sequence[Row]) -> list[str]:
 
 
 def seeking(rows: Sequence[Row]) -> list[str]:
-    """A line per training run with a goal: steps and CPU seconds to the threshold, and final results."""
+    """Return a line per training run with a goal: steps and CPU seconds to the threshold, and final results."""
     found = {name: runs for name, runs in trainings(rows).items() if not name.startswith("maze")}
     width = max(map(len, ("case", *found))) + 1
     head = f"{'case':{width}}{'seed':>5}{'80 % after':>12}{'CPU s':>7}{'steps':>9}{'goal first':>20}"
@@ -180,7 +182,7 @@ def seeking(rows: Sequence[Row]) -> list[str]:
 
 
 def verdicts(rows: Sequence[Row]) -> list[str]:
-    """Descriptions of the bounds that the stored training runs violate."""
+    """Return the descriptions of the bounds that the stored training runs violate."""
     runs = trainings(rows)
     broken = []
     for task in ("detection", "tracking"):
@@ -203,7 +205,7 @@ def verdicts(rows: Sequence[Row]) -> list[str]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Share of episodes with the goal first, over steps."""
+    """Draw the share of episodes with the goal first, over steps."""
     import matplotlib
 
     matplotlib.use("agg")

@@ -8,7 +8,7 @@ command (`validation/evolve/hostile.py`). Such a trial fails in any of these cas
 
 - the command prints a traceback or more than one line;
 - the exit code is not the promised one;
-- where sizes are checked, the command takes more than a second;
+- the damaged part is too large, and the command takes more than a second to refuse it;
 - the command touches a file outside the run.
 
 The other trials kill a run with SIGKILL at a random moment and resume it. They fail if the record or a policy is not
@@ -107,7 +107,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def broken(rows: Sequence[Row]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     found = [f"{row.promise}: {row.failures} of {row.trials} trials failed" for row in rows if row.failures]
     if (trials := sum(row.trials for row in rows)) < LEAST_TRIALS:
         found.append(f"{trials} trials: must be at least {LEAST_TRIALS}")
@@ -115,7 +115,7 @@ def broken(rows: Sequence[Row]) -> list[str]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Bars of trials, with failures in another colour."""
+    """Draw bars of trials, with failures in another colour."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 4), layout="constrained")

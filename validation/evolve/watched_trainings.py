@@ -146,12 +146,12 @@ def watched(case: Case, seed: int) -> Iterable[Row]:
 
 
 def _error(values: np.ndarray) -> float:
-    """Standard error of the mean."""
+    """Return the standard error of the mean."""
     return round(float(values.std(ddof=1)) / math.sqrt(len(values)), 4)
 
 
 def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
-    """Interval for a probability, 95 % by default (Wilson 1927)."""
+    """Return the interval for a probability, 95 % by default (Wilson 1927)."""
     share, spread = successes / trials, z * z / trials
     middle = (share + spread / 2) / (1 + spread)
     half = z / (1 + spread) * math.sqrt(share * (1 - share) / trials + spread / (4 * trials))
@@ -159,12 +159,12 @@ def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
 
 
 def steps_to(rows: Iterable[Row], threshold: float) -> Row | None:
-    """The first evaluation of a training run with the goal first in this share of the episodes."""
+    """Return the first evaluation of a training run with the goal first in this share of the episodes."""
     return next((row for row in rows if row.goals >= threshold * row.episodes), None)
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Rows of a CSV file; an empty list without a file."""
+    """Return the rows of a CSV file; an empty list without a file."""
     if not path.exists():
         return []
     kinds = {"str": str, "int": int, "float": float}

@@ -14,8 +14,8 @@ loaded and kernels compiled.)
 **Bounds.** Memory in the last quarter is at most 1.25 times that in the second, and the number of open files does not
 grow.
 
-**Limits.** Memory may grow slightly because Dr.Jit caches compiled kernels: one for each shape of eye that has not
-occurred before.
+**Limits.** Memory may grow slightly because Dr.Jit caches compiled kernels. There is one kernel for each shape of eye
+(number of eyes and receptors).
 
 Measurements are stored (`docs/validation/data/worker_endurance.csv`). The page is written from the stored measurements.
 
@@ -84,7 +84,7 @@ class Row:
 
 
 def jobs(config: RunConfig, count: int, folder: Path) -> Iterator[Job]:
-    """Jobs with animals drawn from the whole genome."""
+    """Yield jobs with animals drawn from the whole genome."""
     genotype, rng = Genotype(config.genome), np.random.default_rng(0)
     for identity in range(count):
         animal = develop(rng.random(genotype.dimension), config)
@@ -92,7 +92,7 @@ def jobs(config: RunConfig, count: int, folder: Path) -> Iterator[Job]:
 
 
 def measured(count: int) -> list[Row]:
-    """A worker's memory and open files after each candidate."""
+    """Return a worker's memory and open files after each candidate."""
     config, rows = assemble("detection", "quick", assignments=SETTINGS), []
     with tempfile.TemporaryDirectory() as folder, LocalExecutor(evaluate_candidate, 1, prepare_device) as executor:
         for job, outcome in executor.run(list(jobs(config, count, Path(folder)))):
@@ -104,7 +104,7 @@ def measured(count: int) -> list[Row]:
 
 
 def usage(pid: int) -> tuple[int, int]:
-    """Resident memory [bytes] and number of open files of a process, from Linux's /proc."""
+    """Return the resident memory [bytes] and number of open files of a process, from Linux's /proc."""
     status = Path(f"/proc/{pid}/statm").read_text().split()
     return int(status[1]) * os.sysconf("SC_PAGE_SIZE"), len(os.listdir(f"/proc/{pid}/fd"))
 
@@ -119,7 +119,7 @@ def stored() -> list[Row]:
 
 
 def quarters(values: Sequence[int]) -> list[float]:
-    """Medians of the four quarters."""
+    """Return the medians of the four quarters."""
     return [float(np.median(part)) for part in np.array_split(np.asarray(values), 4)]
 
 
@@ -134,7 +134,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def broken(rows: Sequence[Row]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     memory, files = (quarters([getattr(row, name) for row in rows]) for name in ("memory", "files"))
     found = []
     if memory[3] > MOST_GROWTH * memory[1]:
@@ -145,7 +145,7 @@ def broken(rows: Sequence[Row]) -> list[str]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Memory and files over candidates."""
+    """Draw memory and files over candidates."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7, 3), layout="constrained")

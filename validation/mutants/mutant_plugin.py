@@ -49,7 +49,7 @@ class Nearest:
         return sum(self.known[item.nodeid] for item in items)
 
     def _quick(self, items: list[pytest.Item]) -> list[pytest.Item]:
-        """The fastest tests of a file that fit into the budget."""
+        """Return the fastest tests of a file that fit into the budget."""
         kept: list[pytest.Item] = []
         spent = 0.0
         for item in sorted(items, key=lambda item: self.known[item.nodeid]):

@@ -86,7 +86,7 @@ class Site:
         return source[: self.start] + self.after.encode() + source[self.end :]
 
     def chance(self, seed: int) -> str:
-        """Hash that defines the place in a random order, independent of other files and lines."""
+        """Return the hash that defines the place in a random order, independent of other files and lines."""
         return hashlib.sha256(f"{seed} {self.path} {self.kind} {self.change}".encode()).hexdigest()
 
 
@@ -236,7 +236,7 @@ class _Finder:
         return self._site("axes", start, end, swapped)
 
     def _between(self, kind: str, left: ast.AST, right: ast.AST, before: str, after: str) -> Iterator[Site]:
-        """The operator between two operands."""
+        """Yield the operator between two operands."""
         low, high = self._end(left), self._start(right)
         pattern = r"\b" + before.replace(" ", r"\s+") + r"\b" if before[0].isalpha() else re.escape(before)
         match = re.search(pattern, self.source[low:high].decode())

@@ -2,7 +2,7 @@
 
 Which fraction of deliberate mistakes do the tests notice? A copy of the code with one such mistake is called a mutant,
 and the tests kill a mutant if they notice the mistake. They kill 185 of 193 mutants, which is 96 %. Six further mutants
-change nothing that a user could see and do not count.
+do not change any result that a user could see. They are not counted.
 
 **Method.** Examples of mistakes are a changed sign or comparison, a bound that is off by one, an omitted check or call,
 swapped axes or arguments, or a maximum instead of a minimum. For each mutant the nearest tests are run. The
@@ -12,8 +12,8 @@ of these tests fails, hangs or crashes.
 
 The first mutants are those in `validation/mutants/named_mutants.py`, which contain mistakes that no test had noticed at
 first. The others are drawn evenly from all places in the three packages where such a mistake can be made. Some mutants
-change nothing that a user could see, because they give the same results slightly sooner or later. The table lists them
-as "alike", with the reason, and does not count them as mistakes.
+do not change results, but only the time of the computation or an invisible detail. The table lists them as "alike",
+with the reason, and does not count them as mistakes.
 
 **Bounds.** At least 90 % of the mutants that are mistakes are killed. Every mutant that survived or is alike has a
 stated reason.
@@ -88,7 +88,7 @@ def stored(path: Path) -> list[Row]:
 
 
 def chosen(root: Path, count: int, seed: int) -> list[Site]:
-    """Named mutants first, then mutants of each package in turn, evenly drawn."""
+    """Return the named mutants first, then mutants of each package in turn, evenly drawn."""
     named = [mutant.site(root) for mutant in NAMED]
     share = [drawn(root, package, count, seed) for package in PACKAGES]
     in_turn = [site for site in chain.from_iterable(zip_longest(*share)) if site is not None]
@@ -125,7 +125,7 @@ def go_on(root: Path, store: Path, options: argparse.Namespace) -> None:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Counts by package, and the mutants that were not killed."""
+    """Return counts by package, and the mutants that were not killed."""
     lines = [f"{'':<10}{'mutants':>9}{'alike':>9}{'killed':>9}{'survived':>10}{'killed of mistakes':>20}"]
     for name in (*PACKAGES, "all"):
         of = [row for row in rows if name in (row.package, "all")]
@@ -140,13 +140,13 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def share(rows: Sequence[Row]) -> float:
-    """Share of killed mutants among the mistakes."""
+    """Return the share of killed mutants among the mistakes."""
     mistakes = [row for row in rows if row.verdict != "alike"]
     return sum(row.verdict == "killed" for row in mistakes) / max(len(mistakes), 1)
 
 
 def broken(rows: Sequence[Row]) -> list[str]:
-    """Bounds that do not hold."""
+    """Return bounds that do not hold."""
     found = [
         f"{row.path}: {row.change}: not killed, without a reason"
         for row in rows
@@ -162,7 +162,7 @@ def page(rows: Sequence[Row]) -> Page:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Bars by kind of mistake."""
+    """Draw bars by kind of mistake."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7, 3.4), layout="constrained")

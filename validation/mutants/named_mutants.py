@@ -20,7 +20,7 @@ class Named:
     after: str
 
     def site(self, root: Path) -> Site:
-        """Site of the mutant in its file.
+        """Return the site of the mutant in its file.
 
         Raises:
             ValueError: `before` does not occur exactly once.

@@ -8,15 +8,13 @@ with the same samples.
 
 **Method.** A circular aperture of R = 50 µm at 550 nm is sampled on N x N points over a period of 4R. The intensity
 within |x|, |y| <= R is compared with the direct Rayleigh-Sommerfeld sum. The textbook's angular spectrum
-(`validation/optics/textbook_propagation.py`) multiplies the spectrum of the samples by the transfer function. Its
-period is that of the samples. Beyond the critical distance, the steepest light that the samples represent leaves the
-period at one edge and re-enters at the other. More samples then do not help, and at larger distances the error reaches
-100 %. In terms of frequencies, the phase of the transfer function changes by more than half a wave between neighbouring
-samples.
+(`validation/optics/textbook_propagation.py`) multiplies the spectrum of the samples by the transfer function. The
+computed field is periodic, and its period is the width of the grid of samples. Beyond the critical distance, light at
+the largest angle that the samples represent leaves the grid at one edge and re-enters it at the opposite edge. More
+samples then do not reduce the error, and at larger distances it reaches 100 %. In terms of frequencies, the phase of
+the transfer function changes by more than half a wave between neighbouring samples.
 
-`optics.propagate` receives the same hard-edged samples. It chooses its own period, and fades out light that would land
-far outside the window. Its error falls with N at any distance. The remaining error comes from the pixelated edge of the
-aperture. In `optics.psf` the user does not choose N: the function low-pass filters the edge and plans its own sampling.
+`optics.propagate` receives the same samples of the aperture, which have a hard edge. It chooses its own period, and removes light that would land far outside the window. Its error falls with N at any distance. The remaining error comes from the pixelated edge of the aperture. In `optics.psf` the user does not choose N: the function low-pass filters the edge and plans its own sampling.
 
 **First table.** Each row is one Fresnel number R²/λz. N* is the number of samples for which this distance is the
 critical one. The last columns show the error of `optics.psf`, its predicted error and the method that it chose.
@@ -87,7 +85,7 @@ def measure(fresnel_number: float, samples: tuple[int, ...] = SAMPLES) -> Row:
 
 
 def _sampled(n: int, distance: float, exact: np.ndarray) -> tuple[float, float]:
-    """Errors of the textbook's method and of optics.propagate."""
+    """Return the errors of the textbook's method and of optics.propagate."""
     dx, middle, stride = PERIOD / n, n // 2, n // SAMPLES[0]
     u = sampled_lens(n, dx, WAVELENGTH, RADIUS, np.inf)
     points = slice(middle - 16 * stride, middle + 16 * stride + 1, stride)
@@ -103,7 +101,7 @@ def _sampled(n: int, distance: float, exact: np.ndarray) -> tuple[float, float]:
 
 
 def wrap_around(period: float) -> tuple[float, float]:
-    """Errors of intensity of a spread beam, for the textbook and optics.propagate; period in beam radii."""
+    """Return errors of intensity of a spread beam, for the textbook and optics.propagate; period in beam radii."""
     rayleigh = np.pi * WAIST**2 / WAVELENGTH
     distance, width = rayleigh * np.sqrt(SPREAD**2 - 1), SPREAD * WAIST
     n, dx = round(period * width / (WAIST / 4)), WAIST / 4
@@ -118,7 +116,7 @@ def wrap_around(period: float) -> tuple[float, float]:
 
 
 def broken_bounds(rows: list[Row], wrapped: list[tuple[float, float]]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     n, broken = np.array(SAMPLES), []
     for row in rows:
         name = f"Fresnel number {row.fresnel_number:g}"
@@ -163,7 +161,7 @@ def table(rows: list[Row], wrapped: list[tuple[float, float]]) -> str:
 
 
 def draw(rows: list[Row], wrapped: list[tuple[float, float]], path: Path) -> None:
-    """Two maps with the critical distance, the planner's choice below, and the wrap-around."""
+    """Draw two maps with the critical distance, the planner's choice below, and the wrap-around."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 6.2), layout="constrained")
@@ -189,7 +187,7 @@ def draw(rows: list[Row], wrapped: list[tuple[float, float]], path: Path) -> Non
 
 
 def _choices(axes: Any, rows: list[Row]) -> None:
-    """Method and error of optics.psf, one column per Fresnel number, below the map."""
+    """Draw method and error of optics.psf below the map, one column per Fresnel number."""
     for column, row in enumerate(rows):
         words = f"{row.plan.method.replace('rayleigh_sommerfeld', 'rayleigh_s.')}\n{row.error:.0e}"
         axes.text(column, 0.5, words, rotation=90, fontsize=8.5, ha="center", va="center", color="#B04A00")

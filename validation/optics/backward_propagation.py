@@ -5,11 +5,11 @@ a half wavelengths and float64 after two. `optics.propagate` recovers a Gaussian
 6.1e-11 after one wavelength and of 1.1e-07 after 40.
 
 **Method.** Behind a plane, waves with a period below the wavelength (spatial frequency f > 1/λ) decay like exp(-2πz
-√(f² - 1/λ²)). In backward propagation, the textbook's angular spectrum amplifies these waves by the same factor, and
-with them the rounding errors of the samples. A wave of f = 2.8/λ grows by 7 decades per wavelength of distance. Samples
-with a pitch of λ/4 represent such a wave along their diagonal. At larger distances the numbers overflow.
+√(f² - 1/λ²)). In backward propagation, the textbook's angular spectrum amplifies these waves by the same factor. It
+also amplifies the rounding errors of the samples. A wave of f = 2.8/λ grows by 7 decades per wavelength of distance.
+Samples with a pitch of λ/4 represent such a wave along their diagonal. At larger distances the numbers overflow.
 
-With a negative distance, `optics.propagate` only reverses phases. It drops waves beyond f = 1/λ (evanescent waves), and
+With a negative distance, `optics.propagate` only reverses phases. It omits waves beyond f = 1/λ (evanescent waves), and
 `result.evanescent_power` reports their fraction of the input's power. Waves that have decayed cannot be recovered. The
 recovered field therefore lacks the evanescent part of the original, and its error equals the square root of the
 evanescent fraction. Forward propagation reports this fraction, so the error of the recovered field is known in advance.
@@ -19,9 +19,9 @@ its closed-form spectrum. In the first table w is 2 λ. This spot has almost no 
 the error of the method. In the second table z is λ/2 and w falls from 1 λ to 0.2 λ. The spot of w = 0.2 λ is 45 %
 evanescent.
 
-**Limits.** Two more kinds of light cannot be recovered: light that leaves the window, and light at angles too close to
-grazing for the window. `propagate` includes light near grazing in its predicted error, and raises an `AccuracyError` if
-that error exceeds the tolerance.
+**Limits.** Two more kinds of light cannot be recovered: light that leaves the window, and light at angles so close to
+90° that it would need a wider window. `propagate` includes the second kind in its predicted error, and raises an
+`AccuracyError` if that error exceeds the tolerance.
 
     python -m validation.optics.backward_propagation [--out DIR] [--docs DIR]
 """
@@ -77,7 +77,7 @@ class Spot:
 
 
 def spot(waist: float, distance: float, dx: float, side: int) -> np.ndarray:
-    """Exact field (side, side), carrier included; all lengths in wavelengths."""
+    """Return the exact field (side, side), carrier included; all lengths in wavelengths."""
     x = (np.arange(side) - side // 2) * dx
     r = np.hypot(x[None, :], x[:, None])
     if distance == 0:
@@ -112,7 +112,7 @@ def recover(waist: float) -> Spot:
 
 
 def broken_bounds(rows: list[Row], spots: list[Spot]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for row in rows:
         name = f"{row.distance:g} wavelengths"
@@ -151,7 +151,7 @@ def _shown(error: float) -> str:
 
 
 def draw(rows: list[Row], spots: list[Spot], path: Path) -> None:
-    """Error over distance, and lost light over the evanescent share."""
+    """Draw the error over distance, and lost light over the evanescent share."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 4.8), layout="constrained")

@@ -26,7 +26,7 @@ CYCLES = (0.0, 0.5, 1.0, 2.0, 9.0)  # per cell: limits of classes
 
 
 def errors(eye: optics.Eye, samples: float) -> list[tuple[float, float]]:
-    """Cycles per cell and relative error of the integrals, for each of the eye's wavelengths."""
+    """Return cycles per cell and relative error of the integrals, for each of the eye's wavelengths."""
     assert eye.pupil is not None
     retina = eye._retina(cells_for(eye))
     beams = beams_to(eye.pupil, retina, np.inf, (0.0, 0.0))

@@ -46,7 +46,7 @@ class Row:
 
 
 def measure(aperture: float) -> Row:
-    """Results for the ideal lens of this NA: R/f = tan θ and R²/(λf) determine both lengths."""
+    """Return results for the ideal lens of this NA: R/f = tan θ and R²/(λf) determine both lengths."""
     tangent = aperture / np.sqrt(1 - aperture**2)
     focal_length = FRESNEL_NUMBER * WAVELENGTH / tangent**2
     radius = tangent * focal_length
@@ -73,7 +73,7 @@ def measure(aperture: float) -> Row:
 
 
 def orders(rows: list[Row]) -> tuple[float, float, float]:
-    """Exponents of NA in both misfits and in the loss of the peak, over the lenses of small aperture."""
+    """Return the exponents of NA in both misfits and in the loss of the peak, over the lenses of small aperture."""
     small = [row for row in rows if row.aperture <= LEADING_ORDER]
     apertures = [row.aperture for row in small]
     return (
@@ -84,7 +84,7 @@ def orders(rows: list[Row]) -> tuple[float, float, float]:
 
 
 def broken_bounds(rows: list[Row]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     found = [
         f"NA {row.aperture:g}: optics.psf has an error of {row.error:.1g}, tolerance {TOLERANCE:g}"
         for row in rows
@@ -116,7 +116,7 @@ def table(rows: list[Row]) -> str:
 
 
 def draw(rows: list[Row], path: Path) -> None:
-    """Misfits over NA, and cuts through the PSF at three apertures."""
+    """Draw misfits over NA, and cuts through the PSF at three apertures."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 5), layout="constrained")

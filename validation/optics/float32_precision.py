@@ -1,9 +1,9 @@
 """Float32 precision: rounded phases and dark windows
 
-Up to which distance are phases in float32 accurate, and when does `optics.psf` need float64? With float32 phases, the
-error of the textbook angular spectrum method exceeds 1e-5 beyond 2 mm, 1e-3 beyond 0.1 m and 1 beyond 3 m. `optics.psf`
-in float32 stays below 1e-5 at every distance. It needs float64 only for windows far from the focus that receive very
-little light.
+Phases are proportional to the distance, and float32 has only seven digits. Up to which distance are phases in float32
+accurate, and when does `optics.psf` need float64? With float32 phases, the error of the textbook angular spectrum
+method exceeds 1e-5 beyond 2 mm, 1e-3 beyond 0.1 m and 1 beyond 3 m. `optics.psf` in float32 stays below 1e-5 at every
+distance. It needs float64 only for windows far from the focus that receive very little light.
 
 **First table.** A phase kz in float32 has a rounding error of up to kz 2^-24. For light of 550 nm, this is 7e-4 rad at
 a distance of 1 mm and 0.7 rad at 1 m. The lenses have Fresnel number 20 and focus at 0.1 mm to 10 m. The textbook's
@@ -13,12 +13,13 @@ the two differ only by rounding.
 In `optics`, phases are stored as optical paths in float64. Whole waves are removed in float64, and only the remainder,
 below one wave, is converted to float32. Long distances alone therefore do not require float64.
 
-**Second table.** In `optics`, the limit of float32 is a dark window. The rounding error is a fixed fraction of the
-pupil's light, and a window far from the focus receives so little of that light that the error matters. Here the source
-of an ideal lens (R = 50 µm, f = 0.5 mm) moves off the axis while the window stays on it. Every PSF is compared with the
-direct sum at a few of its points. If the error at these points exceeds the tolerance, the PSF is computed again with a
-smaller tolerance or by an exact method. If that does not help, an `AccuracyError` is raised that names the dtype
-("refused" in the table). With float64, the tolerance is still reached in these windows.
+**Second table.** In `optics`, float32 is not accurate enough for dark windows. The rounding error is a fixed fraction
+of the pupil's light, and a window far from the focus receives so little of that light that the error is large in
+comparison. Here the source in front of an ideal lens (R = 50 µm, f = 0.5 mm) moves off the axis while the window stays
+on the axis. Every PSF is compared with the direct sum at a few of its points. If the error at these points exceeds the
+tolerance, the PSF is computed again with a smaller tolerance or by an exact method. If the error is still too large, an
+`AccuracyError` is raised, whose message recommends another dtype ("refused" in the table). With float64, the tolerance
+is still reached in these windows.
 
     python -m validation.optics.float32_precision [--out DIR] [--docs DIR]
 """
@@ -118,13 +119,13 @@ def dark(angle: float) -> Dark:
 
 
 def breaking_distances(rows: list[Distant]) -> list[float]:
-    """Distances at which naive phases exceed each of BREAKS, interpolated by power laws."""
+    """Return distances at which naive phases exceed each of BREAKS, interpolated by power laws."""
     errors = np.maximum.accumulate([row.naive for row in rows])
     return [float(np.exp(np.interp(np.log(b), np.log(errors), np.log(DISTANCES)))) for b in BREAKS]
 
 
 def broken_bounds(rows: list[Distant], windows: list[Dark]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for row in rows:
         if not row.naive <= max(row.rounding, 1e-6):
@@ -166,7 +167,7 @@ def table(rows: list[Distant], windows: list[Dark]) -> str:
 
 
 def draw(rows: list[Distant], windows: list[Dark], path: Path) -> None:
-    """Error over distance, and over the darkness of the window."""
+    """Draw the error over distance, and over the darkness of the window."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 4.8), layout="constrained")

@@ -26,7 +26,7 @@ PATCHES = {"white 9.5 (.05 D)": "white", "black 2 (1.5 D)": "black"}
 
 
 def colour_tables() -> dict[str, np.ndarray]:
-    """CIE D65, and the colour matching functions of 1931 (0 below 360 nm, outside their table)."""
+    """Return CIE D65, and the colour matching functions of 1931 (0 below 360 nm, outside their table)."""
     import colour
 
     matching = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
@@ -35,12 +35,12 @@ def colour_tables() -> dict[str, np.ndarray]:
 
 
 def illuminants() -> dict[str, np.ndarray]:
-    """Illuminants except D65 and E, 0 at wavelengths without an entry."""
+    """Return illuminants except D65 and E, 0 at wavelengths without an entry."""
     return {"wavelength_nm": FROM_300, **{name: _power(name) for name in ILLUMINANTS}}
 
 
 def reflectances() -> dict[str, np.ndarray]:
-    """The ColorChecker's patches after Ohta."""
+    """Return the ColorChecker's patches after Ohta."""
     import colour
 
     chart = colour.SDS_COLOURCHECKERS["ColorChecker N Ohta"]
@@ -48,7 +48,7 @@ def reflectances() -> dict[str, np.ndarray]:
 
 
 def cone_fundamentals() -> dict[str, np.ndarray]:
-    """Human cones' sensitivities at the cornea, in units of energy."""
+    """Return the human cones' sensitivities at the cornea, in units of energy."""
     import colour
 
     cones = colour.MSDS_CMFS["Stockman & Sharpe 2 Degree Cone Fundamentals"]
@@ -56,7 +56,7 @@ def cone_fundamentals() -> dict[str, np.ndarray]:
 
 
 def srgb_basis() -> dict[str, np.ndarray]:
-    """Reflectances of the primaries of sRGB after Mallett & Yuksel."""
+    """Return the reflectances of the primaries of sRGB after Mallett & Yuksel."""
     import colour
 
     basis = colour.recovery.MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019
@@ -89,7 +89,7 @@ def _patch(name: str) -> str:
 
 
 def text(columns: dict[str, np.ndarray]) -> str:
-    """CSV text: numbers with the fewest digits that identify them."""
+    """Return CSV text: numbers with the fewest digits that identify them."""
     rows = zip(*columns.values(), strict=True)
     lines = [",".join(columns), *(",".join(repr(float(value)).removesuffix(".0") for value in row) for row in rows)]
     return "\n".join(lines) + "\n"

@@ -97,7 +97,7 @@ def measure(f_number: float, focal_length: float = FOCAL_LENGTH, dtype: str = "f
 
 
 def _first_minimum(x: np.ndarray, cut: np.ndarray) -> float:
-    """Position of the first minimum of the cut, on the spline through it."""
+    """Return the position of the first minimum of the cut, on the spline through it."""
     slope = CubicSpline(x, cut).derivative()
     roots = [root for root in slope.roots(extrapolate=False) if root > x[2] and slope(root, 1) > 0]
     return float(roots[0])
@@ -110,7 +110,7 @@ def _disk_integral(profile: CubicSpline, radius: float) -> float:
 
 
 def broken_bounds(rows: list[Row], slow: Row) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     found = [
         f"f/{row.f_number:g}: error {row.error:.2g} against the exact integral, bound {MOST_ERROR:g}"
         for row in [*rows, slow]
@@ -133,7 +133,7 @@ def broken_bounds(rows: list[Row], slow: Row) -> list[str]:
 
 
 def airy_order(rows: list[Row]) -> float:
-    """Exponent of NA in the difference from the Airy pattern from f/2 to f/8, at large Fresnel numbers."""
+    """Return the exponent of NA in the difference from the Airy pattern from f/2 to f/8, at large Fresnel numbers."""
     fast, slow = (next(row for row in rows if row.f_number == n) for n in (2, 8))
     return float(np.log(fast.airy_misfit / slow.airy_misfit) / np.log(slow.f_number / fast.f_number))
 
@@ -153,7 +153,7 @@ def table(rows: list[Row]) -> str:
 
 
 def draw(rows: list[Row], path: Path) -> None:
-    """Cuts through the PSFs with both references, and the differences over NA."""
+    """Draw cuts through the PSFs with both references, and the differences over NA."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 6.2), layout="constrained")

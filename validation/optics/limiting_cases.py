@@ -12,9 +12,10 @@ argument, value and valid range. No other outcome is allowed: no NaN, no mere wa
 instead. The inputs are:
 
 - pupils far below the wavelength, compared with the cos²θ lobe of Rayleigh-Sommerfeld's integral;
-- a relief with the refractive index of the medium, and a DOE of one pixel (a plate), compared with the bare pupil;
-- a source in the focal plane of a lens. The lens collimates its light, and the result is compared with the shadow of
-  the bare aperture;
+- a relief with the refractive index of the medium, and a relief of a single pixel (a plate), compared with a pupil
+  without glass;
+- a source in the focal plane of a lens. Its light is parallel behind the lens, and the result is compared with the
+  light behind an aperture without a lens;
 - a window of one sample, compared with the closed form; a window far off the axis, compared with quadrature; and a
   source at grazing incidence, compared with a result in float64;
 - `optics.propagate` over a distance of 0, for an evanescent wave, and for a field of zeros.
@@ -82,7 +83,10 @@ def propagated(u: Any, **more: Any) -> optics.PropagationResult:
 
 
 def lobe(radius: float) -> float:
-    """Error relative to a pinhole's PSF = πa² z² / (λρ²)², ka << 1, from the kernel ik z / (2πρ²) e^{ikρ}."""
+    """Return the error relative to the closed form of a tiny pinhole's PSF, πa² z² / (λρ²)² for ka << 1.
+
+    It follows from the kernel ik z / (2πρ²) e^{ikρ}.
+    """
     distance, side = 1e-3, 17
     got = psf(Pupil(radius), distance, dx=2e-4, shape=(side, side))
     x = (np.arange(side) - side // 2) * 2e-4
@@ -95,27 +99,36 @@ def same(pupil: Pupil, other: Pupil, **more: Any) -> float:
 
 
 def on_axis() -> float:
-    """Error of one sample on the axis relative to |1 - (z/L) e^{ik(L - z)}|², the closed form of the bare aperture."""
+    """Return the error of one sample on the axis, relative to the closed form of a bare aperture.
+
+    The closed form is |1 - (z/L) e^{ik(L - z)}|².
+    """
     exact = circular_aperture_on_axis(RADIUS, DISTANCE, LAMBDA) / (math.pi * RADIUS**2)
     return abs(float(psf(Pupil(RADIUS), shape=(1, 1))[0, 0]) / exact - 1)
 
 
 def far_window() -> float:
-    """Error in a window 5 mm off the axis at 0.2 mm, at a brightness of 1e-9, relative to quadrature in float64."""
+    """Return the error in a window 5 mm off the axis at a distance of 0.2 mm, relative to quadrature in float64.
+
+    The brightness there is 1e-9.
+    """
     result = optics.psf(BARE, [LAMBDA], DISTANCE, centre=(5e-3, 0.0), dx=2e-6, shape=(5, 5), tolerance=1e-2)
     r = np.hypot(result.x[None, :], result.y[:, None])
     return relative_l2(result.psf[0], np.abs(ideal_lens_field(r, LAMBDA, RADIUS, distance=DISTANCE)) ** 2 / BARE.area)
 
 
 def slanted() -> float:
-    """Error at 86° of incidence, where the lens' axis is dark, relative to float64."""
+    """Return the error at 86° of incidence, where the lens' axis is dark, relative to float64."""
     pupil, asked = Pupil(RADIUS, thin_lens_focal_length=FOCUS), {"source_angle": (1.5, 0.0)}
     exact = psf(pupil, **asked, tolerance=1e-6, method="rayleigh_sommerfeld", dtype="float64")
     return relative_l2(psf(pupil, **asked), exact)
 
 
 def evanescent_wave() -> float:
-    """Error of the decay e^{-2πz√(f² - 1/λ²)} of exp(2πifx) with f = 1.25/λ, in the middle of a wide Gaussian."""
+    """Return the error of the decay of an evanescent wave in the middle of a wide Gaussian.
+
+    The wave is exp(2πifx) with f = 1.25/λ, and decays like e^{-2πz√(f² - 1/λ²)}.
+    """
     f, z, dx = 1.25 / LAMBDA, 0.1 * LAMBDA, LAMBDA / 20
     x = (np.arange(641) - 320) * dx
     u = np.tile(np.exp(-((x / (100 * dx)) ** 2)) * np.exp(2j * np.pi * f * x), (641, 1))
@@ -126,7 +139,7 @@ def evanescent_wave() -> float:
 
 
 def far_away() -> float:
-    """Error over a window far smaller than the first zero: there |U| is the integral of u, divided by λz."""
+    """Return the error over a window far smaller than the first zero: there |U| is the integral of u, divided by λz."""
     distance, side = 1e6, 5
     found = np.abs(propagated(np.ones((side, side)), distance=distance).u)
     return relative_l2(found, np.full((side, side), (side * 1e-6) ** 2 / (LAMBDA * distance)))
@@ -227,7 +240,7 @@ def _refusal(name: str, call: Callable[[], Any], line: str) -> Edge:
 
 
 def broken_bounds(edges: list[Edge]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     return [f"{edge.name}: {edge.happened}; expected {edge.expected}" for edge in edges if not edge.holds]
 
 
@@ -236,7 +249,7 @@ def table(edges: list[Edge]) -> str:
 
 
 def draw(path: Path) -> None:
-    """Four PSFs at the edge of the domain, from a pinhole of 1 nm to a window far off the axis."""
+    """Draw four PSFs at the edge of the domain, from a pinhole of 1 nm to a window far off the axis."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 3.6), layout="constrained")

@@ -11,14 +11,16 @@ to predicted error is 0.93. In 92.7 % of the cases the prediction is at most 30 
 - windows of 17 to 257 samples along each side. A quarter of the windows have pitches of 0.3 to 4 times λz/2R;
 - tolerances from 1e-5 (float32) or 1e-8 (float64) to 3e-2.
 
-The actual error is the relative L2 error of intensity against the direct Rayleigh-Sommerfeld sum in float64. The
-tolerance of that sum is a thousandth of the case's tolerance or a thirtieth of the prediction, whichever is smaller. A
-case whose direct sum would take more than 5 s is replaced by another random case. The table counts these replacements.
+The actual error is the relative L2 difference between the intensity of the PSF and that of the direct
+Rayleigh-Sommerfeld sum in float64. This sum has its own tolerance: a thousandth of the tolerance of the PSF or a
+thirtieth of the predicted error, whichever is smaller. If the direct sum would take more than 5 s, another random case
+is drawn instead. The table counts these replacements.
 
 **Bounds.** In 99 % of the cases, the actual error is at most the predicted one. In no case is it above three times the
-prediction. In 80 % of the cases, the predicted error is at most 30 times the actual one. A larger ratio would mean that
-time is spent on unnecessary digits. With `--methods N`, every method runs on the first N cases. In 80 % of these cases,
-the chosen method must take at most twice the time of the fastest method whose actual error is below the tolerance.
+predicted error. In 80 % of the cases, the predicted error is at most 30 times the actual one. A larger ratio would mean
+that PSFs are computed more accurately than necessary, which costs time. With `--methods N`, every method runs on the
+first N cases. In 80 % of these cases, the chosen method must take at most twice the time of the fastest method whose
+actual error is below the tolerance.
 
 **Limits.** If no method can reach the tolerance, an `AccuracyError` states what is possible. The table counts those
 cases by reason.
@@ -117,7 +119,10 @@ def measure(count: int, seed: int = 0, methods: int = 0) -> tuple[list[Row], int
 
 
 def _row(case: Case, methods: bool) -> Row | None:
-    """Row of a case; None if the direct sum, with a much smaller tolerance than the prediction, would take too long."""
+    """Return the row of a case; None if the direct sum would take too long.
+
+    The tolerance of the direct sum is much smaller than the prediction.
+    """
     try:
         chosen = _timed(case, "auto", 3 if methods else 1)
     except optics.AccuracyError as error:
@@ -158,7 +163,7 @@ def _asked(case: Case, method: str) -> dict[str, Any]:
 
 
 def _timed(case: Case, method: str, calls: int) -> tuple[optics.PSFResult, float]:
-    """The PSF, and the time of a warm call, after a first one that may compile."""
+    """Return the PSF, and the time of a warm call, after a first one that may compile."""
     result, seconds = case.psf(method), []
     for _ in range(calls - 1):
         start = time.perf_counter()
@@ -174,13 +179,13 @@ def _run(timed: tuple[optics.PSFResult, float], exact: optics.PSFResult) -> Run:
 
 
 def reason(refusal: str) -> str:
-    """Kind of refusal; "" for none."""
+    """Return the kind of refusal; "" for none."""
     known = (name for name, words in REASONS.items() if words in refusal)
     return next(known, "other: " + re.sub(r"\d\S*", "#", refusal)) if refusal else ""
 
 
 def shares(rows: Sequence[Row]) -> dict[str, float]:
-    """Quantities on which the bounds are set."""
+    """Return quantities on which the bounds are set."""
     answered = [row for row in rows if row.runs]
     ratios = np.array([row.ratio for row in answered])
     # Refused cases are not timed; a chosen method above the tolerance counts as too slow.
@@ -195,7 +200,7 @@ def shares(rows: Sequence[Row]) -> dict[str, float]:
 
 
 def broken_bounds(rows: Sequence[Row], percentages: bool = True) -> list[str]:
-    """Descriptions of the bounds that do not hold.
+    """Return the descriptions of the bounds that do not hold.
 
     percentages: True if there are enough cases for bounds on percentages.
     """
@@ -242,7 +247,7 @@ def table(rows: Sequence[Row], skipped: int) -> str:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Predicted over actual error, coloured by method."""
+    """Draw the predicted over actual error, coloured by method."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.6, 6.4), layout="constrained")

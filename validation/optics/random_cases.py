@@ -89,7 +89,7 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _aperture(rng: np.random.Generator, opening: str) -> Aperture:
-    """Slits with a width down to a twentieth of the radius, stars with 3 to 9 points."""
+    """Return a random aperture of this kind: slits down to a twentieth of the radius wide, stars with 3 to 9 points."""
     if opening == "annulus":
         return optics.Annulus(rng.uniform(0.05, 0.95))
     if opening == "slit":
@@ -105,7 +105,7 @@ def _aperture(rng: np.random.Generator, opening: str) -> Aperture:
 
 
 def _hills(rng: np.random.Generator) -> np.ndarray:
-    """Tilted, wavy surface of peak height 1, 12 x 12 samples."""
+    """Return a tilted, wavy surface of peak height 1, (12, 12)."""
     y, x = np.mgrid[-1:1:12j, -1:1:12j]
     c = rng.normal(size=6)
     surface = c[0] * x + c[1] * y + c[2] * x * y + c[3] * np.sin(3 * x + c[4]) * np.cos(2 * y + c[5])
@@ -113,7 +113,7 @@ def _hills(rng: np.random.Generator) -> np.ndarray:
 
 
 def _window(rng: np.random.Generator, radius: float, distance: float, focused: bool) -> dict[str, Any]:
-    """Window of random width, at most 50° off the axis.
+    """Return a window of random width, at most 50° off the axis.
 
     Half its width is a part of the pupil's shadow or a few Airy radii, whichever is larger, or follows from a number of
     samples with a coarse pitch.

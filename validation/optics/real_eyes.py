@@ -26,8 +26,8 @@ from a later article, or was proposed for this page. Rows with "closed form" are
   light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves could not be
   read. They apply to tapered rhabdomeres, whereas the model has straight ones.
 - *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The inputs are quoted.
-- *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. The receptor accepts 45° by geometrical
-  optics. The row shows by how much the PSF of the lens widens this angle.
+- *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. According to geometrical optics, the
+  acceptance angle of the receptor is 45°. The row shows by how much the PSF of the lens increases this angle.
 - Humans: Curcio et al., J. Comp. Neurol. 292, 497, 1990, abstract (199,000 cones per mm², 100,000 to 324,000 in
   individuals); Land, in Neurobiology of Arachnids, p. 53, 1985, abstract (0.42 minutes of arc between cones); Caves,
   Brandley & Johnsen, Trends Ecol. Evol. 33, 358, 2018, press release (60 cycles/degree).
@@ -53,8 +53,9 @@ uses another MTF. Duration, window and criterion are quoted.
   receptors, but only its abstract was accessible.
 - The owlfly's Δρ of 1.8°. Its eye is a superposition eye.
 - Values for tapered rhabdomeres.
-- The acuity of the wedge-tailed eagle, 140 cycles/degree, the 13 minutes of arc of the goldfish and the 0.24° of
-  dragonflies. They were read in abstracts, and are inputs of `optics.animals`, so a comparison would prove nothing.
+- The acuity of the wedge-tailed eagle (140 cycles/degree), and the angles between receptors of the goldfish (13 minutes
+  of arc) and of dragonflies (0.24°). They are inputs of `optics.animals`, so a comparison would show nothing. We read
+  them in abstracts.
 
 The command computes the table:
 
@@ -108,12 +109,12 @@ class Row:
 
 
 def land(facet: Facet) -> float:
-    """Land's sensitivity [µm² sr] in white light."""
+    """Return Land's sensitivity [µm² sr] in white light."""
     return 1e12 * optics.optical_sensitivity(facet.diameter, facet.focal_length, facet.rhabdom, facet.length)
 
 
 def first_mode_angle(eye: optics.Ommatidium, wavelength: float) -> float:
-    """Full width at half maximum [degrees] of the light in the first mode."""
+    """Return the full width at half maximum [degrees] of the light in the first mode."""
     at = np.linspace(0, 4, 801)
     power = eye.mode_power(np.radians(at), np.zeros(len(at)), wavelength)[0]
     return 2 * float(np.interp(-power[0] / 2, -power[: power.argmin()], at[: power.argmin()]))
@@ -208,7 +209,7 @@ def limits() -> list[Row]:
 
 
 def geisler_photons() -> float:
-    """Photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
+    """Return photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
 
     The budget's light is daylight. The ratio of its luminance to that of its light at 555 nm converts it.
     """
@@ -223,7 +224,7 @@ def geisler_photons() -> float:
 
 
 def ideal_sensitivities() -> np.ndarray:
-    """Contrast sensitivities of the ideal observer, (luminance, frequency)."""
+    """Return the contrast sensitivities of the ideal observer, (luminance, frequency)."""
     contrast = optics.mean_human_mtf(FREQUENCIES, 2 * math.sqrt(PUPIL_AREA / math.pi))
     area = (CYCLES / FREQUENCIES) ** 2 / 4  # the squared window has the mean 1/4
     bands = optics.SpectralBands.uniform(16, "lms")
@@ -237,7 +238,7 @@ def ideal_sensitivities() -> np.ndarray:
 
 
 def broken_bounds(rows: list[Row], ideal: np.ndarray) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = [
         f"{row.name}: {row.ratio:.4g} times the published value, must be {row.low:g} to {row.high:g} times"
         for row in rows
@@ -259,7 +260,7 @@ def table(rows: list[Row], ideal: np.ndarray) -> str:
 
 
 def draw(rows: list[Row], ideal: np.ndarray, path: Path) -> None:
-    """Computed over published values, and the ideal observer's contrast sensitivity."""
+    """Draw the computed values over the published ones, and the ideal observer's contrast sensitivity."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 6.5), layout="constrained")

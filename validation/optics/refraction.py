@@ -41,7 +41,7 @@ class Corrugation:
 
 
 def refract(slope: np.ndarray, n: float) -> tuple[np.ndarray, np.ndarray]:
-    """Direction (x, z) of a ray that leaves glass of index n at a slope of h; NaN for total reflection.
+    """Return the direction (x, z) of a ray that leaves glass of index n at a slope of h; NaN for total reflection.
 
     Snell's law as a vector: t = n d + (√(1 - n²(1 - c²)) - n c) N, c = d·N, N = (-h', 1)/√(1 + h'²) (Born & Wolf,
     Principles of Optics, §3.2.2).
@@ -54,24 +54,30 @@ def refract(slope: np.ndarray, n: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def deviation_glass_first(angle: float, n: float) -> float:
-    """Deviation [rad] of a ray that leaves through a surface tilted by α: arcsin(n sin α) - α; NaN if reflected."""
+    """Return the deviation [rad] of a ray that leaves through a tilted surface; NaN if it is reflected.
+
+    For the tilt α, it is arcsin(n sin α) - α.
+    """
     sine = n * np.sin(angle)
     return float(np.arcsin(sine) - angle) if sine < 1 else float("nan")
 
 
 def deviation_relief_first(angle: float, n: float) -> float:
-    """Deviation [rad] of a ray that enters through a surface tilted by `angle` and leaves through a flat one."""
+    """Return the deviation [rad] of a ray that enters through a tilted surface and leaves through a flat one."""
     return float(np.arcsin(n * np.sin(angle - np.arcsin(np.sin(angle) / n))))
 
 
 def thin_deviation(angle: float, n: float) -> float:
-    """Deviation [rad] by the thin element exp(ik(n - 1)h): sin θ = (n - 1) tan α; NaN for evanescent waves."""
+    """Return the deviation θ [rad] by the thin element exp(ik(n - 1)h); NaN for evanescent waves.
+
+    sin θ = (n - 1) tan α for a surface with the tilt α.
+    """
     sine = (n - 1) * np.tan(angle)
     return float(np.arcsin(sine)) if sine < 1 else float("nan")
 
 
 def transmission(angle: float, n: float) -> float:
-    """Share of unpolarised power that leaves glass through a tilted surface (Fresnel; Born & Wolf §1.5.3)."""
+    """Return the share of unpolarised power that leaves glass through a tilted surface (Born & Wolf §1.5.3)."""
     cos_in, sine = np.cos(angle), n * np.sin(angle)
     if sine >= 1:
         return 0.0
@@ -82,7 +88,9 @@ def transmission(angle: float, n: float) -> float:
 
 
 def caught_again(height: Callable[[np.ndarray], np.ndarray], slope: np.ndarray, x: np.ndarray, n: float) -> np.ndarray:
-    """Mask of the rays from z = height(x) at these places with these slopes that hit the surface a second time.
+    """Return the mask of the rays that hit the surface a second time.
+
+    The rays leave the surface z = height(x) at the places x, at which it has these slopes.
 
     The surface must stay below its highest sampled point, above which a ray is free.
     """
@@ -98,7 +106,7 @@ def caught_again(height: Callable[[np.ndarray], np.ndarray], slope: np.ndarray, 
 
 
 def real_lens(aperture: float, focal_length: float, n: float, wavelength: float) -> RealLens:
-    """The relief whose mask is an ideal lens, flat side towards the light, rim in the plane z = 0."""
+    """Return the relief whose mask is an ideal lens, flat side towards the light, rim in the plane z = 0."""
     radius = focal_length * aperture / np.sqrt(1 - aperture**2)
     height = (np.hypot(radius, focal_length) - focal_length) / (n - 1)
     nodes, weights = np.polynomial.legendre.leggauss(300)
@@ -117,7 +125,7 @@ def real_lens(aperture: float, focal_length: float, n: float, wavelength: float)
 
 
 def corrugation(depth: float, n: float) -> Corrugation:
-    """h = (d/2) sin(2πx), period 1."""
+    """Return h = (d/2) sin(2πx), period 1."""
     x = (np.arange(4000) + 0.5) / 4000
     slope = np.pi * depth * np.cos(2 * np.pi * x)
     lost = np.isnan(refract(slope, n)[0])

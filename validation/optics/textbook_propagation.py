@@ -10,7 +10,7 @@ __all__ = ["angular_spectrum", "sampled_lens"]
 def angular_spectrum(
     u: np.ndarray, dx: float, wavelength: float, distance: float, dtype: type[np.complexfloating] = np.complex128
 ) -> np.ndarray:
-    """F⁻¹{F{u} H}, H = exp(2πi z √(1/λ² - fx² - fy²)), over the samples' own period (Goodman §3.10.2).
+    """Return F⁻¹{F{u} H}, H = exp(2πi z √(1/λ² - fx² - fy²)), over the samples' own period (Goodman §3.10.2).
 
     Backwards (z < 0), evanescent waves grow as they decay forwards. dtype: type of every intermediate number, including
     kz.
@@ -26,7 +26,10 @@ def angular_spectrum(
 
 
 def sampled_lens(n: int, dx: float, wavelength: float, radius: float, focal_length: float) -> np.ndarray:
-    """Disk with the phase of an ideal lens at n x n points of pitch dx, centre sample n//2: 1 inside, 0 outside."""
+    """Return a disk (1 inside, 0 outside) with the phase of an ideal lens.
+
+    The n x n samples have the pitch dx, and sample n//2 is on the axis.
+    """
     x = (np.arange(n) - n // 2) * dx
     r2 = x[None, :] ** 2 + x[:, None] ** 2
     path = r2 / (np.sqrt(r2 + focal_length**2) + focal_length) if np.isfinite(focal_length) else 0 * r2

@@ -3,14 +3,15 @@
 Which effects of a real relief does a phase mask omit, and when do they matter? `optics` models every relief as a phase
 mask. The mask is accurate for slopes below 10°, and for lenses below NA = 1.16 (λ/f)^¼, which is 0.25 for f = 240 µm.
 
-**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. The `predicted_error` of a PSF covers
-the propagation behind the mask, but not this choice of model. Rays through the real surface show the effects that the
-mask omits. The rays follow Snell's law and come from inside the glass of n = 1.5 (`validation/optics/refraction.py`):
+**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. The `predicted_error` of a PSF
+includes errors of the propagation behind the mask, but not the error of this model. Rays through the real surface show
+the effects that the mask omits. The rays follow Snell's law and come from inside the glass of n = 1.5
+(`validation/optics/refraction.py`):
 
-- **Refraction at a slope.** A prism of angle α deviates light that leaves through its slope ("glass first" in the
-  table) by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan α). The deviation by the mask is 1 % too small at α =
-  11° and 10 % too small at 30°. It does not depend on the side from which the light comes, unlike that of the prism
-  ("relief first": light enters through the slope).
+- **Refraction at a slope.** Light that leaves a prism of angle α through its slope ("glass first" in the table) is
+  deviated by arcsin(n sin α) - α. A mask with the same slope deviates it by arcsin((n - 1) tan α). The deviation by the
+  mask is 1 % too small at α = 11° and 10 % too small at 30°. If light enters the prism through its slope ("relief
+  first"), the deviation of the prism is different, but that of the mask is the same.
 - **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. The
   slope of a lens that consists of one relief therefore cannot exceed 41.8°, so its NA is at most 0.45. The mask has no
   such limit.
@@ -19,8 +20,8 @@ mask omits. The rays follow Snell's law and come from inside the glass of n = 1.
 - **Thickness.** Real rays bend at the surface of the glass and not in the plane of the mask. A relief whose mask is an
   ideal lens is therefore not an ideal lens itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼. Its focus
   spreads along the axis by several depths of field at this NA, and by more at a higher NA.
-- **Neighbouring ridges.** A sinusoidal corrugation starts to reflect totally if its depth is 0.28 of its period. From
-  0.30 of the period on, some rays that have left the surface hit the next ridge.
+- **Neighbouring ridges.** In a sinusoidal corrugation, total reflection begins if the depth is 0.28 of the period. If
+  the depth is 0.30 of the period or more, some rays that have left the surface hit the next ridge.
 
 The command computes the table:
 
@@ -81,7 +82,10 @@ def prism(angle_deg: float, with_psf: bool = True) -> Prism:
 
 
 def psf_deviation(angle: float) -> float:
-    """Direction of the brightest point behind a prism by optics.psf, from a parabola through the top of a cut."""
+    """Return the direction [rad] of the brightest point behind a prism.
+
+    It is the top of a parabola through a cut of the PSF by optics.psf.
+    """
     heights = np.tan(angle) * PRISM_RADIUS * (2 * np.arange(4) - 3)
     pupil = optics.Pupil(PRISM_RADIUS, optics.BSplineRelief(np.tile(heights, (4, 1))), n=N)
     place = PRISM_DISTANCE * float(np.tan(thin_deviation(angle, N)))
@@ -98,7 +102,7 @@ def _lens(aperture: float, focal_length: float = FOCAL_LENGTH) -> RealLens:
 
 
 def limits() -> dict[str, float]:
-    """Limits of the mask: given errors of its deviation, and effects that it omits."""
+    """Return the limits of the mask: given errors of its deviation, and effects that it omits."""
 
     def off(angle: float, by: float) -> float:
         return 1 - thin_deviation(angle, N) / deviation_glass_first(angle, N) - by
@@ -143,7 +147,7 @@ SAID = {
 
 
 def broken_bounds(prisms: list[Prism], lenses: list[RealLens], found: dict[str, float]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = [
         f"{name}: {found[name]:.4g}, the page says {said:.4g}"
         for name, (said, within) in SAID.items()
@@ -186,7 +190,7 @@ def table(prisms: list[Prism], lenses: list[RealLens], ridges: list[Corrugation]
 
 
 def draw(lenses: list[RealLens], path: Path) -> None:
-    """Deviation over slope, Strehl ratio over NA, and rays through a real lens."""
+    """Draw the deviation over slope, Strehl ratio over NA, and rays through a real lens."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 4.4), layout="constrained")
@@ -217,7 +221,7 @@ def draw(lenses: list[RealLens], path: Path) -> None:
 
 
 def _rays(axes: Any) -> None:
-    """Rays through the relief whose mask is an ideal lens of NA 0.4."""
+    """Draw rays through the relief whose mask is an ideal lens of NA 0.4."""
     f, aperture = FOCAL_LENGTH * 1e6, 0.4
     radius = f * aperture / np.sqrt(1 - aperture**2)
     x = np.linspace(-radius, radius, 201)

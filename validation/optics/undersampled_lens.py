@@ -2,13 +2,13 @@
 
 What does the PSF of a lens look like if the pupil is sampled too coarsely? It is a regular pattern of bright spots with
 a bright centre. At f/2 with 51 samples, the first dark ring of the Airy pattern encloses 6.2e-06 of the light instead
-of 0.8278. This fraction becomes correct only when the pitch is below λ / (2 NA).
+of 0.8278. This fraction becomes correct only when the pitch (the distance between samples) is below λ / (2 NA).
 
 **Method.** The simulation of the [published eyes](../results/paper.md) samples a pupil of a few mm with 51 or 101
 points per side. Here the lenses are f/2, f/8 and f/13.5, with a focal length of 4 mm. The wavelength is 550 nm, and the
 grid is 2 mm wide. At a pitch of λ / (2 NA), the phase at the rim of a lens changes by half a wave between neighbouring
-samples. With 51 samples, the pitch exceeds λ / (2 NA) by factors of 35, 9 and 5, respectively. Through aliasing, the
-samples then represent an array of many small lenses instead of one, and most of the light misses the Airy disk. The
+samples. With 51 samples, the pitch exceeds λ / (2 NA) by factors of 35, 9 and 5, respectively. Because of aliasing,
+such samples represent an array of many small lenses instead of one, and most of the light misses the Airy disk. The
 image does not show the mistake: it is finite and positive, and its power is conserved.
 
 In `optics.psf`, the user does not choose the sampling of the pupil: the function derives it from the slope of the
@@ -83,7 +83,7 @@ class Row:
 
 
 def focus(lens: Lens, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Fields in the pupil and in the focal plane by the textbook's method."""
+    """Return fields in the pupil and in the focal plane by the textbook's method."""
     u = sampled_lens(n, lens.grid / n, WAVELENGTH, lens.radius, lens.focal_length)
     return u, angular_spectrum(u, lens.grid / n, WAVELENGTH, lens.focal_length)
 
@@ -105,7 +105,7 @@ def true_psf(lens: Lens, dx: float, side: int = 65) -> optics.PSFResult:
 
 
 def energy_inside(u: np.ndarray, dx: float, radius: float) -> float:
-    """∫ |u|² over a disk about the centre, of the band-limited function through the samples.
+    """Return ∫ |u|² over a disk about the centre, of the band-limited function through the samples.
 
     Gauss-Legendre in radius, trapezoidal rule in angle. The points lie between the samples, so the Fourier sum is
     evaluated directly.
@@ -130,7 +130,7 @@ def _exact(lens: Lens) -> float:
 
 
 def broken_bounds(published: list[Row], sweep: Row) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for row in [*published, sweep]:
         name = f"f/{row.lens.f_number:g}, f = {row.lens.focal_length:g} m"
@@ -160,7 +160,7 @@ def table(published: list[Row], sweep: Row) -> str:
 
 
 def draw(published: list[Row], sweep: Row, path: Path) -> None:
-    """Undersampled image, true PSF, and energy over the pitch."""
+    """Draw the undersampled image, true PSF, and energy over the pitch."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.5, 3.6), layout="constrained")

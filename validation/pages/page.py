@@ -58,7 +58,7 @@ class Page:
 
 
 def parser(text: str) -> argparse.ArgumentParser:
-    """Argument parser with the options of all pages."""
+    """Return the argument parser with the options of all pages."""
     found = argparse.ArgumentParser(description=text.split("\n")[0])
     found.add_argument("--out", type=Path, default=Path("validation/figures"), help="directory for the figure")
     found.add_argument("--docs", type=Path, help="directory for the page, docs/validation for the stored one")

@@ -48,7 +48,7 @@ class Region:
 
 
 def front(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Pareto front of (seconds, error) pairs, fastest first."""
+    """Return the Pareto front of (seconds, error) pairs, fastest first."""
     kept: list[tuple[float, float]] = []
     for seconds, error in sorted(points):
         if math.isfinite(error) and (not kept or error < kept[-1][1]):

@@ -45,7 +45,7 @@ MODULES = (
 
 @cache
 def installed() -> Mapping[Peer, str]:
-    """Peers that can run here, with their versions. Installed peers that cannot be imported are reported."""
+    """Return peers that can run here, with their versions. Installed peers that cannot be imported are reported."""
     found = {}
     for module in MODULES:
         peer = import_module(f"validation.peers.{module}").PEER

@@ -88,7 +88,7 @@ def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -
 
 
 def own_best(peers: Iterable[Point]) -> list[Point]:
-    """Point of the smallest error of each peer, among methods that solve the same problem.
+    """Return the point of the smallest error of each peer, among methods that solve the same problem.
 
     Paraxial methods are excluded, because they are most accurate with a handful of samples by chance.
     """

@@ -45,9 +45,10 @@ def one_thread() -> Iterator[None]:
 
 
 def median_seconds(compute: Callable[[], Any], repeats: int = REPEATS, least: float = 0.05) -> float:
-    """Median of at least `repeats` calls (three if one takes a second) and `least` seconds.
+    """Return the median of at least `repeats` calls (three if one takes a second) and `least` seconds.
 
-    It must have been called once before. A short second call often still includes warm-up and is not counted.
+    The call must have been made once before. If the second call is short, it is not counted, because it may still
+    include warm-up.
     """
     times = [_seconds(compute)]
     if times[0] < UNHURRIED:
@@ -73,7 +74,7 @@ def our_points(case: Case, machine: str) -> Iterator[Point]:
 
 
 def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator[Point]:
-    """Every method of these peers (with their versions), on every grid, in every precision."""
+    """Yield every method of these peers (with their versions), on every grid, in every precision."""
     for peer, version in peers.items():
         done = set()  # some grids are equal for methods that choose their own pitch
         for grid in grids(case):
@@ -86,7 +87,7 @@ def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator
 
 
 def quickest(rounds: Sequence[Sequence[Point]]) -> list[Point]:
-    """One point of each method and setting: the smallest of its medians, since other load only adds time."""
+    """Return one point of each method and setting: the smallest of its medians, since other load only adds time."""
     best: dict[tuple[object, ...], Point] = {}
     for point in (point for points in rounds for point in points):
         key = (*point.series, point.samples, point.pitch)

@@ -6,9 +6,9 @@ Do the claims of other codes' tests and of textbooks also hold for the results o
 values. Each of these values is computed with the functions of `optics`.
 
 **Table.** Each row shows the value from the source ("theirs"), our value, and the largest difference that is allowed
-between them. If a test suite states a bound, the same bound is used. The bound is wider where the claim is paraxial and
-the exact integral differs from it. Because most claims are paraxial, most systems have a large F-number (f/100).
-Lengths are in units of λf/D.
+between them. If a test suite states a bound, the same bound is used. Most claims are paraxial approximations, which
+agree with the exact integral only at large F-numbers. Most systems therefore have f/100. At smaller F-numbers, the
+bound is wider. Lengths are in units of λf/D.
 
 **Limits.** The claims listed below the table cannot be tested with `optics`. Each one is followed by the reason.
 
@@ -37,7 +37,7 @@ def cases() -> Iterator[Case]:
 
 
 def answered(asked: list[Case]) -> tuple[list[float], str, list[str]]:
-    """Differences over their bounds, the table, and the claims that do not hold."""
+    """Return differences over their bounds, the table, and the claims that do not hold."""
     shares, broken, lines = [], [], []
     source = ""
     for case in asked:

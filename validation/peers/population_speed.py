@@ -12,9 +12,10 @@ an eye needs. The error of a PSF is its relative L2 distance from our direct sum
 The table states the median and the largest error over every fifth eye.
 
 **Table.** `psf_batch` runs with five tolerances and `psf` with three. The peers run with 32 to 256 samples across the
-pupil. The second table is for the design of lenses with a radius of 1 mm and a focal length of 10 mm. It states CPU
-times of single PSFs, with and without the gradient with respect to all heights or coefficients. They are compared with
-a matrix Fourier transform in NumPy, which predicts no error.
+pupil. The second table is for the design of lenses: pupils with a radius of 1 mm and a focal length of 10 mm, whose
+wavefront is a map of heights or a sum of Zernike modes. It states CPU times of single PSFs, without and with the
+gradient with respect to all heights or coefficients. They are compared with a matrix Fourier transform in NumPy, which
+predicts no error.
 
 **Limits.** The other codes cannot share a plan between the eyes of a population. They also have no exact propagator
 with a freely chosen output grid, as `optics.psf` has. Instead, their matrix Fourier transform from the pupil to the
@@ -125,7 +126,7 @@ def timed(code: str, asked: str, population: list[optics.Pupil], known: dict[int
 
 
 def pupil_field(pupil: optics.Pupil, n: int, parts: int = 1) -> tuple[np.ndarray, float]:
-    """Samples (n, n) of the pupil's field with the phase r²/2z that a focus lacks, and their pitch [m].
+    """Return samples (n, n) of the pupil's field with the phase r²/2z that a focus lacks, and their pitch [m].
 
     For even n the axis is at n//2.
 
@@ -164,7 +165,7 @@ def prysm_picture(n: int) -> Picture:
 
 
 def _scale(field: np.ndarray, pitch: float, out: np.ndarray) -> float:
-    """Factor that gives the axis |Σ u| dξ²/λz, for any convention of a code."""
+    """Return the factor that gives the axis |Σ u| dξ²/λz, for any convention of a code."""
     axis = abs(out[N // 2, N // 2])
     return float(abs(field.sum()) * pitch**2 / (WAVE * Z) / axis)
 
@@ -207,7 +208,7 @@ def table(rows: list[Row]) -> str:
 
 
 def message(rows: list[Row]) -> str:
-    """Figure title: our fastest row compared with the fastest of other codes, if available."""
+    """Return the figure title: our fastest row compared with the fastest of other codes, if available."""
     batch = max((row for row in rows if row.code == "psf_batch"), key=lambda row: row.rate)
     others = [row for row in rows if row.code in ("prysm", "hcipy")]
     if not others:

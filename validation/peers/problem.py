@@ -77,18 +77,18 @@ class Case:
         return math.isfinite(self.focal_length)
 
     def around_pupil(self, n: int) -> SampleGrid:
-        """n x n samples on a grid just wider than the pupil, for codes that transform onto another pitch."""
+        """Return n x n samples on a grid just wider than the pupil, for codes that transform onto another pitch."""
         return SampleGrid(n, 2.04 * self.radius / n)
 
     def exact(self) -> np.ndarray:
-        """|U|² of a unit wave on the window."""
+        """Return |U|² of a unit wave on the window."""
         return _exact(self)
 
     def aperture(self, grid: SampleGrid) -> np.ndarray:
         return (grid.r <= self.radius).astype(np.float64)
 
     def lens(self, grid: SampleGrid, paraxial: bool = False) -> np.ndarray:
-        """exp(-ik(√(r² + f²) - f)), or its paraxial form exp(-ikr²/2f) for codes that propagate paraxially."""
+        """Return exp(-ik(√(r² + f²) - f)), or its paraxial form exp(-ikr²/2f) for codes that propagate paraxially."""
         if not self.has_lens:
             return np.ones((grid.n, grid.n), np.complex128)
         f, r2 = self.focal_length, grid.r**2
@@ -96,11 +96,14 @@ class Case:
         return np.exp(-2j * np.pi / WAVELENGTH * path)
 
     def pupil(self, grid: SampleGrid, paraxial: bool = False) -> np.ndarray:
-        """Field behind pupil and lens, hard edge: a sample is inside or outside."""
+        """Return the field behind pupil and lens, hard edge: a sample is inside or outside."""
         return self.aperture(grid) * self.lens(grid, paraxial)
 
     def resampled(self, field: np.ndarray, grid: SampleGrid) -> np.ndarray:
-        """|field|² on the window by band-limited (sinc) interpolation; exact where an output falls on a sample."""
+        """Return |field|² on the window by band-limited (sinc) interpolation.
+
+        It is exact at outputs that coincide with a sample.
+        """
         weights = np.sinc((self.window.x[:, None] - grid.x[None, :]) / grid.dx)
         return np.abs(weights @ np.asarray(field, np.complex128) @ weights.T) ** 2
 
@@ -142,7 +145,9 @@ class Peer:
 
 
 def grids(case: Case) -> list[SampleGrid]:
-    """Square grids with even, fast lengths that contain pupil and window once, and coarse ones of twice that width.
+    """Return square grids with even, fast lengths that contain pupil and window once.
+
+    Coarse grids of twice that width follow.
 
     Outputs coincide with samples if the samples are fine enough. The wider grids are for codes whose error is wrapped
     light.
@@ -158,7 +163,7 @@ def grids(case: Case) -> list[SampleGrid]:
 
 
 def error(case: Case, intensity: np.ndarray, fitted: bool) -> float:
-    """Relative L2 error of intensity over the window; fitted: after the overall scale that minimises it."""
+    """Return the relative L2 error of intensity over the window; fitted: after the overall scale that minimises it."""
     exact = case.exact()
     image = np.asarray(intensity, np.float64)
     if image.shape != exact.shape or not np.isfinite(image).all():
@@ -169,7 +174,7 @@ def error(case: Case, intensity: np.ndarray, fitted: bool) -> float:
 
 @cache
 def _exact(case: Case) -> np.ndarray:
-    """Exact result with the reference's own node counts, checked at some radii with many more."""
+    """Return the exact result with the reference's own node counts, checked at some radii with many more."""
     r = np.hypot(case.window.x[None, :], case.window.x[:, None])
     profile = ideal_lens_profile(float(r.max()), WAVELENGTH, case.radius, case.focal_length, case.distance)
     some = np.linspace(0, float(r.max()), 23)

@@ -19,7 +19,7 @@ LONGEST = 0.2  # predicted seconds above which a method selected by name is omit
 
 
 def psf_runs(case: Case) -> Iterator[Run]:
-    """Every possible tolerance, with the planner's choice and with each method of that accuracy."""
+    """Yield every possible tolerance, with the planner's choice and with each method of that accuracy."""
     focal_length = case.focal_length if case.has_lens else None
     pupil = optics.Pupil(aperture_radius=case.radius, thin_lens_focal_length=focal_length)
     for method in ("auto", *EXACT):
@@ -53,7 +53,7 @@ def _calls(pupil: optics.Pupil, request: dict[str, Any]) -> Iterator[Run]:
 
 
 def plain_angular_spectrum(case: Case, grid: SampleGrid) -> Iterator[Run]:
-    """The angular spectrum of the same hard-edged samples that the peers receive."""
+    """Yield the angular spectrum of the same hard-edged samples that the peers receive."""
     window = case.window
     pupil = case.pupil(grid)
     for dtype, complex_dtype in zip(DTYPES, (np.complex64, np.complex128), strict=True):

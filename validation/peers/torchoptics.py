@@ -38,7 +38,10 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
 
 
 def _target(case: Case, grid: SampleGrid) -> SampleGrid:
-    """Odd number of samples that covers the window with a margin for interpolation, and has a fast transform."""
+    """Return an odd number of samples that has a fast transform.
+
+    It covers the window with a margin for interpolation.
+    """
     least = 2 * math.ceil(case.half_window / grid.dx) + 1
     if grid.dx > case.window.dx:
         least = grid.odd.n

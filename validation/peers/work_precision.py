@@ -33,7 +33,10 @@ COLORS = {"float32": OURS, "float64": OURS_TOO}
 def measure(
     cases: Sequence[Case], machine: str, rounds: int, rivals: Mapping[Peer, str]
 ) -> tuple[list[Point], list[Point]]:
-    """Points of this package and of the peers, measured in turns; the smallest of the medians over the rounds."""
+    """Return points of this package and of the peers, measured in turns.
+
+    The time of a point is the smallest of its medians over the rounds.
+    """
     ours, peers = [], []
     if rivals:
         print(f"peers: {', '.join(f'{peer.distribution} {at}' for peer, at in rivals.items())}", file=sys.stderr)
@@ -47,7 +50,7 @@ def measure(
 
 
 def table(points: Sequence[Point]) -> str:
-    """Best error of every method of every code, with its time."""
+    """Return the best error of every method of every code, with its time."""
     series: dict[tuple[str, ...], list[Point]] = defaultdict(list)
     for point in points:
         series[point.case, point.peer, point.method, point.dtype].append(point)
@@ -62,7 +65,7 @@ def table(points: Sequence[Point]) -> str:
 
 
 def curves(ours: Sequence[Point], peers: Sequence[Point]) -> list[Curve]:
-    """Pareto front of each code; for this package one per dtype, with all methods as dots."""
+    """Return the Pareto front of each code; for this package one per dtype, with all methods as dots."""
     found = []
     for peer in sorted({point.peer for point in peers}):
         kept = front((point.seconds, point.error) for point in peers if point.peer == peer)
@@ -80,7 +83,7 @@ def curves(ours: Sequence[Point], peers: Sequence[Point]) -> list[Curve]:
 
 
 def regions(peers: Sequence[Point]) -> list[Region]:
-    """Regions of the goals for this package, given the peers' points of a case."""
+    """Return the regions of the goals for this package, given the peers' points of a case."""
     found = []
     converged = [point.seconds for point in peers if point.error <= CONVERGED_PEER]
     if converged:
@@ -158,7 +161,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _rivals(names: list[str] | None) -> Mapping[Peer, str]:
-    """Peers to run, with their versions: all that are installed for an empty list, none for None."""
+    """Return peers to run, with their versions: all that are installed for an empty list, none for None."""
     if names is None:
         return {}
     return {peer: at for peer, at in installed().items() if not names or peer.distribution in names}

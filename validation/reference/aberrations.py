@@ -1,7 +1,8 @@
 """Aberrations of a circular pupil: Zernike polynomials, and Strehl ratios.
 
-Coefficients in waves of the peak terms W020 ρ², W040 ρ⁴, W131 ρ³ cos θ, W222 ρ² cos² θ. The Strehl ratio is
-|<e^{2πiW}>|² over the unit disk, paraxial: the intensity on the axis of the reference sphere, not the highest one.
+Coefficients are in waves and belong to the peak terms W020 ρ², W040 ρ⁴, W131 ρ³ cos θ and W222 ρ² cos² θ. Strehl ratios
+are paraxial: |<e^{2πiW}>|², a mean over the unit disk. They are the intensity at the centre of the reference sphere,
+which may differ from the highest intensity.
 """
 
 from __future__ import annotations
@@ -37,17 +38,20 @@ RMS_PER_WAVE = {
 
 
 def marechal_strehl(sigma: float) -> float:
-    """exp(-(2πσ)²), σ the RMS of the wavefront in waves, accurate below a tenth (Mahajan 1983, JOSA 73:860)."""
+    """Return exp(-(2πσ)²) for a wavefront of RMS σ in waves; accurate below 0.1 (Mahajan 1983, JOSA 73:860)."""
     return math.exp(-((2 * math.pi * sigma) ** 2))
 
 
 def strehl_defocus(w: float) -> float:
-    """sinc²(W020): [sin(πW)/(πW)]² (Born & Wolf §8.8.2, u = 4πW)."""
+    """Return sinc²(W020): [sin(πW)/(πW)]² (Born & Wolf §8.8.2, u = 4πW)."""
     return float(np.sinc(w) ** 2)
 
 
 def strehl_spherical(w: float, defocus: float = 0.0) -> float:
-    """|∫₀¹ exp(2πi(W040 t² + W020 t)) dt|², t = ρ², in Fresnel integrals; W020 = -W040 balances (Born & Wolf §9.3)."""
+    """Return |∫₀¹ exp(2πi(W040 t² + W020 t)) dt|², t = ρ², by Fresnel integrals (Born & Wolf §9.3).
+
+    With W020 = -W040, defocus balances the spherical aberration.
+    """
     if w == 0:
         return strehl_defocus(defocus)
     scale, middle = 2 * math.sqrt(abs(w)), math.copysign(1, w) * defocus / (2 * abs(w))
@@ -56,13 +60,19 @@ def strehl_spherical(w: float, defocus: float = 0.0) -> float:
 
 
 def strehl_coma(w: float, tilt: float = 0.0) -> float:
-    """|∫₀¹ J0(2π(W131 t^{3/2} + W111 t^{1/2})) dt|², t = ρ²; W111 = -2 W131/3 balances (Mahajan 1983)."""
+    """Return |∫₀¹ J0(2π(W131 t^{3/2} + W111 t^{1/2})) dt|², t = ρ² (Mahajan 1983).
+
+    With W111 = -2 W131/3, tilt balances the coma.
+    """
     value, _ = quad(lambda rho: 2 * rho * j0(2 * np.pi * (w * rho**3 + tilt * rho)), 0, 1, epsabs=1e-13, limit=200)
     return value**2
 
 
 def strehl_astigmatism(w: float, defocus: float = 0.0) -> float:
-    """|∫₀¹ J0(πW222 t) exp(2πi(W020 + W222/2) t) dt|², t = ρ²; W020 = -W222/2 balances (Mahajan 1983)."""
+    """Return |∫₀¹ J0(πW222 t) exp(2πi(W020 + W222/2) t) dt|², t = ρ² (Mahajan 1983).
+
+    With W020 = -W222/2, defocus balances the astigmatism.
+    """
 
     def integrand(t: float) -> complex:
         return j0(np.pi * w * t) * np.exp(2j * np.pi * (defocus + w / 2) * t)
@@ -72,12 +82,12 @@ def strehl_astigmatism(w: float, defocus: float = 0.0) -> float:
 
 
 def strehl_of_wavefront(wavefront: np.ndarray, weight: np.ndarray) -> float:
-    """|Σ w e^{2πiW}|² / (Σ w)² for W in waves on nodes of the disk with quadrature weights."""
+    """Return |Σ w e^{2πiW}|² / (Σ w)² for W in waves on nodes of the disk with quadrature weights."""
     return float(np.abs(np.sum(weight * np.exp(2j * np.pi * wavefront)) / np.sum(weight)) ** 2)
 
 
 def noll_index(j: int) -> tuple[int, int]:
-    """(n, m) of Noll's j >= 1: m > 0 is the cosine, m < 0 the sine (Noll 1976, JOSA 66:207, table I)."""
+    """Return (n, m) of Noll's j >= 1: m > 0 is the cosine, m < 0 the sine (Noll 1976, JOSA 66:207, table I)."""
     if j < 1:
         raise ValueError(f"j = {j}: must be at least 1")
     n = (math.isqrt(8 * j - 7) - 1) // 2
@@ -87,7 +97,10 @@ def noll_index(j: int) -> tuple[int, int]:
 
 
 def zernike(j: int, rho: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """Noll's Z_j, of RMS 1 and orthogonal over the unit disk: √(n+1) R_n^m √2 cos or sin mθ (Noll 1976, eqs. 1, 2)."""
+    """Return Noll's polynomial Z_j, which has RMS 1 over the unit disk (Noll 1976, eqs. 1, 2).
+
+    It is √(n+1) R_n^m √2 cos mθ, or the same with sin mθ. All Z_j are orthogonal.
+    """
     n, m = noll_index(j)
     radial = np.zeros(np.shape(rho))
     for s in range((n - abs(m)) // 2 + 1):

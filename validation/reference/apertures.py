@@ -10,23 +10,25 @@ __all__ = ["annulus_spectrum", "disk_spectrum", "polygon_spectrum", "rectangle_s
 
 
 def disk_spectrum(fx: np.ndarray, fy: np.ndarray, radius: float = 1.0) -> np.ndarray:
-    """a J₁(2πaf)/f (Goodman, Introduction to Fourier Optics, §2.1.5)."""
+    """Return a J₁(2πaf)/f (Goodman, Introduction to Fourier Optics, §2.1.5)."""
     f = np.maximum(np.hypot(fx, fy), 1e-12)
     return np.asarray(radius * j1(2 * np.pi * radius * f) / f)
 
 
 def annulus_spectrum(fx: np.ndarray, fy: np.ndarray, inner: float, outer: float = 1.0) -> np.ndarray:
-    """Difference of two disks."""
+    """Return the difference of two disks."""
     return disk_spectrum(fx, fy, outer) - disk_spectrum(fx, fy, inner)
 
 
 def rectangle_spectrum(fx: np.ndarray, fy: np.ndarray, width: float, height: float) -> np.ndarray:
-    """Spectrum of a rectangle of full widths (Goodman, §2.1.5)."""
+    """Return the spectrum of a rectangle of full widths (Goodman, §2.1.5)."""
     return np.asarray(width * np.sinc(width * np.asarray(fx)) * height * np.sinc(height * np.asarray(fy)))
 
 
 def polygon_spectrum(fx: np.ndarray, fy: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Counterclockwise polygon, f not 0 (Lee & Mittra, IEEE Trans. Antennas Propag. 31, 99-103 (1983)).
+    """Return the spectrum of a counterclockwise polygon for f other than 0.
+
+    Source: Lee & Mittra, IEEE Trans. Antennas Propag. 31, 99-103 (1983).
 
     By Gauss's theorem, with the field f e^{-2πi f·x} / (-2πi f²), a sum over edges e = w - v with middle m of
     (f x e) sinc(f·e) e^{-2πi f·m} / (-2πi f²).

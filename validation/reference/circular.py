@@ -21,19 +21,22 @@ AIRY_ZEROS = jn_zeros(1, 10)
 
 
 def airy_psf(r: np.ndarray, wavelength: float, radius: float, focal_length: float) -> np.ndarray:
-    """Airy pattern, unit power [1/m²]: πR²/(λf)² (2 J1(v)/v)², v = 2πRr/(λf) (Born & Wolf §8.5.2, eq. 14)."""
+    """Return the Airy pattern of unit power [1/m²] (Born & Wolf §8.5.2, eq. 14).
+
+    It is πR²/(λf)² (2 J1(v)/v)² with v = 2πRr/(λf).
+    """
     v = 2 * np.pi * radius * np.asarray(r, dtype=np.float64) / (wavelength * focal_length)
     return np.pi * radius**2 / (wavelength * focal_length) ** 2 * _jinc(v) ** 2
 
 
 def airy_encircled_energy(r: np.ndarray, wavelength: float, radius: float, focal_length: float) -> np.ndarray:
-    """1 - J0(v)² - J1(v)² (Born & Wolf §8.5.2, eq. 18)."""
+    """Return 1 - J0(v)² - J1(v)² (Born & Wolf §8.5.2, eq. 18)."""
     v = 2 * np.pi * radius * np.asarray(r, dtype=np.float64) / (wavelength * focal_length)
     return 1 - j0(v) ** 2 - j1(v) ** 2
 
 
 def circular_mtf(f: np.ndarray, wavelength: float, radius: float, focal_length: float) -> np.ndarray:
-    """MTF of Airy's pattern at spatial frequencies f [1/m]: the overlap of two disks,
+    """Return the MTF of Airy's pattern at spatial frequencies f [1/m]: the overlap of two disks,
 
     2/π (arccos s - s √(1 - s²)), s = f λ f# = f λ focal_length / (2R), 0 beyond s = 1 (Goodman §6.4.2, eq. 6-32).
     """
@@ -42,15 +45,18 @@ def circular_mtf(f: np.ndarray, wavelength: float, radius: float, focal_length: 
 
 
 def circular_aperture_on_axis(radius: float, distance: float, wavelength: float) -> float:
-    """On-axis intensity behind a circular aperture in a unit plane wave, first Rayleigh-Sommerfeld integral, exact:
-    |1 - (z/ρ) e^{ik(ρ - z)}|², ρ = √(z² + R²) (Osterberg & Smith 1961, JOSA 51:1050)."""
+    """Return the intensity on the axis behind a circular aperture in a unit plane wave.
+
+    It is the exact first Rayleigh-Sommerfeld integral, |1 - (z/ρ) e^{ik(ρ - z)}|² with ρ = √(z² + R²) (Osterberg &
+    Smith 1961, JOSA 51:1050).
+    """
     edge = np.hypot(distance, radius)
     excess = radius**2 / (edge + distance)
     return float(np.abs(1 - distance / edge * np.exp(2j * np.pi * excess / wavelength)) ** 2)
 
 
 def converging_wave_at_focus(radius: float, distance: float, wavelength: float) -> complex:
-    """Field at the focus of exp(-ik(L(ρ) - z)), L = √(ρ² + z²), behind a circular aperture, exact:
+    """Return the field at the focus of exp(-ik(L(ρ) - z)), L = √(ρ² + z²), behind a circular aperture, exact:
 
     ∫ z/(2πL²) (1/L - ik) 2πρ dρ with ρ dρ = L dL is 1 - z/L - ikz ln(L/z), L at the edge
     (first Rayleigh-Sommerfeld integral, Goodman §3.5; Airy's peak is its limit |kR²/2z|² for R << z).
@@ -62,7 +68,7 @@ def converging_wave_at_focus(radius: float, distance: float, wavelength: float) 
 
 
 def circular_aperture_fraunhofer(r: np.ndarray, wavelength: float, radius: float, distance: float) -> np.ndarray:
-    """Intensity far behind a circular aperture in a unit plane wave (R²/(λz) << 1) at any angle:
+    """Return the intensity far behind a circular aperture in a unit plane wave (R²/(λz) << 1) at any angle:
 
     |πR²/(λD) (z/D) 2 J1(v)/v|², v = kR r/D, D = √(r² + z²) (first Rayleigh-Sommerfeld integral with
     the phase k(D - r·ρ/D); Goodman §4.4.2 is its paraxial limit).
@@ -73,13 +79,13 @@ def circular_aperture_fraunhofer(r: np.ndarray, wavelength: float, radius: float
 
 
 def circular_aperture_power(radius: float, wavelength: float) -> float:
-    """Fraction of a circular aperture's power in waves that propagate: 1 - J0(kR)² - J1(kR)².
+    """Return the fraction of a circular aperture's power in waves that propagate: 1 - J0(kR)² - J1(kR)².
 
     The aperture's power spectrum is Airy's pattern in the direction sines; sines above 1 are evanescent (Parseval)."""
     return float(airy_encircled_energy(np.ones(1), wavelength, radius, 1.0)[0])
 
 
 def _jinc(v: np.ndarray) -> np.ndarray:
-    """2 J1(v)/v."""
+    """Return 2 J1(v)/v."""
     safe = np.where(v == 0, 1.0, v)
     return np.where(v == 0, 1.0, 2 * j1(safe) / safe)

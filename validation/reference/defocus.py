@@ -9,10 +9,11 @@ __all__ = ["defocused_psf", "lommel_intensity"]
 
 
 def lommel_intensity(u: np.ndarray | float, v: np.ndarray | float) -> np.ndarray:
-    """|∫₀¹ J0(vρ) e^{-iuρ²/2} 2ρ dρ|² by Lommel's functions (Born & Wolf §8.8.1).
+    """Return |∫₀¹ J0(vρ) e^{-iuρ²/2} 2ρ dρ|² by Lommel's functions (Born & Wolf §8.8.1).
 
-    (2/u)² (U1² + U2²) in the shadow |u| < |v|, (2/u)² (1 + V0² + V1² - 2 V0 cos w - 2 V1 sin w), w = (u + v²/u)/2, in
-    the light. 1 at the focus, Airy's pattern at u = 0, sin²(u/4)/(u/4)² at v = 0.
+    In the shadow, |u| < |v|, it is (2/u)² (U1² + U2²). In the light, it is (2/u)² (1 + V0² + V1² - 2 V0 cos w - 2 V1
+    sin w) with w = (u + v²/u)/2. Special cases are 1 at the focus, Airy's pattern at u = 0, and sin²(u/4)/(u/4)² at v =
+    0.
     """
     u, v = np.broadcast_arrays(np.abs(np.asarray(u, dtype=np.float64)), np.abs(np.asarray(v, dtype=np.float64)))
     near = np.maximum(u, v) < 2
@@ -25,7 +26,7 @@ def lommel_intensity(u: np.ndarray | float, v: np.ndarray | float) -> np.ndarray
 
 
 def defocused_psf(r: np.ndarray, wavelength: float, radius: float, focal_length: float, distance: float) -> np.ndarray:
-    """Fresnel's PSF of a thin lens exp(-ikρ²/2f) in a plane, unit power [1/m²], on the plane z = distance:
+    """Return Fresnel's PSF of a thin lens exp(-ikρ²/2f) in a plane, unit power [1/m²], on the plane z = distance:
 
     πR²/(λz)² I(u, v) with u = kR²(1/z - 1/f), v = kRr/z: Lommel's integral without the Debye approximation, so that it
     holds at any Fresnel number (Li & Wolf 1984, JOSA A 1:801). An infinite focal length is the bare aperture; for a
@@ -37,7 +38,7 @@ def defocused_psf(r: np.ndarray, wavelength: float, radius: float, focal_length:
 
 
 def _shadow(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """U_n = Σ (-1)^s (u/v)^{n+2s} J_{n+2s}(v), for u < v."""
+    """Return U_n = Σ (-1)^s (u/v)^{n+2s} J_{n+2s}(v), for u < v."""
     total = np.zeros((2, *u.shape))
     for order in range(1, _orders(v)):
         total[(order - 1) % 2] += (-1) ** ((order - 1) // 2) * (u / v) ** (order - 1) * 2 / v * jv(order, v)
@@ -45,7 +46,10 @@ def _shadow(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _near_the_focus(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """The same with J_n(v) = (v/2)^n / n! 0F1(n + 1, -v²/4): no quotient of small numbers where u and v are small."""
+    """Return the same with J_n(v) = (v/2)^n / n! 0F1(n + 1, -v²/4).
+
+    For small u and v, this avoids quotients of small numbers.
+    """
     total = np.zeros((2, *u.shape))
     factorial = 1.0
     for order in range(1, 32):
@@ -56,7 +60,7 @@ def _near_the_focus(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _light(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """V_n = Σ (-1)^s (v/u)^{n+2s} J_{n+2s}(v)."""
+    """Return V_n = Σ (-1)^s (v/u)^{n+2s} J_{n+2s}(v)."""
     v0, v1 = np.zeros(u.shape), np.zeros(u.shape)
     for s in range(_orders(v) // 2 + 1):
         v0 += (-1) ** s * (v / u) ** (2 * s) * jv(2 * s, v)
@@ -66,6 +70,6 @@ def _light(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _orders(v: np.ndarray) -> int:
-    """J_n(v) vanishes to float64 beyond n = v + a few v^(1/3) and some."""
+    """Return an order n beyond which J_n(v) vanishes in float64: v plus a few v^(1/3), and a margin."""
     largest = float(v.max(initial=0))
     return int(largest + 8 * largest ** (1 / 3) + 24)

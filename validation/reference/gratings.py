@@ -21,10 +21,13 @@ __all__ = [
 
 
 def binary_grating_efficiency(order: int, depth: float, duty: float = 0.5) -> float:
-    """Share of the light in a diffraction order of a two-level phase grating, depth in waves, thin element:
+    """Return the share of the light in order m of a thin phase grating with two levels.
 
-    |1 + d(e^{2πi depth} - 1)|² for order 0, 4 d² sin²(π depth) sinc²(m d) else; 40.5 % at half a wave and d = 1/2
-    (Fourier series of a rectangular wave; Goodman §4.4).
+    depth: difference of the two levels in waves.
+    duty: fraction d of the period with the greater depth.
+
+    The share is |1 + d(e^{2πi depth} - 1)|² in order 0, else 4 d² sin²(π depth) sinc²(m d). It is 40.5 % for m = 1 at
+    half a wave and d = 1/2. Source: Fourier series of a rectangular wave; Goodman §4.4.
     """
     if order == 0:
         return float(np.abs(1 + duty * np.expm1(2j * np.pi * depth)) ** 2)
@@ -32,16 +35,19 @@ def binary_grating_efficiency(order: int, depth: float, duty: float = 0.5) -> fl
 
 
 def blazed_grating_efficiency(order: int, depth: float) -> float:
-    """sinc²(depth - m): a sawtooth of `depth` waves that rises along +x sends its light to order m = depth
-    (Swanson 1989, MIT Lincoln Laboratory Technical Report 854; at λ in place of the design's λ0 the depth is λ0/λ)."""
+    """Return sinc²(depth - m), the share of the light in order m of a sawtooth that rises along +x.
+
+    A depth of m waves sends all light to the order m. At the wavelength λ, a grating that is one wave deep at λ0 has
+    the depth λ0/λ (Swanson 1989, MIT Lincoln Laboratory Technical Report 854).
+    """
     return float(np.sinc(depth - order) ** 2)
 
 
 def staircase_grating_efficiency(order: int, levels: int, depth: float = 1.0) -> float:
-    """The sawtooth of `depth` waves approximated by L equal steps of depth/L:
+    """Return the share of the light in order m of a sawtooth of `depth` waves, made of L equal steps of depth/L.
 
-    sinc²(m/L) [sin π(depth - m) / (L sin(π(depth - m)/L))]²; sinc²(1/L) in the design order (Swanson 1989):
-    40.5, 81.1, 95.0, 98.7 % for 2, 4, 8, 16 levels.
+    It is sinc²(m/L) [sin π(depth - m) / (L sin(π(depth - m)/L))]². In the design order it is sinc²(1/L): 40.5, 81.1,
+    95.0 and 98.7 % for 2, 4, 8 and 16 levels (Swanson 1989).
     """
     off = depth - order
     wraps = np.isclose(off / levels, round(off / levels), rtol=0, atol=1e-12)
@@ -50,19 +56,22 @@ def staircase_grating_efficiency(order: int, levels: int, depth: float = 1.0) ->
 
 
 def sinusoidal_grating_efficiency(order: int, depth: float) -> float:
-    """J_m(π depth)²: phase π depth sin(2πx/d), `depth` waves from crest to trough (Goodman §4.4.4)."""
+    """Return J_m(π depth)²: phase π depth sin(2πx/d), `depth` waves from crest to trough (Goodman §4.4.4)."""
     return float(jv(order, np.pi * depth) ** 2)
 
 
 def grating_field(
     x: np.ndarray, z: float, wavelength: float, period: float, orders: Mapping[int, complex]
 ) -> np.ndarray:
-    """Field at distance z of Σ c_m exp(2πi m x/d), orders = {m: c_m}: each order is a plane wave, exactly."""
+    """Return the exact field at distance z of Σ c_m exp(2πi m x/d), where orders = {m: c_m}.
+
+    Each order is a plane wave.
+    """
     return np.sum([c * plane_wave(x, z, wavelength, m / period) for m, c in orders.items()], axis=0)
 
 
 def talbot_distance(period: float, wavelength: float) -> float:
-    """Distance at which orders -1, 0 and 1 are in phase again: z = λ / (1 - √(1 - λ²/d²)), exactly.
+    """Return the distance at which orders -1, 0 and 1 are in phase again: z = λ / (1 - √(1 - λ²/d²)), exactly.
 
     It follows from k z (1 - cos θ) = 2π, sin θ = λ/d (Rayleigh 1881, Phil. Mag. 11:196).
     """
@@ -71,5 +80,5 @@ def talbot_distance(period: float, wavelength: float) -> float:
 
 
 def paraxial_talbot_distance(period: float, wavelength: float) -> float:
-    """2d²/λ: the limit of `talbot_distance` for d >> λ (Goodman §4.5.2)."""
+    """Return 2d²/λ: the limit of `talbot_distance` for d >> λ (Goodman §4.5.2)."""
     return 2 * period**2 / wavelength

@@ -18,29 +18,33 @@ PINHOLE_FRESNEL_NUMBER = 0.742019
 
 
 def thin_lens_image_distance(focal_length: float, source_distance: float) -> float:
-    """z of 1/z = 1/f - 1/s (Born & Wolf §4.4); negative for a virtual image."""
+    """Return z of 1/z = 1/f - 1/s (Born & Wolf §4.4); negative for a virtual image."""
     return 1 / (1 / focal_length - 1 / source_distance)
 
 
 def refractive_focal_length(radius_of_curvature: float, n: float, medium_n: float = 1.0) -> float:
-    """f = n_m R_c / (n(λ) - n_m), plano-convex, n_m on both sides (lensmaker's equation, Born & Wolf §4.4)."""
+    """Return f = n_m R_c / (n(λ) - n_m), plano-convex, n_m on both sides (lensmaker's equation, Born & Wolf §4.4)."""
     return medium_n * radius_of_curvature / (n - medium_n)
 
 
 def diffractive_focal_length(focal_length: float, design_wavelength: float, wavelength: float, order: int = 1) -> float:
-    """f(λ) = f0 λ0 / (m λ): zones are fixed, so the deflection grows with λ (Swanson 1989; opposite to, and many times
-    stronger than, the dispersion of glass)."""
+    """Return f(λ) = f0 λ0 / (m λ) of a diffractive lens (Swanson 1989).
+
+    Its zones are fixed, so the deflection grows with λ. This dispersion is opposite to that of glass, and many times
+    stronger.
+    """
     return focal_length * design_wavelength / (order * wavelength)
 
 
 def kinoform_on_axis(
     wavelength: float, design_wavelength: float, radius: float, focal_length: float, order: int = 1
 ) -> tuple[float, float]:
-    """Focus [m] of an order, and the PSF [1/m²] there, of a wrapped paraboloid with depth λ0 and f0 at λ0:
+    """Return the focal length [m] of an order of a kinoform, and the PSF [1/m²] in this focus.
 
-    f = f0 λ0/(mλ), sinc²(λ0/λ - m) πR²/(λf)². This is the paraxial limit, in which it is exact if the pupil contains
-    whole zones, R² = 2 M λ0 f0: over ρ² the pupil is a blazed grating, and the field on the axis is one Fourier
-    coefficient (Buralli, Morris & Rogers 1989, Appl. Opt. 28:976).
+    The kinoform is a wrapped paraboloid with a depth of one wave and the focal length f0 at λ0. The results are
+    f = f0 λ0/(mλ) and sinc²(λ0/λ - m) πR²/(λf)². They are paraxial, and exact in this limit if the pupil contains whole
+    zones, R² = 2 M λ0 f0. As a function of ρ², the pupil is then a blazed grating, and the field on the axis is one of
+    its Fourier coefficients (Buralli, Morris & Rogers 1989, Appl. Opt. 28:976).
     """
     focus = diffractive_focal_length(focal_length, design_wavelength, wavelength, order)
     off = math.pi * (design_wavelength / wavelength - order)
@@ -49,10 +53,10 @@ def kinoform_on_axis(
 
 
 def pinhole_radius(wavelength: float, distance: float) -> float:
-    """Sharpest pinhole: R = √(0.742 λz) has the highest peak per unit of light.
+    """Return the radius of the sharpest pinhole, R = √(0.742 λz), which has the highest peak per unit of light.
 
-    Fresnel's axial intensity is 4 sin²(πN/2), N = R²/(λz), so the PSF's peak is 4 sin²(πN/2) / (πλzN), highest at
-    tan(πN/2) = πN. It lies between the radius that equals its Airy radius, √(0.61 λz), and the radius with the
-    brightest axis, √(λz) (Rayleigh 1891, Phil. Mag. 31:87; Young 1971, Appl. Opt. 10:2763).
+    Fresnel's intensity on the axis is 4 sin²(πN/2) with N = R²/(λz). The PSF's peak is therefore 4 sin²(πN/2) / (πλzN),
+    which is highest at tan(πN/2) = πN. This radius lies between √(0.61 λz), at which the pinhole is as wide as its Airy
+    disk, and √(λz), at which the axis is brightest (Rayleigh 1891, Phil. Mag. 31:87; Young 1971, Appl. Opt. 10:2763).
     """
     return math.sqrt(PINHOLE_FRESNEL_NUMBER * wavelength * distance)

@@ -25,7 +25,7 @@ def ideal_lens_field(
     source_distance: float = math.inf,
     nodes: tuple[int, int] | None = None,
 ) -> np.ndarray:
-    """Field of an ideal lens exp(-ik(√(ρ² + f²) - f)) in a unit wave at radii r of the plane z = distance.
+    """Return the field of an ideal lens exp(-ik(√(ρ² + f²) - f)) in a unit wave at radii r of the plane z = distance.
 
     The wave is plane, or exp(ik(√(ρ² + s²) - s)) of a point source at s = source_distance. An infinite focal length is
     the bare aperture. First Rayleigh-Sommerfeld integral (Goodman §3.5), with D the distance from the aperture's point:
@@ -79,15 +79,17 @@ def ideal_lens_profile(
 
 
 def _phase(rho: np.ndarray, distance: float) -> np.ndarray:
-    """√(ρ² + d²) - d."""
+    """Return √(ρ² + d²) - d."""
     return rho**2 / (np.hypot(rho, distance) + distance)
 
 
 def _nodes(r: float, k: float, radius: float, focal_length: float, z: float, source: float) -> tuple[int, int]:
-    """Radial and angular nodes: the phase's largest gradient, and the kernel's nearest complex singularity.
+    """Return the numbers of radial and angular nodes.
 
-    n Gauss-Legendre nodes integrate exp(iωx) on [-1, 1] once 2n exceeds ω, and lose ρ^-2n to a singularity on the
-    Bernstein ellipse ρ; 2m points around the circle integrate harmonics below 2m, losing e^{-2ms} to one at φ = is.
+    They follow from the largest gradient of the phase, and from the nearest complex singularity of the kernel. n
+    Gauss-Legendre nodes integrate exp(iωx) on [-1, 1] as soon as 2n exceeds ω. A singularity on the Bernstein ellipse
+    with the parameter ρ adds an error of ρ^-2n. 2m points around the circle integrate harmonics below 2m, and a
+    singularity at φ = is adds an error of e^{-2ms}.
     """
     rho = np.linspace(0, radius, 33)[:, None]
     angle = np.linspace(0, np.pi, 17)
@@ -104,6 +106,6 @@ def _nodes(r: float, k: float, radius: float, focal_length: float, z: float, sou
 
 @lru_cache(maxsize=256)
 def _gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights on [0, 1]."""
+    """Return nodes and weights on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(n)
     return (nodes + 1) / 2, weights / 2

@@ -40,7 +40,7 @@ class Light:
 def focal_integrals(
     rho: np.ndarray, wavenumber: float, distance: float, ends: tuple[float, float], light: Light
 ) -> np.ndarray:
-    """I₀, I₁ and I₂ at the radii `rho` [m], and scalar theory's, (4, radius), complex.
+    """Return I₀, I₁ and I₂ at the radii `rho` [m], and scalar theory's, (4, radius), complex.
 
     wavenumber: k [1/m] in the medium. distance: z [m]. ends: θ of the pupil's inner and outer rim. light: amplitude
     from each direction.

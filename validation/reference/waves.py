@@ -16,16 +16,21 @@ __all__ = [
 
 
 def plane_wave(x: np.ndarray, z: float, wavelength: float, fx: float) -> np.ndarray:
-    """exp(2πi(fx x + z(√(1/λ² - fx²) - 1/λ))): beyond fx = 1/λ it decays like exp(-2πz √(fx² - 1/λ²))
-    (Goodman §3.10.2). The carrier is omitted for evanescent waves, too."""
+    """Return the plane wave exp(2πi(fx x + z(√(1/λ² - fx²) - 1/λ))) (Goodman §3.10.2).
+
+    Beyond fx = 1/λ, it decays like exp(-2πz √(fx² - 1/λ²)). The carrier is omitted for evanescent waves, too.
+    """
     axial = np.sqrt(complex(1 / wavelength**2 - fx**2))
     difference = -(fx**2) / (axial + 1 / wavelength)
     return np.exp(2j * np.pi * (fx * np.asarray(x) + z * difference))
 
 
 def gaussian_beam(r: np.ndarray, wavelength: float, waist: float, z: float) -> np.ndarray:
-    """Paraxial beam, w0/w exp(-r²/w² + ikr²/2R - iζ): w = w0 √(1 + (z/z_R)²), R = z + z_R²/z, Gouy's
-    ζ = arctan(z/z_R), z_R = πw0²/λ (Siegman, Lasers, §17.1)."""
+    """Return the paraxial Gaussian beam w0/w exp(-r²/w² + ikr²/2R - iζ) (Siegman, Lasers, §17.1).
+
+    The width is w = w0 √(1 + (z/z_R)²), the radius of curvature R = z + z_R²/z, and Gouy's phase ζ = arctan(z/z_R),
+    with z_R = πw0²/λ.
+    """
     rayleigh = np.pi * waist**2 / wavelength
     width = waist * np.hypot(1, z / rayleigh)
     curvature = z / (z**2 + rayleigh**2)
@@ -35,10 +40,11 @@ def gaussian_beam(r: np.ndarray, wavelength: float, waist: float, z: float) -> n
 
 
 def gaussian_field(r: np.ndarray, wavelength: float, waist: float, z: float, *, nodes: int = 0) -> np.ndarray:
-    """Exact field of exp(-r²/w0²) at distance z >= 0, summed from its angular spectrum.
+    """Return the exact field of exp(-r²/w0²) at distance z >= 0, summed from its angular spectrum.
 
     ∫ πw0² e^{-π²w0²f²} H(f) J0(2πfr) 2πf df, H as in `plane_wave` (Goodman §3.10; the Hankel transform §2.1.5).
-    Propagating part with f = sin θ / λ, evanescent part with f = cosh t / λ: both integrands are smooth.
+    The propagating part is integrated over θ with f = sin θ / λ, and the evanescent part over t with f = cosh t / λ, so
+    that both integrands are smooth.
     """
     r = np.asarray(r, dtype=np.float64)
     top = min(np.pi / 2, float(np.arcsin(min(1, 6.1 * wavelength / (np.pi * waist)))))
@@ -57,18 +63,24 @@ def gaussian_field(r: np.ndarray, wavelength: float, waist: float, z: float, *, 
 
 
 def gaussian_evanescent_power(wavelength: float, waist: float) -> float:
-    """Share of exp(-r²/w0²)'s power at frequencies above 1/λ: exp(-2π²w0²/λ²), its power spectrum being Gaussian."""
+    """Return the share of the power of exp(-r²/w0²) at frequencies above 1/λ.
+
+    It is exp(-2π²w0²/λ²), because the power spectrum is Gaussian.
+    """
     return float(np.exp(-2 * (np.pi * waist / wavelength) ** 2))
 
 
 def knife_edge_field(x: np.ndarray, wavelength: float, z: float) -> np.ndarray:
-    """Fresnel's field behind an opaque half plane x < 0 in a unit plane wave: (1 - i)/2 (F(∞) + F(x √(2/λz))),
-    F(s) = ∫₀ˢ e^{iπt²/2} dt; intensity 1/4 at the edge (Born & Wolf §8.7.3)."""
+    """Return Fresnel's field behind an opaque half plane x < 0 in a unit plane wave.
+
+    It is (1 - i)/2 (F(∞) + F(x √(2/λz))) with F(s) = ∫₀ˢ e^{iπt²/2} dt (Born & Wolf §8.7.3). The intensity at the edge
+    is 1/4.
+    """
     return (1 - 1j) / 2 * ((1 + 1j) / 2 + _fresnel_integral(np.asarray(x) * np.sqrt(2 / (wavelength * z))))
 
 
 def slit_field(x: np.ndarray, half_width: float, wavelength: float, z: float) -> np.ndarray:
-    """Fresnel's field behind a slit |x| < a in a unit plane wave, the difference of two edges (Goodman §4.5.1).
+    """Return Fresnel's field behind a slit |x| < a in a unit plane wave, the difference of two edges (Goodman §4.5.1).
 
     The product of two such fields is that of a rectangle.
     """

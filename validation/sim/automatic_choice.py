@@ -1,8 +1,8 @@
 """Cost of the automatic choice of samples over resolution, field of view and number of eyes
 
-Does the automatic choice ("auto") have a cliff, where a slightly different eye takes many more samples? It does not. In
-every setting it chooses area sampling, in which each sample averages the light over a receptor or a part of it (an
-area). One to six areas per receptor are enough for a predicted error within the tolerance.
+Are there eyes for which a slight change makes the automatic choice ("auto") use many more samples? No. In every setting
+it chooses area sampling, in which each sample is the mean light on a receptor or a part of it (an area). One to six
+areas per receptor are enough for a predicted error within the tolerance.
 
 **Method.** `sim.choose_fidelity` chooses samples for eyes with perfect lenses in detection, a maze and navigation. One
 property changes at a time: the number of receptors across, the field of view, or the number of eyes. Detection has
@@ -14,8 +14,8 @@ that the eyes' spectral bands cause. Times are the median CPU time per frame and
 value of the same task. The time per receptor is longer if eyes have few receptors, because the work that is done once
 per world or per eye is then divided by fewer receptors.
 
-**Bounds.** No error is above 1, and in no setting are single rays chosen instead of areas. If two neighbouring settings
-of the sweep over resolutions differ by at most three receptors, their numbers of samples differ by at most a factor of
+**Bounds.** No error is above 1, and in no setting are rays chosen instead of areas. If the resolutions of two
+neighbouring rows of the table differ by at most three receptors, their numbers of samples differ by at most a factor of
 three.
 
     python -m validation.sim.automatic_choice [--out DIR] [--docs DIR]
@@ -53,7 +53,8 @@ NEXT, FACTOR = 3, 3.0  # resolutions that differ by at most NEXT receptors take 
 class Choice:
     """Chosen samples of one setting.
 
-    sweep: property that differs from the setting before · error: predicted, relative to the tolerance
+    sweep: property that differs from the setting before
+    error: predicted error relative to the tolerance
     time: CPU time of a frame per receptor [s]
     """
 
@@ -108,7 +109,7 @@ def settings() -> list[tuple[str, str, int, float, int]]:
 
 
 def broken_bounds(choices: Sequence[Choice]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for c in choices:
         name = f"{c.task}, {c.eyes} eyes of {c.receptors} over {c.fov_deg:g}°"
@@ -146,7 +147,7 @@ COLORS = {"detection": "#0072B2", "maze": "#D55E00", "navigation": "#009E73"}
 
 
 def draw(choices: Sequence[Choice], path: Path) -> None:
-    """One column per sweep: samples and time per receptor above, predicted error below."""
+    """Draw one column per sweep: samples and time per receptor above, predicted error below."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 6.5), layout="constrained")

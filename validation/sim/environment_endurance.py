@@ -22,14 +22,17 @@ WORLDS = 4
 
 
 def resident() -> float:
-    """Resident memory of this process [MB] (Linux)."""
+    """Return the resident memory of this process [MB] (Linux)."""
     with open("/proc/self/status", encoding="ascii") as status:
         line = next(line for line in status if line.startswith("VmRSS:"))
     return int(line.split()[1]) / 1024
 
 
 def measure(task: str, steps: int) -> tuple[list[float], int, int]:
-    """Resident memory [MB] after each tenth of the steps; recordings after the first tenth and at the end."""
+    """Return the resident memory [MB] after each tenth of the steps, and numbers of kernel recordings.
+
+    Recordings are counted after the first tenth and at the end.
+    """
     case = next(case for case in CASES if case.task == task)
     worlds = sim.make_vec_env(task, with_pupil(case.eyes), WORLDS)
     worlds.reset()

@@ -15,8 +15,9 @@ The light of one illuminated sphere is computed by tracing rays, without the ren
 
 **Table.** The table states the signal of an adversary minus that of a goal, in units of the receptor noise (a standard
 deviation of 0.01), for one receptor that looks straight at the object. Each cell is a mean or a root mean square over
-24 directions. The first pair of columns is for the built-in adversaries, which have seven bands. Their edges, called
-shipped, are those stored in `sim.worlds.detection`. The second pair is for six bands of 30°.
+24 directions. The first pair of columns is for the built-in adversaries, which have seven bands. The edges of these
+bands ("shipped") are stored in `sim.worlds.detection`. The second pair of columns is for adversaries with six bands of
+30°.
 
 **Bounds.** At distances of 2 m or more, the mean difference is below a fifth of the noise. With the shipped edges, the
 mean difference is at most a tenth of the noise larger than with the fitted edges. (The shipped edges differ from the
@@ -57,7 +58,7 @@ STIFFNESS = 1.0  # a band 30° too wide has the weight of a difference of this s
 
 @cache
 def light_seen(distance: float, bearing_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """Light of a white object in one receptor, by latitude (direction, BINS) and by longitude of its origin.
+    """Return the light of a white object in one receptor, by latitude (direction, BINS) and by longitude of its origin.
 
     Lambert's law under the world's directional lights; uniform over the receptor's square field.
     """
@@ -86,7 +87,7 @@ def light_seen(distance: float, bearing_deg: float) -> tuple[np.ndarray, np.ndar
 
 
 def _lights() -> list[tuple[np.ndarray, float]]:
-    """Unit vectors towards the lights, and their levels."""
+    """Return the unit vectors towards the lights, and their levels."""
     found = []
     for azimuth_deg, elevation_deg, level in materials.LIGHTS:
         azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
@@ -96,7 +97,10 @@ def _lights() -> list[tuple[np.ndarray, float]]:
 
 
 def contrast(light: np.ndarray, edges: Sequence[float]) -> np.ndarray:
-    """Light of alternate stripes minus that of the mean reflectance; edges as fractions of the whole."""
+    """Return the light of alternate stripes minus that of the mean reflectance.
+
+    edges: positions of the edges, as fractions of the whole
+    """
     bounds = np.concatenate([[0], np.sort(edges), [1]])
     collected = np.array([np.interp(bounds * BINS, np.arange(BINS + 1), np.r_[0, np.cumsum(row)]) for row in light])
     sign = np.where(np.arange(len(bounds) - 1) % 2 == 0, 1, -1)
@@ -104,7 +108,7 @@ def contrast(light: np.ndarray, edges: Sequence[float]) -> np.ndarray:
 
 
 def difference(edges_deg: Sequence[float], distance: float, bearing_deg: float = 0.0) -> np.ndarray:
-    """Signal of an adversary with these edges minus that of a goal, in units of the noise, (direction,)."""
+    """Return the signal of an adversary with these edges minus that of a goal, in units of the noise, (direction,)."""
     by_latitude, by_longitude = light_seen(distance, bearing_deg)
     sectors = np.arange(1, 2 * STRIPES) / (2 * STRIPES)
     bands = np.asarray(edges_deg) / 180
@@ -112,7 +116,7 @@ def difference(edges_deg: Sequence[float], distance: float, bearing_deg: float =
 
 
 def fitted() -> np.ndarray:
-    """Edges [deg] that make adversaries as bright as grey, seen from any direction in the plane of the eyes."""
+    """Return edges [deg] that make adversaries as bright as grey, seen from any direction in the plane of the eyes."""
     rest = BAND_EDGES_DEG[FITTED:]
 
     def residuals(edges: np.ndarray) -> np.ndarray:
@@ -145,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _draw(path: Path) -> None:
-    """Mean difference over distance, for fitted and for even bands."""
+    """Draw the mean difference over distance, for fitted and for even bands."""
     import matplotlib
 
     matplotlib.use("agg")

@@ -14,10 +14,10 @@ two eyes of 15 x 15 receptors and 4 rays per receptor, without physics.
 
 **Bounds.** In every model, at least 99.5 % of the receptors have the same depth to 1e-3, or both see nothing.
 
-**Limits.** The receptors that differ look at the edge of a curved surface that is approximated by triangles, or at the
-inside of a surface. MuJoCo's rays hit the inside of a surface, but eyes look through it. With planes it is the other
-way round: eyes see the back of a plane, and MuJoCo's rays do not hit it. Only eyes in front of every plane are
-therefore counted.
+**Limits.** The receptors whose depths differ look at the edge of a curved surface that is approximated by triangles, or
+at the inside of a surface. MuJoCo's rays hit the inside of a surface, but eyes see through it. The back of a plane is
+the opposite case: eyes see it, but MuJoCo's rays do not hit it. Only eyes in front of every plane are therefore
+counted.
 
     PYTHONPATH=DIR python -m validation.sim.eyes_against_ray_caster [--only suite] [--out DIR] [--docs DIR]
 """
@@ -67,7 +67,7 @@ class Row:
 
 
 def with_camera(path: Path, rng: np.random.Generator) -> mujoco.MjModel:
-    """The model with an added camera that looks at it.
+    """Return a model with an added camera that looks at it.
 
     Raises:
         ValueError: the file is only a part of a model.
@@ -97,7 +97,7 @@ def before_planes(model: mujoco.MjModel, data: mujoco.MjData, point: np.ndarray)
 
 
 def posed(model: mujoco.MjModel, rng: np.random.Generator) -> mujoco.MjData:
-    """State with all joints at random positions within their ranges."""
+    """Return a state with all joints at random positions within their ranges."""
     data = mujoco.MjData(model)
     for joint in range(model.njnt):
         move(model, data.qpos, joint, rng)
@@ -106,7 +106,7 @@ def posed(model: mujoco.MjModel, rng: np.random.Generator) -> mujoco.MjData:
 
 
 def mounts_on(model: mujoco.MjModel) -> list[sim.Mount]:
-    """Mounts on the added camera and on the model's own cameras."""
+    """Return mounts on the added camera and on the model's own cameras."""
     names = [model.camera(i).name for i in range(model.ncam) if model.camera(i).name not in ("", CAMERA)]
     return [sim.Mount(name, kind="camera") for name in (CAMERA, *names[:OWN_CAMERAS])]
 
@@ -131,7 +131,7 @@ def compare(name: str, model: mujoco.MjModel, rng: np.random.Generator) -> Row |
 
 
 def in_front(renderer: sim.ModelRenderer, datas: list[mujoco.MjData]) -> np.ndarray:
-    """Mask (world, eye) of the eyes that are on the front side of every plane."""
+    """Return the mask (world, eye) of the eyes that are on the front side of every plane."""
     pupils, _ = renderer.eye_frames(sim.Poses.from_data(datas))
     eyes = [
         [before_planes(renderer.model, data, pupil) for pupil in own] for data, own in zip(datas, pupils, strict=True)
@@ -140,7 +140,7 @@ def in_front(renderer: sim.ModelRenderer, datas: list[mujoco.MjData]) -> np.ndar
 
 
 def expected(renderer: sim.ModelRenderer, datas: list[mujoco.MjData]) -> np.ndarray:
-    """Depths by mj_ray, (world, eye, y, x); MuJoCo 4.0.0's mj_multiRay misses some limbs of some geoms."""
+    """Return depths by mj_ray, (world, eye, y, x); MuJoCo 4.0.0's mj_multiRay misses some limbs of some geoms."""
     pupils, frames = renderer.eye_frames(sim.Poses.from_data(datas))
     rows, columns = RESOLUTION
     side = 2 * np.tan(np.radians(FOV_DEG) / 2) / columns
@@ -157,7 +157,7 @@ def expected(renderer: sim.ModelRenderer, datas: list[mujoco.MjData]) -> np.ndar
 
 
 def rate(model: mujoco.MjModel, datas: list[mujoco.MjData]) -> float:
-    """Steps per CPU second, the median of a few rounds."""
+    """Return steps per CPU second, the median of a few rounds."""
     mounts = [sim.Mount(CAMERA), sim.Mount(CAMERA, azimuth_deg=30)]
     renderer = sim.ModelRenderer(model, optics.Eye(), mounts, MANY, sim.Fidelity(4, bands=4))
     many, seconds = [datas[i % len(datas)] for i in range(MANY)], []
@@ -202,7 +202,7 @@ def broken_bounds(rows: list[Row]) -> list[str]:
 
 
 def draw_figure(rows: list[Row], path: Path) -> None:
-    """Steps over the number of moving geoms."""
+    """Draw steps over the number of moving geoms."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7, 4), layout="constrained")

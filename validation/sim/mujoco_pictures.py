@@ -41,7 +41,7 @@ class Shot:
         data.mocap_pos[:], data.mocap_quat[:] = self.mocap_pos, self.mocap_quat
 
     def origin_and_target(self) -> tuple[np.ndarray, np.ndarray]:
-        """Origin and target of the free camera."""
+        """Return the origin and target of the free camera."""
         azimuth, elevation = np.radians(self.free[4:6])
         cos = np.cos(elevation)
         forward = np.array([cos * np.cos(azimuth), cos * np.sin(azimuth), np.sin(elevation)])
@@ -49,7 +49,7 @@ class Shot:
 
 
 def draw(model: mujoco.MjModel, shots: list[Shot], width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Geom ids (shot, y, x), -1 for none, and depths [m]; None without OpenGL."""
+    """Return the geom ids (shot, y, x), -1 for none, and depths [m]; None without OpenGL."""
     with tempfile.TemporaryDirectory() as folder:
         asked, model_path, drawn = (str(Path(folder) / name) for name in ("in.npz", "model.mjb", "out.npz"))
         mujoco.mj_saveModel(model, model_path)
@@ -65,7 +65,7 @@ def draw(model: mujoco.MjModel, shots: list[Shot], width: int, height: int) -> t
 
 
 def only_geoms() -> mujoco.MjvOption:
-    """MuJoCo's default view without objects other than geoms."""
+    """Return MuJoCo's default view without objects other than geoms."""
     option = mujoco.MjvOption()
     for groups in (option.sitegroup, option.tendongroup, option.skingroup, option.flexgroup):
         groups[:] = 0

@@ -10,8 +10,9 @@ halfway between both in inverse distance. Its blur is up to five receptors wide.
 narrower than a receptor, so geometric optics holds. Mitsuba traces 10,000 rays per receptor through all parts of the
 lens. `Eye.see` receives an image with one distance per cell. This image contains no stripes behind the plate.
 
-**Table.** Errors are in units of the signal of white. "no occlusion" adds the blurred light of both surfaces. Halfway
-between both distances, the blur of both surfaces is equally wide, and adding the light is correct, too.
+**Table.** Errors are in units of the signal of white. In the column "no occlusion", the blurred light of both surfaces
+is added. If the lens is focused halfway between both distances, the blur of both surfaces is equally wide, and adding
+the light is correct, too.
 
 **Bounds.** With occlusion, the largest error is at most 0.03, and the mean error at most 0.01. Without occlusion, the
 largest error is at least 0.1, except for the focus halfway.
@@ -132,7 +133,7 @@ def _described(mi: Any, focus: float, samples: int) -> dict[str, Any]:
 
 
 def broken_bounds(cases: list[Case]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for case in cases:
         if not (case.error.max() <= LARGEST and case.error.mean() <= MEAN):
@@ -150,7 +151,7 @@ def table(cases: list[Case]) -> str:
 
 
 def draw(cases: list[Case], path: Path) -> None:
-    """Profiles across the edge for each focus."""
+    """Draw profiles across the edge for each focus."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 3.2), layout="constrained")

@@ -1,14 +1,10 @@
 """Receptive fields sampled by rays, compared with convolution of a padded image
 
 Do rays sample receptive fields without bias? Yes: errors fall with the number n of rays per receptor, at least like
-n^-0.51 wherever a slope can be fitted. The automatic choice has an error of at most 0.165 of the receptor noise σ.
+n^-0.51 wherever a slope can be fitted. The automatically chosen sampling has an error of at most 0.165 of the receptor
+noise σ.
 
-**Method.** Behind a pupil, all receptors of an eye share one set of rays, drawn from the mixture of their receptive
-fields. The signal of a receptor is a weighted sum over these rays. The reference is the published method: an image of
-the tangent plane is convolved with the PSF (`Eye.see`). On every side this image is wider than the retina by the reach
-of the kernel. The grid of this image differs from the grid on which the receptive fields of the rays are tabulated.
-Each cell is rendered with many rays of its own or, if light may be reflected any number of times, with many areas
-([area sampling](../concepts/rendering.md#area-sampling)). Rays and reference use the same light, so they differ only in
+**Method.** Behind a pupil, all receptors of an eye use one set of rays, whose directions are drawn from the mean of their receptive fields. The signal of a receptor is a weighted sum over these rays. These signals are compared with the published method, in which an image of the scene is convolved with the PSF (`Eye.see`). The image extends beyond the field of view by the width of the kernel on every side. Its grid differs from the grid on which the receptive fields of the rays are tabulated. Each cell of the image is rendered with many rays or, if light may be reflected any number of times, with many areas ([area sampling](../concepts/rendering.md#area-sampling)). Rays and reference use the same light, so they differ only in
 sampling.
 
 Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection world.
@@ -26,8 +22,8 @@ The perfect lens uses 24 states, because its errors differ much between views. T
 **Table.** Retinas are given as width x height. The last column shows the choice of `rays_per_receptor = "auto"`, which
 is a number of rays or of areas, and its error. No slope is given if fewer than three errors are above 0.01 σ.
 
-**Bounds.** The error of the automatic choice is at most half of the noise. Errors fall at least like n^-0.5, as with
-independent rays, down to 0.01 σ. Smaller differences can come from the two different grids.
+**Bounds.** The error of the automatic choice is at most half of the noise. Down to 0.01 σ, errors fall at least like
+n^-0.5, as they do with independent rays. Below 0.01 σ, differences can come from the two different grids.
 
     python -m validation.sim.receptive_field_sampling [--out DIR] [--docs DIR]
 """
@@ -102,7 +98,7 @@ def eyes_behind(pupil: str, resolution: tuple[int, int]) -> sim.Eyes:
 
 
 def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -> np.ndarray:
-    """Signals of the eyes by the reference, (state, channel, h, w)."""
+    """Return the signals of the eyes by the reference, (state, channel, h, w)."""
     eye = eyes.eye()
     cells = 1 if eye.pupil is None else CELLS
     reach = eye.kernel(cells).shape[-1] // 2
@@ -122,7 +118,7 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
 
 
 def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
-    """Fidelity of the cells of the reference's image, which are whole receptors with a perfect lens."""
+    """Return the fidelity of the cells of the reference's image, which are whole receptors with a perfect lens."""
     perfect = eyes.optics is None
     if light == "all":
         return sim.Fidelity(PERFECT_AREAS if perfect else CELL_AREAS, eyes.bands, light=light, samples="areas")
@@ -130,7 +126,7 @@ def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
 
 
 def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: sim.Fidelity) -> tuple[np.ndarray, float]:
-    """Signals of the eyes by rays or areas, and their number per receptor."""
+    """Return the signals of the eyes by rays or areas, and their number per receptor."""
     renderer = sim.BatchedRenderer(world, eyes, 1, fidelity)
     rays = len(renderer.sensor.directions) / math.prod(eyes.resolution)
     return np.concatenate([renderer.signals(state.take(np.array([i]))) for i in range(state.n)])[:, 0], rays
@@ -156,7 +152,7 @@ def measure(pupil: str, resolution: tuple[int, int], world: sim.World, state: Wo
 
 
 def broken_bounds(series: Sequence[Series]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for s in series:
         if s.auto_error > HALF:
@@ -180,7 +176,7 @@ COLORS = dict(zip(PUPILS, ("#000000", "#999999", "#0072B2", "#E69F00", "#009E73"
 
 
 def draw(series: Sequence[Series], path: Path) -> None:
-    """One panel per retina: errors over rays, with the choice of auto as a star."""
+    """Draw one panel per retina: errors over rays, with the choice of auto as a star."""
     from matplotlib.figure import Figure
 
     retinas = list(dict.fromkeys(s.retina for s in series))

@@ -18,9 +18,10 @@ that the mirror lacks, as reported by the mirror.
 depth to 1e-3.
 
 **Limits.** The pixels that differ are at the edges of curved surfaces, which the mirror approximates by triangles. The
-models are those in dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that compile on
-their own. They are not part of rhabdom. Install them with `pip install 'rhabdom[validation]'`. If pinned versions
-conflict, use `pip install --no-deps --target DIR dm_control gymnasium-robotics` and add DIR to PYTHONPATH.
+models are all files in dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that are
+complete models. (The other files are parts of models.) They are not part of rhabdom. Install them with `pip install
+'rhabdom[validation]'`. If pinned versions conflict, use `pip install --no-deps --target DIR dm_control
+gymnasium-robotics` and add DIR to PYTHONPATH.
 
     python -m validation.sim.scene_against_mujoco [--only WORD] [--out DIR] [--docs DIR]
 """
@@ -81,7 +82,7 @@ def model_files() -> Iterator[tuple[str, Path]]:
 
 
 def poses(model: mujoco.MjModel, rng: np.random.Generator) -> Iterator[Shot]:
-    """Random poses with moved and rotated mocap bodies.
+    """Yield random poses with moved and rotated mocap bodies.
 
     Each is seen from a random direction above the horizon, and by the model's cameras in turn.
     """
@@ -151,7 +152,10 @@ def compare(name: str, model: mujoco.MjModel) -> Row:
 
 
 def _agreement(mirror: Mirror, data: mujoco.MjData, shot: Shot, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Masks of pixels that show the same geom, and of those with the same depth, if the ray caster hits the geom."""
+    """Return masks of pixels that show the same geom, and of pixels with the same depth.
+
+    Only pixels in which the ray caster hits the geom count.
+    """
     view = _viewpoint(mirror, shot)
     seen, depth = mirror.render_ids(view, WIDTH, HEIGHT), mirror.render_depth(view, WIDTH, HEIGHT)
     cast, distance = _cast(mirror, data, view)
@@ -167,7 +171,7 @@ def _viewpoint(mirror: Mirror, shot: Shot) -> Viewpoint:
 
 
 def _cast(mirror: Mirror, data: mujoco.MjData, view: Viewpoint) -> tuple[np.ndarray, np.ndarray]:
-    """Geom ids (y, x) and depth [m] by mj_multiRay."""
+    """Return the geom ids (y, x) and depth [m] by mj_multiRay."""
     rays = view.rays(WIDTH, HEIGHT).reshape(-1, 3)
     length = np.linalg.norm(rays, axis=1)
     n = len(rays)
@@ -179,7 +183,7 @@ def _cast(mirror: Mirror, data: mujoco.MjData, view: Viewpoint) -> tuple[np.ndar
 
 
 def measure(only: str = "") -> tuple[list[Row], list[str]]:
-    """Rows of the models with `only` in their names, and the files that are only parts of models."""
+    """Return the rows of the models with `only` in their names, and the files that are only parts of models."""
     rows, fragments = [], []
     for name, path in model_files():
         if only not in name:
@@ -198,7 +202,7 @@ def measure(only: str = "") -> tuple[list[Row], list[str]]:
 
 
 def broken_bounds(rows: list[Row]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     words = [f"{r.name}: {r.same_geom:.3%} of pixels show the same geom" for r in rows if r.same_geom < SAME_GEOM]
     return words + [f"{r.name}: {r.same_depth:.3%} have the same depth" for r in rows if r.same_depth < SAME_DEPTH]
 
@@ -217,7 +221,7 @@ def table(rows: list[Row], fragments: list[str]) -> str:
 
 
 def draw_figure(rows: list[Row], path: Path) -> None:
-    """Deviations from full agreement, per model."""
+    """Draw deviations from full agreement, per model."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 0.16 * len(rows) + 1.5), layout="constrained")

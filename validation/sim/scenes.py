@@ -43,7 +43,7 @@ class Scene:
         return "perfect lens" if self.aperture is None else "lens"
 
     def eyes_with(self, bands: int) -> sim.Eyes:
-        """The eyes with the scene's lens, in focus at infinity, and this number of bands."""
+        """Return the eyes with the scene's lens, in focus at infinity, and this number of bands."""
         pupil = None
         if self.aperture is not None:
             pupil = optics.Pupil(
@@ -65,7 +65,7 @@ SCENES = (
 
 
 def lived_through(world: sim.World, n: int, steps: int = 20) -> WorldState:
-    """States that agents reach with random actions."""
+    """Return states that agents reach with random actions."""
     simulation = Simulation(task_of(world), n, 3)
     simulation.reset()
     rng = np.random.default_rng(5)
@@ -78,7 +78,7 @@ def lived_through(world: sim.World, n: int, steps: int = 20) -> WorldState:
 
 
 def facing_objects(world: sim.World, state: WorldState) -> WorldState:
-    """The same worlds, with each agent NEAR one of its objects and turned towards it."""
+    """Return the same worlds, with each agent NEAR one of its objects and turned towards it."""
     rng = np.random.default_rng(6)
     cells = np.concatenate([world.agent_spawn, world.object_spawn])
     position, heading = np.empty((state.n, 2)), np.empty(state.n)
@@ -94,7 +94,7 @@ def facing_objects(world: sim.World, state: WorldState) -> WorldState:
 
 
 def sees_object(world: sim.World, eyes: sim.Eyes, state: WorldState) -> np.ndarray:
-    """Mask (env, eye, height, width) of the receptors with a part of an object in their square field."""
+    """Return the mask (env, eye, height, width) of the receptors with a part of an object in their square field."""
     sharp = replace(eyes, optics=None)
     directions = BoxSampling(sharp.eye()).sensor(WITHIN).directions
     position, heading, objects = (

@@ -2,7 +2,7 @@
 
 How much accuracy does each rendering speed allow? The automatic choice of settings promises an error below σ/2, where σ
 is the receptor noise. Does it keep this promise? It does in all six scenes: its largest error is 0.399 σ. Its speed is
-0.95 to 1.00 of that of the fastest setting that is at least as accurate.
+0.95 to 1.00 times the speed of the fastest setting that is at least as accurate.
 
 **Errors.** The error of a setting is the root mean square difference from a reference, over channels, eyes, states and
 receptors. Errors are in units of the receptor noise, σ = 0.01. Errors below σ/2 are small compared with the noise of
@@ -11,14 +11,14 @@ two populations of receptors:
 
 - all receptors, in 4 states that agents reached;
 - the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead. With a perfect lens there are 8 views,
-  because their references are expensive. Mazes have no objects, so this population is empty there.
+  because the path-traced renderings take long. Mazes have no objects, so this population is empty there.
 
 The reference is Mitsuba's path tracer in 8 bands. Behind a lens, its image is convolved with the kernel of the eye
 (`Eye.see`).
 
 **Speed.** The speed is the number of agent-steps per second of one core's CPU time, without physics. In an agent-step,
-all eyes of one agent are rendered once. All settings are measured in turns over several rounds, and the best round of
-each setting counts.
+all eyes of one agent are rendered once. All settings are measured in turn, in several rounds, and the speed of a
+setting is that of its fastest round.
 
 **Settings.** The eyes are those of the published experiments. Each is rendered with a perfect lens, and behind a lens
 in focus with a stated relative aperture a (pupil diameter / retina width). The following settings vary:
@@ -117,14 +117,14 @@ class Population:
         return self.crowd.take(np.arange(self.states))
 
     def signals(self, see: Callable[[WorldState], np.ndarray], at_once: int) -> np.ndarray:
-        """Signals of the counted receptors, (receptor, channel), computed for `at_once` worlds at a time."""
+        """Return the signals of the counted receptors, (receptor, channel), computed for `at_once` worlds at a time."""
         parts = range(0, self.states, at_once)
         found = [see(self.crowd.take(np.arange(at, at + at_once))) for at in parts]
         return np.moveaxis(np.concatenate(found)[: self.states], 2, -1)[self.counted].astype(float)
 
 
 def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[Population]:
-    """All receptors in states that agents reached, and receptors that see an object in states with one ahead."""
+    """Return all receptors in states that agents reached, and receptors that see an object in states with one ahead."""
     crowd = lived_through(world, MANY)
     found = [Population(crowd, np.ones((states[0], scene.eyes.n_eyes, *scene.eyes.resolution), bool))]
     if world.objects:
@@ -136,7 +136,7 @@ def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[P
 def converged(
     scene: Scene, world: sim.World, judged: Sequence[Population], spp: int
 ) -> tuple[list[np.ndarray], Errors]:
-    """Path-traced signals by the reference renderer, and their standard errors, from two halves."""
+    """Return the path-traced signals by the reference renderer, and their standard errors, from two halves."""
     renderer = sim.ReferenceRenderer(world, scene.eyes_with(BANDS), "path", spp, sampler="multijitter")
     halves = []
     for renderer.seed in (1, 2):
@@ -179,7 +179,7 @@ def runner(setting: Setting, scene: Scene, world: sim.World) -> Runner:
 
 
 def chosen(world: sim.World, eyes: sim.Eyes) -> tuple[sim.Fidelity, str]:
-    """The automatic choice, and its warning, if any."""
+    """Return the automatic choice, and its warning, if any."""
     with warnings.catch_warnings(record=True) as given:
         warnings.simplefilter("always", sim.FidelityWarning)
         fidelity = sim.choose_fidelity(world, eyes)
@@ -215,14 +215,14 @@ def measure(
 
 
 def to_the_end(scene: Scene, world: sim.World, judged: Sequence[Population], light: str) -> list[np.ndarray]:
-    """Signals by the batched renderer with many rays, a few worlds at a time."""
+    """Return signals by the batched renderer with many rays, a few worlds at a time."""
     fidelity, at_once = sim.Fidelity(TO_THE_END[scene.lens], BANDS, light=light), 4
     renderer = sim.BatchedRenderer(world, scene.eyes_with(BANDS), at_once, fidelity)
     return [population.signals(renderer.signals, at_once) for population in judged]
 
 
 def timed(runners: Sequence[Runner], crowd: WorldState, rounds: int) -> list[float]:
-    """CPU seconds of the fastest call of each runner; short calls are repeated for ROUND in every round."""
+    """Return the CPU seconds of the fastest call of each runner; short calls are repeated for ROUND in every round."""
     quickest = [np.inf] * len(runners)
     for _ in range(rounds):
         for i, mine in enumerate(runners):
@@ -236,7 +236,7 @@ def timed(runners: Sequence[Runner], crowd: WorldState, rounds: int) -> list[flo
 
 
 def broken_bounds(charts: Sequence[Chart]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for chart in charts:
         auto, rival = chart.auto, chart.rival

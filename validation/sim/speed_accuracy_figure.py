@@ -35,7 +35,7 @@ POPULATIONS = (("all receptors", everywhere), ("receptors that see an object", o
 
 
 def message(charts: Sequence[Chart]) -> str:
-    """Title of the figure."""
+    """Return the title of the figure."""
     worst = max(chart.auto.error.worst for chart in charts)
     if not any(chart.missed for chart in charts):
         return f'The error of "auto" is below σ/2, also on objects: at most {worst:.2f} σ'
@@ -44,7 +44,7 @@ def message(charts: Sequence[Chart]) -> str:
 
 
 def draw(charts: Sequence[Chart], path: Path) -> None:
-    """Error over speed, fronts as lines, auto as a star. Worlds without objects have no second panel."""
+    """Draw the error over speed, fronts as lines, auto as a star. Worlds without objects have no second panel."""
     from matplotlib.figure import Figure
 
     columns = min(PER_ROW, len(charts))

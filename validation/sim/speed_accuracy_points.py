@@ -45,7 +45,7 @@ class Errors:
 
     @classmethod
     def between(cls, found: Sequence[np.ndarray], true: Sequence[np.ndarray], unit: float) -> Errors:
-        """Differences between signals and true ones, one array for each population."""
+        """Return differences between signals and true signals, one array for each population."""
         return cls(*(rms(a - b) / unit for a, b in zip(found, true, strict=True)))
 
     @property
@@ -90,7 +90,7 @@ class Point:
         )
 
     def __str__(self) -> str:
-        """The setting, with auto's choice filled in."""
+        """Return the setting, with auto's choice filled in."""
         f = self.fidelity
         if f is None or self.setting.samples is not None:
             return str(self.setting)
@@ -115,7 +115,7 @@ class Chart:
         return self.auto.error.on_objects is not None
 
     def front_of(self, error: Callable[[Errors], float | None]) -> tuple[Point, ...]:
-        """Pareto front of speed and this error, fastest first."""
+        """Return the Pareto front of speed and this error, fastest first."""
         ranked = sorted(self.points, key=lambda p: (-p.speed, error(p.error)))
         least, found = np.inf, []
         for point in ranked:
@@ -187,7 +187,7 @@ def table(charts: Sequence[Chart]) -> str:
 
 
 def rows_of(charts: Sequence[Chart]) -> list[dict[str, Any]]:
-    """One row per point, for the stored table."""
+    """Return one row per point, for the stored table."""
     rows = []
     for chart in charts:
         for p in chart.points:

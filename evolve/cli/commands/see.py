@@ -7,7 +7,7 @@ from argparse import Namespace
 from evolve.cli.waiting import Waiting
 from evolve.config.run_config import ConfigError
 from evolve.runs.output import say
-from sim.pictures.photograph import read_photograph, see_photograph
+from sim.pictures.photograph import read_depth, read_photograph, see_photograph
 
 __all__ = ["through_eye"]
 
@@ -17,9 +17,10 @@ def through_eye(arguments: Namespace) -> int:
     animal, said = arguments.animal, f"signals of the receptors of a {arguments.animal}"
     try:
         photograph = read_photograph(arguments.photograph)
+        depth = None if arguments.depth is None else read_depth(arguments.depth)
         with Waiting(1).of_one_step(said) as wait:
             mosaic = see_photograph(
-                photograph, animal, arguments.width_deg, arguments.uv, lambda share: wait.within(said, share)
+                photograph, animal, arguments.width_deg, arguments.uv, depth, lambda share: wait.within(said, share)
             )
     except ValueError as error:
         raise ConfigError(str(error)) from None

@@ -119,7 +119,7 @@ class AreaTracer:
         found = [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
         if self._medium is None:
             return found
-        # Surfaces sent their contrast with the veiling light, which is added to the first depth layer.
+        # Surfaces contributed their contrast with the veiling light, which is now added to the first depth layer.
         return [own + veil for own, veil in zip(found, self._medium.veil, strict=False)] + found[len(self.basis) :]
 
     def first_faces(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
@@ -145,8 +145,7 @@ class AreaTracer:
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
-        """Return rows of the table of illuminated bodies. place: row within a world's table · bodies: centres of the
-        bodies in this world"""
+        """Return the rows `place` of a world's table of illuminated bodies, given the centres of its bodies."""
         assert self._reflected
         assert inputs.reflected
         reflected = partial(self._reflected.on_body, tables=inputs.reflected)
@@ -215,9 +214,11 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return the fractions of the area in which a sphere hides the left wall, the right wall and the floor. They
-        are followed by the sphere's light times the fraction of the area that it fills, per component. Parts of the
-        sphere that nearer spheres hide are omitted."""
+        """Return the fractions of the area in which a sphere hides the left wall, the right wall and the floor.
+
+        They are followed by the sphere's light times the fraction of the area that the sphere fills, per component.
+        Parts of the sphere that nearer spheres hide are omitted.
+        """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
         sphere = LitSphere(k, view, light, now, depth)
@@ -235,8 +236,10 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(self, area: Area, sphere: LitSphere, strip: Strip) -> list[Array]:
-        """Return the fraction of a strip that no other sphere hides. It is followed by the strip's light times the
-        fraction of the area that it fills, per component."""
+        """Return the fraction of a strip that no other sphere hides.
+
+        It is followed by the strip's light times the fraction of the area that the strip fills, per component.
+        """
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
         texture = self._sphere_textures[k]
 

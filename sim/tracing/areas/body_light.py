@@ -58,7 +58,9 @@ class BodyLight:
 class LitSphere:
     """A sphere in an area.
 
-    number: number of the sphere among the bodies · view: visible part of the sphere · light: light on the sphere
+    number: number of the sphere among the bodies
+    view: visible part of the sphere
+    light: light on the sphere
     now: inputs of the current frame
     depth: layers among which its light is divided
     """

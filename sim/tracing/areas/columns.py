@@ -24,7 +24,7 @@ from sim.tracing.walls import SIDES, Walls
 
 LEAST_NEARNESS = 1e-6  # smallest inverse distance [1/m], which also prevents divisions by 0
 NOTHING = 1e-12  # smallest height of a part of an area, which prevents divisions by 0
-RIM = 4  # number of sides of the floor; its rim counts as a wall in directions without one
+RIM = 4  # number of sides of the floor; its rim counts as a wall in directions without a wall
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Two integrals for the fractions of an area that its parts fill. Straight lines bound the parts."""
+"""Two integrals for the fractions of an area that its parts fill, if straight lines bound the parts."""
 
 from __future__ import annotations
 

@@ -86,7 +86,10 @@ class Illumination:
         return self.arriving(patch.normal, self.visibility(patch, now))
 
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
-        """Return the fraction of a patch that each light reaches. itself: number of the body that has the patch"""
+        """Return the fraction of a patch that each light reaches.
+
+        itself: number of the body on which the patch lies
+        """
 
         def past(k: Array, lit: list[Array]) -> list[Array]:
             left = lit_past_sphere(patch, self._directions, select(k, now.bodies), select(k, self._radii))
@@ -132,7 +135,9 @@ class Illumination:
         return found
 
     def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: FrameState) -> list[Array]:
-        """Return the light from a body minus the light that it hides, both by the form factor of a sphere.
+        """Return the light that a body sends to a patch, minus the light that the body hides from the patch.
+
+        Both use the form factor of a sphere.
 
         If the patch's horizon crosses the sphere, Snyder's (1996) form factor applies. The hidden light is the light
         that arrives on the body's far side, as seen from the patch. Its radiance follows from the irradiance of that

@@ -1,6 +1,6 @@
 """Computation of the tables of reflected light by brute force, with many rays from every node.
 
-The tables describe the static scene. Moving bodies have one effect in them: the shadow that a body casts on the floor
+The tables describe the static scene. They take moving bodies into account in one way only: a body's shadow on the floor
 reduces the light that the floor reflects back to this body.
 """
 
@@ -22,8 +22,8 @@ RAYS = 256  # rays from a node
 BODY_RAYS = 128  # rays from each point of a body's surface; the rays of all points determine the harmonics
 NORMALS = 96  # normals of a body's surface, to which sixteen harmonics are fitted
 FOURS = 4  # groups of four floats: sixteen harmonics
-# Largest number of reflections. Each further one adds at most the light of the previous one times the surfaces'
-# reflectance.
+# Largest number of reflections. Each further reflection adds at most the light of the previous reflection times the
+# surfaces' reflectance.
 ORDERS = 16
 CHANGE = 1e-3  # the iteration ends if all changes are at most this fraction of the largest irradiance
 LANES = 2**21  # rays traced at once

@@ -1,4 +1,4 @@
-"""A cache on disk of tables of reflected light, which take seconds to bake and are the same for the same world.
+"""A cache of tables of reflected light on disk, because the computation of a world's tables takes seconds.
 
 A file is used only if it has the expected names, shapes and number types, finite numbers, and a checksum that includes
 the world. Otherwise the tables are baked again.

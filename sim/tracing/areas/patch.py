@@ -17,7 +17,7 @@ class Area:
 
     origin: the pupil (Point3f)
     ahead, up: horizontal part (Vector2f) and z of the direction to the rectangle's middle
-    right, height: whole width (Vector2f), and whole height
+    right, height: full width as a vector (Vector2f), and full height
     """
 
     origin: Array

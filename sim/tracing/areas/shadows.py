@@ -58,7 +58,7 @@ class WallShadows:
 
     A ray from a point in a free cell to a light crosses the next cell along x, the next cell along y, or the cell
     across the corner. A table states for each cell which of these neighbours are walls. Three straight lines across the
-    patch decide which neighbour the ray enters first, and whether the ray passes over its wall.
+    patch separate points whose rays enter different neighbours, or pass above the wall there.
 
     around: for each cell, which cells around it are walls, for the kernel; None without walls
 

@@ -25,7 +25,7 @@ WIDE = 0.0555  # width of a wide area on the plane at distance 1: 3.2 degrees
 # the sphere.
 GRAZING = 0.15
 TINY = 1e-12
-NEARLY_OPEN = 1e-4  # chosen: outlines that are more than about 100 times as long as wide are treated as open
+NEARLY_OPEN = 1e-4  # chosen: outlines whose length exceeds about 100 times their width are treated as open
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class _Outline:
     high: Array
 
     def edge(self, share: Array) -> _Edge:
-        """Return the edge of a strip before which this fraction of the visible part lies."""
+        """Return the edge of a strip, given the fraction of the visible part that lies before this edge."""
         angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
         place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), share - 0.5)

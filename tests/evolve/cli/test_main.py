@@ -25,6 +25,8 @@ BAD = {
     "unknown command": (("rnu", "detection"), "'rnu'; did you mean 'run'? (see evolve --help)"),
     "unknown flag": (("run", "--prest", "quick"), "'--preset'? (see evolve run --help)"),
     "unknown flag of no command": (("--verison",), "evolve: error: "),
+    "unknown argument of two lines": (("demo", "a\nb"), "unrecognized arguments: a b (see evolve demo --help)"),
+    "unknown argument of 5,000 letters": (("demo", "x" * 5000), "xx [...] xx"),
     "unknown shell": (("completion", "fsh"), "did you mean 'zsh'?"),
     "loud and quiet": (("run", "detection", "--quiet", "--json"), "--json: not allowed with argument --quiet"),
     "list of nothing": (("list", "/absent"), "/absent: No such file or directory"),

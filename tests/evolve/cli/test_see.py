@@ -31,6 +31,9 @@ def test_it_writes_an_image_and_the_signals(call, photo, tmp_path):
         (["--animal", "mouze", "--width-deg", "20"], "mouse"),
         (["--animal", "mouse", "--width-deg", "200"], "width_deg"),
         (["--animal", "mouse", "--width-deg", "wide"], "width-deg"),
+        (["--animal", "mouse", "--width-deg", "20", "--depth", "near"], "depth"),
+        (["--animal", "mouse", "--width-deg", "20", "--depth", "missing.npy"], "missing.npy"),
+        (["--animal", "honeybee", "--width-deg", "20", "--depth", "1"], "all distances"),
     ],
 )
 def test_it_refuses_invalid_arguments(call, photo, given, words):

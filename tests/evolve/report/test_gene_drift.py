@@ -46,18 +46,18 @@ def runs(tmp_path_factory):
 
 @pytest.mark.slow
 def test_the_gene_that_is_selected_is_told_from_those_that_are_not(runs):
-    drift = drift_of(runs, 100)
+    drift = drift_of(runs, 40)
     moved = {one.quantity: one for one in drift.moved}
     assert drift.generations == range(9, 12)
     genes = {name for name, use in runs[0].config.genome.items() if use.open}
     assert set(moved) == genes | {"acuity_cpd", "receptors"}
     fov = moved["fov_deg"]
     assert fov.high < fov.mean
-    assert fov.p == pytest.approx(2 / 101, rel=0.1)
+    assert fov.p == pytest.approx(2 / 41, rel=0.1)
     assert np.mean([one.p > 0.05 for one in drift.moved]) > 0.5
     late = [c.phenotype.fov_deg for c in runs[1].candidates if c.generation >= 9]
     assert fov.runs[1] == pytest.approx(np.mean(late))
-    model = null_model(runs[0].config, measured, 12, 100)
+    model = null_model(runs[0].config, measured, 12, 40)
     ends = model.means["fov_deg"][:, 9:].mean(axis=1)
     assert (fov.low, fov.median, fov.high) == pytest.approx(tuple(np.quantile(ends, [0.025, 0.5, 0.975])))
 

@@ -1,16 +1,20 @@
 """A video shows the episode: the agent's position and its eyes' signals, with the correct duration."""
 
-import dataclasses
 import sys
+from dataclasses import replace
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from evolve.analysis.episode import Pictures
 from evolve.config.run_config import ConfigError
-from evolve.report.moving_picture import ASIDE, HEIGHT, LONGEST, SPEED, write_gif, write_mp4
-from evolve.report.theme import INK
+from evolve.report.moving_picture import GAP, HEIGHT, INSET, LONGEST, SPEED, _frame, _frames, write_gif, write_mp4
+from evolve.report.picture import display
+from evolve.report.theme import INK, PAPER
+
+BACKGROUND = int(PAPER[1:3], 16)
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +24,7 @@ def short(episode):
         name: value[:24] for name, value in vars(episode).items() if isinstance(value, np.ndarray) and len(value) == 256
     }
     terms, beside = ({name: term[:24] for name, term in of.items()} for of in (episode.reward_terms, episode.beside))
-    return dataclasses.replace(episode, **cut, reward_terms=terms, beside=beside)
+    return replace(episode, **cut, reward_terms=terms, beside=beside)
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +53,46 @@ def test_the_agent_is_where_it_was(short, frames):
 
 
 def test_the_eyes_are_beside_it(short, frames):
-    picture = np.asarray(frames[12][0])[:, -ASIDE:]
-    left, right = picture[: HEIGHT // 2 - 10], picture[HEIGHT // 2 + 10 :]
-    assert np.abs(left.astype(float).mean() - right.astype(float).mean()) > 1 or (left != right[: len(left)]).any()
-    assert picture.std() > 5
+    """Two eyes fill the part on the right, one above the other, without interpolation between receptors."""
+    plan, receptors = short.plan.bounds, display(short.signals, short.gain)[12]
+    width = round((plan[2] - plan[0]) * HEIGHT / (plan[3] - plan[1]))
+    high = (HEIGHT - GAP) // 2
+    wide = round(high * short.eyes.field_aspect)
+    assert frames[12][0].size == (width + GAP + wide, HEIGHT)
+    for number, eye in enumerate(receptors):
+        y, x = 0.5 + np.indices(eye.shape[:2]).reshape(2, -1)
+        at = zip(number * (high + GAP) + y * high / len(eye), width + GAP + x * wide / len(eye[0]), strict=True)
+        pixels = [frames[12][0].getpixel((int(right), int(down))) for down, right in at]
+        assert np.abs(np.subtract(pixels, eye.reshape(-1, 3))).mean() < 8, "the palette's colours"
+
+
+@pytest.mark.parametrize(
+    ("eyes", "aspect", "columns", "rows"), [(1, 1.0, 1, 1), (4, 1.0, 2, 2), (3, 4.0, 1, 3), (12, 1.0, 3, 4)]
+)
+def test_eyes_are_as_large_as_possible(eyes, aspect, columns, rows):
+    """Each eye's colour is its number, so that rows and columns can be counted."""
+    seen = np.broadcast_to(np.arange(1, eyes + 1, dtype=np.uint8)[:, None, None, None], (eyes, 2, 2, 3))
+    picture = np.asarray(_frame(Image.new("RGB", (0, HEIGHT)), seen, aspect))[..., 0]
+    assert len(set(picture[5]) - {BACKGROUND}) == columns
+    assert len(set(picture[:, GAP + 2]) - {BACKGROUND}) == rows
+    assert set(np.unique(picture)) - {BACKGROUND} == set(range(1, eyes + 1))
+
+
+def test_a_rendered_world_has_the_plan_in_its_corner(short):
+    """The latest image is on the left, with the plan in its corner, and the eyes are the same as without the image."""
+    pixels = np.empty((12, HEIGHT, 400, 3), np.uint8)
+    pixels[:] = np.arange(12, dtype=np.uint8)[:, None, None, None] * 20
+    plain = [np.asarray(one) for one in _frames(short, 12)]
+    drawn = [np.asarray(one) for one in _frames(replace(short, pictures=Pictures(np.arange(0, 24, 2), pixels)), 12)]
+    for image, seen, alone in zip((0, 6), drawn, plain, strict=True):
+        eyes = seen[:, 400:]
+        np.testing.assert_array_equal(eyes, alone[:, -eyes.shape[1] :])
+        assert (seen[: HEIGHT // 2, :400] == 20 * image).all()
+        whole = Image.fromarray(alone[:, : -eyes.shape[1]])
+        size = round(INSET * whole.width), round(INSET * HEIGHT)
+        corner = seen[HEIGHT - GAP - size[1] : HEIGHT - GAP, GAP : GAP + size[0]]
+        assert np.abs(corner.astype(int) - whole.resize(size, Image.Resampling.LANCZOS)).max() == 0
+        assert (seen[HEIGHT - GAP :, :400] == 20 * image).all()
 
 
 def test_a_film_has_a_frame_for_every_action(short, frames, tmp_path):

@@ -78,8 +78,11 @@ def test_failure_texts_and_names_of_directories_do_not_steer_the_terminal(call, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("options", [(), ("--json",)], ids=["text", "json"])
-@pytest.mark.parametrize("closed", [("stdout",), ("stdout", "stderr")], ids=["head -1", "2>&1 head -1"])
+@pytest.mark.parametrize(
+    ("options", "closed"),
+    [(("--json",), ("stdout",)), ((), ("stdout", "stderr"))],
+    ids=["json, head -1", "text, 2>&1 head -1"],
+)
 def test_a_run_goes_on_when_nobody_reads_any_more(tmp_path, options, closed):
     """The reader takes the first line and closes the pipe, like `head -1`."""
     reader, writer = os.pipe()

@@ -75,3 +75,5 @@ def test_it_prints_how_it_goes(capsys):
     assert len(lines) == 20
     assert lines[0].startswith("generation  0  best fitness")
     assert float(lines[-1].split()[4]) > 0.01 * float(lines[0].split()[4])
+    found = [float(value) for value in lines[-1].split("[")[1].rstrip("]").split()]
+    np.testing.assert_allclose(found, [0.7] * 3, atol=0.02)

@@ -1,5 +1,6 @@
 """A scheduler without workers, one that ends, and one that never answers: each ends the wait after the patience."""
 
+import asyncio
 import socket
 import time
 from concurrent.futures import Future
@@ -110,3 +111,21 @@ def test_a_call_on_a_lost_connection_does_not_wait(cluster):
     with pytest.raises(ConnectionLost):
         found.ask(lambda: counter.identity())
     found.close()
+
+
+def test_silent_workers_are_removed_from_the_scheduler_once():
+    client, removed, notes = Client("running"), [], []
+
+    async def unregister(address, stimulus_id):
+        removed.append((address, stimulus_id))
+
+    client.scheduler = SimpleNamespace(unregister=unregister)
+    found = connection([client])
+    found.note, found.ask = notes.append, lambda call: asyncio.run(call())
+    silent = ["tcp://a:1", "tcp://b:2"]
+    found.signs = SimpleNamespace(lost_workers=tuple(silent), forget=silent.remove)
+    found.remove_lost_workers()
+    assert removed == [("tcp://a:1", "topic"), ("tcp://b:2", "topic")]
+    assert silent == []
+    assert notes[0].startswith("tcp://host:1: worker tcp://a:1 has given no sign of life for 5 s; its candidates are")
+    assert len(notes) == 2

@@ -88,13 +88,17 @@ def test_the_better_go_on_and_the_search_is_told_how_far_each_came(tmp_path, mon
     assert not list((run.path / "trainings").iterdir()), "a finished generation leaves no training state behind"
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Return an uninterrupted run."""
+    with pytest.MonkeyPatch.context() as patch:
+        return carry(tmp_path_factory.mktemp("whole") / "run", tiny(*HALVING), patch)[0]
+
+
 @pytest.mark.fast_cases(1)
-@pytest.mark.parametrize("until", [9, 3, 12, 13, 20, 26])
-def test_interrupted_anywhere_it_goes_on_to_the_same_history(tmp_path, monkeypatch, until):
-    for folder in ("whole", "interrupted"):
-        (tmp_path / folder).mkdir()
-    whole, _ = carry(tmp_path / "whole" / "run", tiny(*HALVING), monkeypatch)
-    path = tmp_path / "interrupted" / "run"
+@pytest.mark.parametrize("until", [9, 3, 13, 20])
+def test_interrupted_anywhere_it_goes_on_to_the_same_history(tmp_path, monkeypatch, whole, until):
+    path = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
         carry(path, tiny(*HALVING), monkeypatch, until=until)
     kept = (path / "candidates.jsonl").read_bytes()
@@ -153,9 +157,7 @@ def test_progress_of_a_stage_that_fails_never_runs_backwards(tmp_path, monkeypat
 
 
 @pytest.mark.slow
-def test_a_lost_checkpoint_is_trained_again(tmp_path, monkeypatch):
-    (tmp_path / "a").mkdir()
-    whole, _ = carry(tmp_path / "a" / "run", tiny(*HALVING), monkeypatch)
+def test_a_lost_checkpoint_is_trained_again(tmp_path, monkeypatch, whole):
     with pytest.raises(KeyboardInterrupt):
         carry(tmp_path / "run", tiny(*HALVING), monkeypatch, until=9)
     lost = list((tmp_path / "run" / "trainings").iterdir())

@@ -31,7 +31,7 @@ from tests.evolve.search.test_kill import tensors
 SMALL = (
     "workers=1",
     "search.population=2",
-    "search.generations=2",
+    "search.generations=1",
     "learning.total_steps=256",
     "learning.n_envs=8",
     "learning.n_steps=16",

@@ -1,12 +1,15 @@
 """Receptors as waveguides: an eye with such receptors agrees with an ommatidium."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import optics
 from optics import AccuracyError, Eye, Ommatidium, Pupil, Waveguide, snyder_acceptance
+from optics.eye.guided_field import check_guide
+from optics.eye.receptive_field import beams_to, spot_of
 from optics.spectra.spectrum import daylight
 
 FOCAL, PITCH = 50e-6, 3e-6
@@ -182,3 +185,24 @@ def test_derivatives_are_refused():
     dr.enable_grad(z)
     with pytest.raises(ValueError, match="z"):
         eye_of(Waveguide(2e-6)).kernel(4, z)
+
+
+def test_a_guide_may_fill_its_receptor_and_no_more():
+    """Rounding of the receptor's side is no reason for a refusal."""
+    for side in np.random.default_rng(5).uniform(1e-6, 5e-6, 20):
+        check_guide(Waveguide(float(side)), LENS, (float(side), 2 * float(side)))
+        check_guide(Waveguide(float(side * (1 + 5e-10))), LENS, (2 * float(side), float(side)))
+        with pytest.raises(ValueError, match=r"must be at most a receptor's height .* m, so that neighbours"):
+            check_guide(Waveguide(float(side * (1 + 2e-9))), LENS, (float(side), 2 * float(side)))
+        with pytest.raises(ValueError, match=r"must be at most sensor_width / resolution\[1\] = .* m, so that"):
+            check_guide(Waveguide(float(side * 1.01)), LENS, (2 * float(side), float(side)))
+
+
+def test_the_window_of_a_focused_guide_is_narrower_than_all_diffracted_light():
+    """Rays meet in the focus, so that the search for a window starts within the light that edges diffract."""
+    retina = eye_of(Waveguide(1.4e-6))._retina(4)
+    spot = spot_of(beams_to(LENS, retina, math.inf, (0.0, 0.0)), retina)
+    assert spot.half_of_rays < 0.1 * spot.half
+    near = replace(retina, distance=retina.distance / 2)
+    half = spot_of(beams_to(LENS, near, math.inf, (0.0, 0.0)), near).half_of_rays
+    assert half == pytest.approx(LENS.aperture_radius / 2, rel=0.2), "the cone of light at half the distance"

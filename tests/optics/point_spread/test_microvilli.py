@@ -90,7 +90,7 @@ def integral(radius, centre, picture):
 
 
 @pytest.mark.fast_cases(1)
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(16))
 def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
     """Receptors from a twentieth of λ/NA to four, anywhere about the focus; pitches up to 0.7 λ/NA, windows of at least
     three samples. A sum under a hard disk has a median error of some 20 %."""
@@ -147,7 +147,7 @@ def test_what_light_errs_by_is_told(sine, focal, wavefront, aperture, defocus, t
 @pytest.mark.slow
 def test_signals_do_not_depend_on_samples():
     """Signals of a tilted hexagon in coarse, narrow and even windows, and the polarisation sensitivity in them."""
-    hexagon = optics.Pupil(1e-3, thin_lens_focal_length=2e-3, aperture=optics.Polygon.regular(6))
+    hexagon = optics.Pupil(0.25e-3, thin_lens_focal_length=0.5e-3, aperture=optics.Polygon.regular(6))
     cells, angle, place = Microvilli(20.0, 8.0), (0.1, -0.05), (0.3e-6, -0.2e-6)
     windows = [(0.1e-6, (61, 61)), (0.7e-6, (5, 5)), (1e-6, (4, 6)), (0.4e-6, (9, 12))]
     lights = [optics.vector_focus(hexagon, WAVE, source_angle=angle, dx=dx, shape=shape) for dx, shape in windows]

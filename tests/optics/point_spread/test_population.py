@@ -7,8 +7,11 @@ import pytest
 
 import optics
 from optics import Grid
-from optics.point_spread.population import _sine, _spread, _Stack, population_pictures
-from optics.point_spread.population_members import Member
+from optics.apertures.aperture import EDGE_REACH
+from optics.methods.problem import SLOPE_MARGIN
+from optics.numerics.interpolation import cubic_bsplines
+from optics.point_spread.population import _sine, _spread, _Stack, _turns, population_pictures
+from optics.point_spread.population_members import HIGHEST_ORDER, Member, powers
 from tests.optics.device_types import Float64
 from validation.reference import relative_l2
 
@@ -117,3 +120,49 @@ def test_the_time_of_a_common_plan_follows_the_window():
     assert all("population" in plan.why for plan in times)
     assert times[1].seconds > 30 * times[0].seconds > 3e-3
     assert times[1].seconds < 0.05
+
+
+@pytest.mark.parametrize("source", [math.inf, 4e-4])
+@pytest.mark.parametrize(
+    "pupil",
+    [
+        optics.Pupil(20e-6, thin_lens_focal_length=200e-6, object_n=1.2),
+        optics.Pupil(20e-6, thin_lens_focal_length=-300e-6),
+        optics.Pupil(20e-6, optics.BSplineRelief(2e-6 * np.random.default_rng(3).random((4, 4)))),
+        optics.Pupil(20e-6, thin_lens_focal_length=Z, wavefront=optics.Zernike({(3, 1): 0.2, (2, 0): 0.3})),
+    ],
+    ids=["lens", "diverging lens", "relief", "wavefront"],
+)
+def test_cycles_per_radius_are_differences_of_the_phase(pupil, source):
+    """The phase in waves is that of relief, wavefront, lens, and paths from the source and to the sensor."""
+    member, window = Member(pupil, LAMBDA, Z, source), Grid.square(33, 0.5e-6)
+    radius, wavelength, z, source, focal, before, _ = member.numbers
+
+    def splines(t):
+        return np.stack(cubic_bsplines((t + 1) / 2), axis=-1)
+
+    def waves(x, y, to_sensor):
+        r = radius * np.hypot(x, y)
+        found = (
+            np.einsum("yxi,ij,yxj->yx", splines(y), member.relief, splines(x))
+            - np.sign(focal) * (np.hypot(r, focal) - abs(focal) if math.isfinite(focal) else 0) / wavelength
+        )
+        if math.isfinite(source):
+            found += before * (np.hypot(r, source) - source) / wavelength
+        zernike = np.tensordot(member.powers, powers(x, y, HIGHEST_ORDER), 1)
+        return found + zernike + to_sensor * (np.hypot(r, z) - z) / wavelength
+
+    n, step = (9, 1e-5) if member.order < 2 else (4 * member.order + 1, 1e-5)
+    x, y = np.meshgrid(*[np.linspace(-1, 1, n) * (1 + EDGE_REACH)] * 2)
+
+    def steepest(to_sensor, inside):
+        along_x = (waves(x + step, y, to_sensor) - waves(x - step, y, to_sensor)) / (2 * step)
+        along_y = (waves(x, y + step, to_sensor) - waves(x, y - step, to_sensor)) / (2 * step)
+        return SLOPE_MARGIN * np.hypot(along_x, along_y)[inside].max()
+
+    inside = np.hypot(x, y) <= 1 + EDGE_REACH
+    everywhere = inside if member.order else np.ones_like(inside)  # a wavefront is not evaluated beyond the edge
+    [turns], [sine] = _turns(_Stack.from_members([member]), window)
+    tilt = radius * window.half_diagonal / (wavelength * z)
+    assert turns == pytest.approx(steepest(1, everywhere) + tilt + member.detail, rel=1e-3)
+    assert sine == pytest.approx((steepest(0, inside) + member.detail + 1) * wavelength / radius, rel=1e-3)

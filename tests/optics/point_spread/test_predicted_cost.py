@@ -45,7 +45,7 @@ def measured(beam, problem, method):
     """Return the CPU time of a warm call divided by the predicted time; None unless both exceed a few hundredths."""
     try:
         plan = choose(problem, method)[0]
-        if not 0.04 < plan.seconds < 0.7:
+        if not 0.03 < plan.seconds < 0.3:
             return None
         times = []
         for _ in range(2):
@@ -55,7 +55,7 @@ def measured(beam, problem, method):
             times.append(time.process_time() - start)
     except AccuracyError:
         return None
-    return times[1] / plan.seconds if picture.plan.method == plan.method and times[1] > 0.05 else None
+    return times[1] / plan.seconds if picture.plan.method == plan.method and times[1] > 0.03 else None
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_predicted_times_have_the_right_size():
     """Relative to the median, which depends on the machine, nine of ten ratios lie within a factor of three."""
     rng, ratios = np.random.default_rng(3), []
     end = time.process_time() + 100
-    while time.process_time() < end and len(ratios) < 80:
+    while time.process_time() < end and len(ratios) < 30:
         beam, problem = draw(rng)
         method = "auto" if rng.random() < 0.3 else str(rng.choice(list(METHODS)))
         ratio = measured(beam, problem, method)

@@ -18,7 +18,7 @@ import sim
 from sim.envs.field_of_view_overlay import _receptor_rays
 from sim.envs.follow_camera import FollowCamera, _follow
 from sim.envs.registration import IDS
-from sim.envs.retina_images import GAP, _shares
+from sim.envs.retina_images import GAP, shares_of
 from sim.eyes.eyes import EYE_HEIGHT
 from sim.scene.color import encode_srgb
 
@@ -294,5 +294,5 @@ def test_an_eyes_columns_of_receptors_are_drawn_where_they_look():
 
 def test_pictures_of_signals_are_white_where_all_receptors_see_white():
     """The shares of each primary add up to one. A primary that no type contributes to is shared by all types."""
-    shares = _shares(np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]))
+    shares = shares_of(np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]))
     np.testing.assert_allclose(shares, [[0.5, 0.0, 0.5], [0.5, 1.0, 0.5]])

@@ -1,5 +1,6 @@
 """Fields of view in the image of a world, against an independent computation pixel by pixel."""
 
+import itertools
 import math
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import sim
 from sim.envs import field_of_view_overlay as overlay
+from sim.eyes.eyes import eye_positions
 from sim.scene.cameras import Viewpoint
 
 SIZE = 20, 31  # height and width, which differ
@@ -83,6 +85,21 @@ def test_visibility_is_interpolated_between_rays():
 def test_colours_repeat():
     for eye in range(3 * len(overlay.COLORS)):
         np.testing.assert_array_equal(overlay._color(eye), overlay.COLORS[eye % len(overlay.COLORS)])
+
+
+def test_colours_are_those_of_okabe_and_ito():
+    """Their palette has these colours and black, which are written here as on their page."""
+    palette = ["009E73", "E69F00", "56B4E9", "CC79A7", "F0E442", "0072B2", "D55E00"]
+    assert ["".join(f"{value:02X}" for value in color) for color in overlay.COLORS] == palette
+
+
+@pytest.mark.parametrize("n_eyes", [1, 2, 5, 12, 40])
+@pytest.mark.parametrize("placement_range_deg", [60.0, 300.0])
+def test_eyes_are_as_large_as_their_distances_allow(n_eyes, placement_range_deg):
+    eyes = sim.Eyes(n_eyes=n_eyes, resolution=(1, 3), fov_deg=20, placement_range_deg=placement_range_deg)
+    places = eye_positions(eyes.azimuths())
+    distances = [math.dist(a, b) for a, b in itertools.combinations(places, 2)]
+    assert overlay._radius(eyes) == pytest.approx(min([overlay.IRIS, *(distance / 2 for distance in distances)]))
 
 
 def test_the_own_body_does_not_hide_an_eye():

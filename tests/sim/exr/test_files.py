@@ -205,30 +205,6 @@ def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path):
         read_exr(tmp_path / "bomb.exr")
 
 
-def test_link_that_waits_under_the_temporary_name_leads_nowhere(tmp_path):
-    victim = tmp_path / "thesis.tex"
-    victim.write_text("all of it")
-    (tmp_path / f".a.exr.{os.getpid()}.tmp").symlink_to(victim)
-    write_exr(tmp_path / "a.exr", views())
-    assert victim.read_text() == "all of it"
-    assert len(read_exr(tmp_path / "a.exr")) == 3
-
-
-def test_a_failed_write_leaves_the_old_file_alone(tmp_path):
-    write_exr(tmp_path / "a.exr", views())
-    before = (tmp_path / "a.exr").read_bytes()
-    with pytest.raises(ValueError, match="attributes"):
-        write_exr(tmp_path / "a.exr", [View("left", NM, views()[0].radiance, attributes={"x": object()})])
-    assert (tmp_path / "a.exr").read_bytes() == before
-    assert len(list(tmp_path.iterdir())) == 1
-
-
-def test_files_may_be_read_by_whoever_may_read_others(tmp_path):
-    write_exr(tmp_path / "a.exr", views())
-    (tmp_path / "plain").touch()
-    assert (tmp_path / "a.exr").stat().st_mode == (tmp_path / "plain").stat().st_mode
-
-
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
@@ -263,32 +239,6 @@ def test_a_file_whose_last_parts_were_taken_away_is_not_whole(tmp_path):
     OpenEXR.File(kept).write(str(tmp_path / "fewer.exr"))
     with pytest.raises(ExrError, match=r"fewer\.exr: parts are missing \(3 of 4\)"):
         read_exr(tmp_path / "fewer.exr")
-
-
-def test_a_picture_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
-    """Otherwise a crash of the machine could leave a name with an incomplete image."""
-    steps, sync, replace = [], os.fsync, os.replace
-    monkeypatch.setattr(os, "fsync", lambda file: (steps.append(("sync", os.fstat(file).st_size)), sync(file)))
-    monkeypatch.setattr(
-        os, "replace", lambda old, new: (steps.append(("name", os.stat(old).st_size)), replace(old, new))
-    )
-    write_exr(tmp_path / "a.exr", views())
-    size = (tmp_path / "a.exr").stat().st_size
-    assert steps == [("sync", size), ("name", size)]
-
-
-def test_a_disk_that_is_full_leaves_the_old_picture_and_nothing_else(tmp_path, monkeypatch):
-    write_exr(tmp_path / "a.exr", views())
-    before = (tmp_path / "a.exr").read_bytes()
-
-    def full(file):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space left"):
-        write_exr(tmp_path / "a.exr", views(seed=1))
-    assert [path.name for path in tmp_path.iterdir()] == ["a.exr"]
-    assert (tmp_path / "a.exr").read_bytes() == before
 
 
 def test_names_need_not_be_text(tmp_path):

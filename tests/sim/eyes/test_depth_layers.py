@@ -88,11 +88,9 @@ def test_areas_share_their_light_among_layers_as_rays_do(close_by, monkeypatch):
 @pytest.mark.slow
 def test_auto_takes_layers_for_large_eyes_alone(close_by):
     world, large, _ = close_by
-    small = sim.Eyes(2, (15, 15), optics=optics.Pupil(25e-6, thin_lens_focal_length=2.4e-4))
-    assert sim.BatchedRenderer(world, small, 1).fidelity.depth == DepthLayers()
-    sharp, noisy = (
-        sim.BatchedRenderer(world, dataclasses.replace(large, noise_sigma=sigma), 1).fidelity for sigma in (2e-3, 0.05)
-    )
+    small = sim.Eyes(2, (5, 5), optics=optics.Pupil(25e-6, thin_lens_focal_length=2.4e-4))
+    assert sim.choose_fidelity(world, small, bands="own").depth == DepthLayers()
+    sharp, noisy = (sim.choose_fidelity(world, dataclasses.replace(large, noise_sigma=sigma)) for sigma in (2e-3, 0.05))
     assert sharp.depth.count > 1
     assert sharp.depth.nearest < 0.5
     assert next(level for level in sharp.levels if level.stage == "depth").predicted_error < 1e-3

@@ -10,7 +10,7 @@ import optics
 from optics.spectra.spectrum import daylight, srgb_basis
 from sim import read_exr
 from sim.pictures import photograph
-from sim.pictures.photograph import ANIMALS, read_photograph, see_photograph
+from sim.pictures.photograph import ANIMALS, read_depth, read_photograph, see_photograph
 from sim.pictures.receptor_mosaic import ReceptorMosaic
 
 WHITE = np.ones((12, 16, 3))
@@ -189,3 +189,55 @@ def test_invalid_arguments_raise_one_line(change, words):
 
 def test_all_animals_are_those_of_optics():
     assert set(ANIMALS) | {"cirolana", "goldfish_lens", "COMPOUND"} == set(optics.animals.__all__)
+
+
+def test_near_edges_are_blurred_by_a_disk():
+    """A source at distance z fills a disk of angular diameter D/z, which an edge divides: t√(1 - t²) + asin t."""
+    edge = np.zeros((40, 60, 3))
+    edge[:, 30:] = 1
+    z, across = 8e-3, 1e-3
+    seen = see_photograph(edge, "mouse", 60.0, depth=z).signals[0]
+    middle, columns = seen[seen.shape[0] // 2], seen.shape[1]
+    tangent = (np.arange(columns) + 0.5 - columns / 2) / columns * 2 * math.tan(math.radians(30))
+    t = np.clip(2 * tangent / (across / z), -1, 1)
+    expected = 0.5 + (t * np.sqrt(1 - t * t) + np.arcsin(t)) / math.pi
+    np.testing.assert_allclose(middle / middle[-8:].mean(), expected, atol=0.03)
+    sharp = see_photograph(edge, "mouse", 60.0).signals[0][seen.shape[0] // 2]
+    assert np.abs(sharp - expected).max() > 0.1
+
+
+def test_a_map_of_distances_blurs_its_near_part_only():
+    stripes = np.zeros((40, 60, 3))
+    stripes[::8] = stripes[1::8] = stripes[2::8] = stripes[3::8] = 1
+    depth = np.full((40, 60), math.inf)
+    depth[:, :30] = 8e-3
+    seen = see_photograph(stripes, "mouse", 60.0, depth=depth).signals[0][8:-8]
+    plain = see_photograph(stripes, "mouse", 60.0).signals[0][8:-8]
+    near, far = (slice(3, seen.shape[1] // 2 - 6), slice(seen.shape[1] // 2 + 6, -3))
+    assert seen[:, near].std() < 0.5 * plain[:, near].std()
+    np.testing.assert_allclose(seen[:, far], plain[:, far], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("animal", "depth", "words"),
+    [
+        ("mouse", np.ones((3, 4)), "shape"),
+        ("mouse", 0.0, "positive"),
+        ("mouse", -1.0, "positive"),
+        ("mouse", math.nan, "positive"),
+        ("honeybee", 1.0, "all distances"),
+    ],
+)
+def test_invalid_distances_are_refused(animal, depth, words):
+    with pytest.raises(ValueError, match=words):
+        see_photograph(WHITE, animal, 20.0, depth=depth)
+
+
+def test_distances_are_read_from_numbers_and_files(tmp_path):
+    np.save(tmp_path / "z.npy", np.full((12, 16), 2.5))
+    (tmp_path / "bad.npy").write_bytes(b"no array")
+    assert read_depth("0.25") == 0.25
+    assert read_depth(str(tmp_path / "z.npy")).max() == 2.5
+    for text, words in (("near", "distance"), (str(tmp_path / "bad.npy"), "undamaged")):
+        with pytest.raises(ValueError, match=words):
+            read_depth(text)

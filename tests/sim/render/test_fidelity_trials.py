@@ -5,8 +5,9 @@ import pytest
 
 import sim
 from sim.eyes.depth_layers import ONE_PSF
+from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT
 from sim.render.fidelity_trials import FidelityTrials
-from sim.render.random_views import NEAR, near_views, random_views
+from sim.render.random_views import NEAR, RandomViews, near_views, on_objects, random_views
 from sim.render.world_scene import WorldScene
 from sim.tracing.lighting import BOUNCE
 
@@ -41,3 +42,39 @@ def test_views_have_all_directions(views):
     headings = views(sim.build_world("detection"), EYES, 400).heading
     quadrants = np.floor(headings / (np.pi / 2)).astype(int) % 4
     assert np.abs(np.bincount(quadrants, minlength=4) - 100).max() < 5 * np.sqrt(75)
+
+
+def some_views(n, rng):
+    """Return views of two objects at random places around the agents."""
+    heading, eye = rng.uniform(-np.pi, np.pi, n), rng.integers(EYES.n_eyes, size=n)
+    return RandomViews(rng.uniform(-3, 3, (n, 2)), heading, rng.uniform(-4, 4, (n, 2, 3)), eye)
+
+
+def test_eyes_are_on_the_body_and_look_outwards():
+    """Axis, right and up of an eye follow from the heading and the eye's azimuth."""
+    views = some_views(50, np.random.default_rng(7))
+    angle = views.heading + EYES.azimuths()[views.eye]
+    cos, sin, zero = np.cos(angle), np.sin(angle), np.zeros(50)
+    ahead, right, up = np.stack([cos, sin, zero], 1), np.stack([sin, -cos, zero], 1), np.array([0.0, 0.0, 1.0])
+    origins, directions = views.in_agents(EYES, np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 0.6, 0.8]]))
+    expected = BODY_RADIUS * ahead + np.column_stack([views.position, np.full(50, EYE_HEIGHT)])
+    np.testing.assert_allclose(origins, expected, atol=1e-12)
+    for k, way in enumerate((ahead, 0.6 * right + 0.8 * ahead, 0.6 * up + 0.8 * ahead)):
+        np.testing.assert_allclose(directions[:, k], way, atol=1e-12)
+    few = views.take(3)
+    for name in ("position", "heading", "objects", "eye"):
+        np.testing.assert_array_equal(getattr(few, name), getattr(views, name)[:3])
+    assert len(few) == 3
+
+
+def test_rays_hit_a_ball_if_they_pass_its_centre_within_its_radius_and_in_front():
+    rng, radii = np.random.default_rng(8), (0.4, 1.7)
+    views, origins, ways = some_views(40, rng), rng.uniform(-1, 1, (40, 3)), rng.normal(size=(40, 200, 3))
+    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+    expected = np.zeros((40, 200), bool)
+    for k, radius in enumerate(radii):
+        towards = (views.objects[:, k] - origins)[:, None]
+        passes = np.linalg.norm(np.cross(ways, towards), axis=-1)
+        expected |= (passes < radius) & (np.sum(ways * towards, axis=-1) > 0)
+    assert 0.02 < expected.mean() < 0.5
+    np.testing.assert_array_equal(on_objects(views, origins, ways, radii), expected)

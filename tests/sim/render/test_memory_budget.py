@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import mujoco
 import pytest
 
 import optics
@@ -53,6 +54,19 @@ def test_each_depth_layer_has_planes_and_behind_a_pupil_weights(monkeypatch, pup
     assert demand.planes == count * len(renderer.tracer.basis)
     assert demand.weights == count * per_layer
     assert demand.rays_per_receptor == len(renderer.sensor.directions) / 12
+
+
+def test_each_band_of_a_model_has_a_plane(monkeypatch):
+    """Light in a MuJoCo model has one component per band."""
+    asked = []
+    monkeypatch.setattr(eye_renderer, "check_memory", asked.append)
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><visual><headlight active='0'/></visual><worldbody><light type='directional'/><geom size='1'/>"
+        "<camera name='c' pos='0 -4 0'/></worldbody></mujoco>"
+    )
+    eye = optics.Eye(optics.Pupil(30e-6), resolution=(3, 4), fov_deg=20, bands=5)
+    sim.ModelRenderer(model, eye, [sim.Mount("c")], 2, sim.Fidelity(2, 5, depth=DepthLayers(nearest=0.5, count=2)))
+    assert (asked[-1].planes, asked[-1].worlds, asked[-1].eyes) == (2 * 5, 2, 1)
 
 
 def test_more_than_an_array_can_number_is_refused_whatever_the_memory(monkeypatch):

@@ -3,6 +3,7 @@ spectrum.
 """
 
 import warnings
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -33,6 +34,7 @@ def model_of(kind):
     return mujoco.MjModel.from_xml_string(MODEL.format(active=int(kind == "headlight"), lamp=LAMPS[kind]))
 
 
+@cache
 def seen(kind, bands, lamp="FL11", receptors="rgb"):
     """Return the signals (channel,) of a small eye that faces a white wall, which faces the lamp."""
     model = model_of(kind)

@@ -10,23 +10,29 @@ import sim
 from sim.render.one_ray import receptor_direction
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
+from tests.slow_part import slow
 
 LENS = optics.Pupil(60e-6, thin_lens_focal_length=240e-6)
 WORLDS = 8
 
 
-def random_state(task, seed):
+def random_state(task, seed, n_worlds=WORLDS):
     world = sim.build_world(task, seed=seed)
-    simulation = Simulation(task_of(world), WORLDS, seed)
+    simulation = Simulation(task_of(world), n_worlds, seed)
     state = simulation.reset()
     simulation.close()
     return world, state
 
 
-@pytest.mark.fast_cases(2)
-@pytest.mark.parametrize("task", ["detection", "maze", "navigation", "tracking"])
-@pytest.mark.parametrize("pupil", [None, LENS])
-@pytest.mark.parametrize(("rows", "ratio"), [(1, 4), (3, 2)])
+@pytest.mark.parametrize(
+    ("task", "pupil", "rows", "ratio"),
+    [
+        ("maze", None, 1, 4),
+        slow("tracking", LENS, 1, 4),
+        slow("navigation", None, 3, 2),
+        slow("detection", LENS, 3, 2),
+    ],
+)
 def test_high_receptors_see_the_mean_of_square_ones(task, pupil, rows, ratio):
     world, state = random_state(task, 3)
     square = sim.Eyes(2, (rows * ratio, 5), 50.0, 70.0, optics=pupil, noise_sigma=0.01)
@@ -44,12 +50,12 @@ def test_high_receptors_see_the_mean_of_square_ones(task, pupil, rows, ratio):
 @pytest.mark.slow
 @pytest.mark.parametrize("pupil", [None, LENS])
 def test_the_reference_renderer_agrees(pupil):
-    world, state = random_state("detection", 5)
+    world, state = random_state("detection", 5, n_worlds=3)
     eyes = sim.Eyes(1, (2, 4), 40.0, optics=pupil, noise_sigma=0.01, vertical_fov_deg=60.0)
     wide = np.tan(np.radians(20)) * 2 * 2 / 4  # receptors 1.5 times as high as wide
     eyes = replace(eyes, vertical_fov_deg=float(2 * np.degrees(np.arctan(1.5 * wide / 2))))
     reference = sim.ReferenceRenderer(world, eyes, {"type": "path", "max_depth": 3}, spp=400, samples_per_receptor=8)
-    renderer = sim.BatchedRenderer(world, eyes, WORLDS, sim.choose_fidelity(world, eyes))
+    renderer = sim.BatchedRenderer(world, eyes, 3, sim.choose_fidelity(world, eyes))
     found, expected = renderer.signals(state), reference.signals(state)
     assert np.sqrt(np.mean((found - expected) ** 2)) < renderer.fidelity.tolerance
     with pytest.raises(ValueError, match="must be a ratio of whole numbers up to 16"):

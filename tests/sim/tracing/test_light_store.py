@@ -102,9 +102,8 @@ def test_no_damage_changes_a_table():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
-def test_no_damage_of_thousands_changes_a_table(seed):
-    assert attack(seed, 4000) > 2500
+def test_no_damage_of_thousands_changes_a_table():
+    assert attack(0, 4000) > 2500
 
 
 def archive(**tables):

@@ -199,7 +199,7 @@ def test_light_that_is_reflected_more_often(monkeypatch):
     one reflection early lacks a third.
     """
     world, eyes = stairs(), sim.Eyes(n_eyes=4, resolution=(1, 4))
-    state = views(world, 6)
+    state = views(world, 3)
     found, truth = more_often(world, eyes, state)
     assert share_of(found, truth) == pytest.approx(1, abs=0.06)
     assert np.sqrt(np.mean((found - truth) ** 2)) < 0.2 * np.sqrt(np.mean(truth**2))

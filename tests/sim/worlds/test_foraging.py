@@ -166,7 +166,7 @@ def test_lights_and_walls_take_spectra_in_any_task():
     grey walls.
     """
     day, evening = (
-        sim.BatchedRenderer(build_world("detection", spectra=s), EYES, 1)
+        sim.BatchedRenderer(build_world("detection", spectra=s), EYES, 1, sim.Fidelity(4, EYES.bands))
         for s in (None, {f"light_{i}": "A" for i in range(3)})
     )
     state = before_the_eyes(build_world("detection"))

@@ -40,7 +40,10 @@ def lens(**more: Any) -> optics.Pupil:
 
 
 def across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
-    """PSF in the focus at evenly spaced positions [λ f/D] along x, relative to the peak of a perfect aperture."""
+    """Return the PSF in the focus at evenly spaced positions [λ f/D] along x.
+
+    It is relative to the peak of the same aperture without aberrations.
+    """
     dx = float(at[1] - at[0]) * UNIT
     n = 2 * round(float(at[-1]) * UNIT / dx) + 1
     found = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), **ASKED).psf[0, 0]
@@ -50,7 +53,7 @@ def across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
 
 
 def amplitude_across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
-    """|U| at the same positions, relative to the centre."""
+    """Return |U| at the same positions, relative to the centre."""
     n = 2 * (len(at) - 1) + 1
     dx = float(at[1] - at[0]) * UNIT
     result = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), field=True, **ASKED)
@@ -62,5 +65,5 @@ def amplitude_across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
 
 
 def strehl_at_centre(pupil: optics.Pupil) -> float:
-    """Light on the axis relative to that of a perfect wave through the same aperture."""
+    """Return light on the axis relative to that of a perfect wave through the same aperture."""
     return float(across(pupil, np.array([0.0, 0.1]))[0])

@@ -18,7 +18,7 @@ __all__ = ["of_hcipy", "of_poppy", "of_prysm"]
 
 
 def jinc(x: np.ndarray) -> np.ndarray:
-    """2 J1(πx)/(πx)."""
+    """Return 2 J1(πx)/(πx)."""
     v = np.pi * np.maximum(np.abs(x), 1e-12)
     return np.asarray(2 * j1(v) / v)
 
@@ -213,7 +213,7 @@ def of_poppy() -> Iterator[Case]:
 
 
 def over_disk(n: int, m: int, other_n: int, other_m: int) -> float:
-    """Mean over the unit disk of two of our modes' product."""
+    """Return the mean over the unit disk of two of our modes' product."""
     nodes, weights = gauss_legendre(16)
     angle = 2 * np.pi * (np.arange(32) + 0.5) / 32
     x, y = nodes[:, None] * np.cos(angle), nodes[:, None] * np.sin(angle)

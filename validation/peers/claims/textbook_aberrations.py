@@ -24,7 +24,7 @@ PEAK = {
 
 
 def wave(**peaks: float) -> optics.Zernike:
-    """Zernike wavefront with these peak terms in waves."""
+    """Return the Zernike wavefront with these peak terms in waves."""
     modes: dict[tuple[int, int], float] = {}
     for name, waves in peaks.items():
         for key, share in PEAK[name].items():

@@ -17,13 +17,13 @@ FINE = 0.001  # λ f/D
 
 
 def dark(pupil: optics.Pupil, near: float) -> float:
-    """Position of a minimum of the light."""
+    """Return the position of a minimum of the light."""
     at = np.arange(near - 0.05, near + 0.05, FINE)
     return float(at[across(pupil, np.round(at / FINE) * FINE).argmin()])
 
 
 def ring(near: float) -> tuple[float, float]:
-    """Position of a maximum of the light off the centre, and its height."""
+    """Return the position of a maximum of the light off the centre, and its height."""
     at = np.round(np.arange(near - 0.05, near + 0.05, FINE) / FINE) * FINE
     found = across(lens(), at)
     return float(at[found.argmax()]), float(found.max())
@@ -98,7 +98,7 @@ def of_openings() -> Iterator[Case]:
 
 
 def on_the_axis() -> Iterator[Case]:
-    """Light behind apertures, with exact closed forms."""
+    """Yield light behind apertures, with exact closed forms."""
     for z in (15e-6, 40e-6, 100e-6):
 
         def light(z: float = z) -> float:
