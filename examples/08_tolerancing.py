@@ -71,9 +71,7 @@ def ratios(scale: float, trials: int) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument(
-        "--trials", type=int, default=10, help="number of random lenses for each scale"
-    )
+    parser.add_argument("--trials", type=int, default=10, help="number of random lenses for each scale")
     parser.add_argument("--out", help="save the yield curves to this file")
     arguments = parser.parse_args()
     start, curves = time.process_time(), {}

@@ -66,8 +66,9 @@ class Predator(sim.Task):
 
 
 def chase(observation):
-    """Return the turning rate towards blue areas: their mean position (left is positive) over the field's half
-    width.
+    """Return the turning rate towards blue areas.
+
+    It is the mean position of these areas (left is positive), divided by half the width of the field of view.
     """
     red, _, blue = np.moveaxis(observation["eyes"][:, -1, 0, :, 0], 1, 0)
     prey = np.clip(blue - red - 0.05, 0, None)

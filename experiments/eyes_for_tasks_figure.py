@@ -149,8 +149,9 @@ def _draw_heights(place: Any, rows: Sequence[Trained]) -> None:
 
 
 def _draw_difference(place: Any, rows: Sequence[Trained]) -> None:
-    """Draw the fitness with two eyes of 15 receptors minus that with ten of 4, for rows and square eyes in bright
-    light.
+    """Draw the fitness with two eyes of 15 receptors minus the fitness with ten eyes of 4.
+
+    It is drawn for rows of receptors and for square eyes, in bright light.
     """
     kinds = {"navigators\nwith rows": with_rows(rows), "square eyes\nin both": with_squares(rows)}
     for task, aside in zip(TASKS, (-0.08, 0.08), strict=True):

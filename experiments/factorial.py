@@ -25,8 +25,9 @@ Floats = NDArray[np.float64]
 class Effects:
     """Effects of factors and of their interactions of order two, in units of the residual standard deviation.
 
-    of: effect of each set of one or two factors: the mean at the high level minus the mean at the low level; for two
-        factors, half the difference of the first factor's effect between the second factor's levels
+    of: effect of each set of one or two factors. For one factor, it is the mean at the high level minus the mean at the
+        low level. For two factors, it is half the difference of the first factor's effect between the second factor's
+        levels
     spread: residual standard deviation, in units of the response
     freedom: degrees of freedom of the residual
     """

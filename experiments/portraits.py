@@ -42,8 +42,10 @@ def designed() -> dict[str, sim.Eyes]:
 
 
 def moment(world: World) -> WorldState:
-    """Return an illustrative state: before the first fork of a course, or a goal on the left and a distractor on the
-    right."""
+    """Return an illustrative state.
+
+    The agent stands before the first fork of a course, or sees a goal on the left and a distractor on the right.
+    """
     none = np.zeros(1, int)
     if not world.objects:
         place, heading = np.array([[-34.0, 4.0]]), np.array([math.radians(35.0)])

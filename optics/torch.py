@@ -57,10 +57,10 @@ def psf(
 ) -> torch.Tensor:
     """Return `optics.psf` as a tensor, differentiable with respect to tensors in the pupil, distances and angle.
 
-    pupil: a pupil, or a sequence of pupils. Its numbers may be tensors that require gradients: the samples of a
-        `HeightMap`, `PixelRelief`, `WavefrontMap` or `MaskMap`, the control points of a `BSplineRelief`, the
-        coefficients of a `Zernike`, the waist of a `GaussianMask`, the radius, the refractive index and the focal
-        length. Tensors that require no gradients are treated as numbers.
+    pupil: a pupil, or a sequence of pupils. Some of its numbers may be tensors that require gradients: the radius, the
+        refractive index and the focal length, the samples of a `HeightMap`, `PixelRelief`, `WavefrontMap` or `MaskMap`,
+        the control points of a `BSplineRelief`, the coefficients of a `Zernike`, and the waist of a `GaussianMask`.
+        Tensors that require no gradients are treated as numbers.
     wavelengths: one or several wavelengths [m] in vacuum.
     sensor_distance, source_distance: distances [m] behind and in front of the pupil. Each is a number, or a row of
         numbers: a sequence, or a tensor with one axis. Two rows must have the same length and are used pairwise.

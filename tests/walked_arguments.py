@@ -39,13 +39,16 @@ class Walk:
 
     def unchanged(self) -> list[str]:
         """Return the parameters whose change has no effect."""
-        found = []
+        found: list[str] = []
+        before: dict[str, str] = {}
         for name, change in self.changes.items():
             if isinstance(change, NoEffect):
                 continue
             value, more = (change.value, change.given) if isinstance(change, With) else (change, {})
-            given = {**self.given, **more}
-            if digest(self.call(**given)) == digest(self.call(**{**given, name: value})):
+            given, key = {**self.given, **more}, _key(more)
+            if key not in before:
+                before[key] = digest(self.call(**given))
+            if before[key] == digest(self.call(**{**given, name: value})):
                 found.append(name)
         return found
 
@@ -83,6 +86,14 @@ def missing(package: Any, table: dict[str, Walk]) -> list[str]:
 def digest(result: Any) -> str:
     """Return a hash of the numbers and words of a result."""
     return hashlib.sha256(_plain(result).encode()).hexdigest()
+
+
+def _key(given: dict[str, Any]) -> str:
+    """Return the digest of arguments, or a name of their own if they have none."""
+    try:
+        return digest(given)
+    except TypeError:
+        return str(id(given))
 
 
 def _plain(result: Any) -> str:

@@ -200,9 +200,9 @@ def _add_watching(commands: Commands) -> None:
     _add_damage(compare)
     compare.add_argument("--json", action="store_true", help="print JSON")
     compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with their fitness curves")
-    drift = _command(commands, "drift", "drift.drift", "test which genes moved further than chance explains")
+    drift = _command(commands, "drift", "drift.drift", "test which genes changed by more than chance explains")
     drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories that differ in seeds")
-    many = "number of searches with random fitness to compare with (default: 200)"
+    many = "number of searches with random fitness with which the runs are compared (default: 200)"
     _add_damage(drift)
     drift.add_argument("--searches", type=searches, default=200, metavar="N", help=many)
     drift.add_argument("--json", action="store_true", help="print JSON")
@@ -220,8 +220,8 @@ def _add_products(commands: Commands) -> None:
         if name != "report":
             product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
             product.add_argument("--seed", type=seed, default=0, help="seed of the episode (default: 0)")
-            shown, usual = ("write a file", 8) if name == "export" else ("with --rrd: record the scene", None)
-            said = f"{shown} at every N-th action (default: 8)"
+            shown, usual = ("write a file", 8) if name == "export" else ("with --rrd, record the scene", None)
+            said = f"{shown} every N actions (default: 8)"
             product.add_argument("--every", type=every, default=usual, metavar="N", help=said)
         if name == "replay":
             product.add_argument("--test", action="store_true", help="play in the test set of a family of layouts")

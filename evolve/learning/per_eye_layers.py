@@ -36,7 +36,9 @@ class PerEyeLinear(nn.Module):
 
     @property
     def weights(self) -> tuple[Tensor, Tensor]:
-        """Return weights (eye, outputs, inputs) and biases (eye, outputs, 1), views of the same numbers if shared."""
+        """Return weights (eye, outputs, inputs) and biases (eye, outputs, 1), which are views of the same numbers if
+        eyes share them.
+        """
         return self.weight.expand(self.n_eyes, -1, -1), self.bias.expand(self.n_eyes, -1, -1)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -109,8 +111,12 @@ class _Slide(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-        """Return the sum plus `bias` (eye, output, 1), for codes (eye, code, frame, segment), weight (eye, output,
-        code, lag)."""
+        """Return the sum of the weighted codes plus `bias`.
+
+        codes: shape (eye, code, frame, segment)
+        weight: shape (eye, output, code, lag)
+        bias: shape (eye, output, 1)
+        """
         weights = weight.permute(3, 0, 1, 2).contiguous()
         total, *pieces = _slices(codes, len(weights))
         result = torch.baddbmm(bias, weights[0], total)

@@ -38,8 +38,7 @@ class Regridding:
 
 
 def _axis(n: int, pool_side: int, repeat_side: int) -> np.ndarray:
-    """Return the matrix (input, n) that maps the signals of `n` receptors along an axis to the inputs along this
-    axis."""
+    """Return the matrix (input, n) from the signals of `n` receptors along an axis to the inputs along it."""
     pooled = _averages(n, min(pool_side or n, n))
     return _repeats(len(pooled), max(repeat_side, len(pooled))) @ pooled
 

@@ -84,7 +84,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
     rows = [[name, *values] for name, values in columns.items()]
     rows += [[name, *(_shown(v) for v in row)] for name, row in differing_settings(runs).items()]
     curves = {str(run.path): generation_statistics(run.candidates) for run in runs}
-    caption = html("<b>Best fitness so far</b> over the generations, a line per run.")
+    caption = html("<b>Best fitness so far</b> over the generations, one line for each run.")
     drawn = figure(comparison_figure({name: rows for name, rows in curves.items() if rows}), caption)
     found = table(["", *names], rows, "comparison")
     body = html("<header><h1>{} runs</h1></header>\n", len(runs)) + section(

@@ -82,7 +82,7 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> Html:
     index = phenotype.refractive_index or 1.0
     waves = (index - 1) * (high - low) / 0.55
     caption = html(
-        "<b>Pupil.</b> Height of its {}, {} to {} µm within a radius of {} µm (a = {}). With n = {} the relief "
+        "<b>Pupil.</b> Height of its {}, from {} to {} µm within a radius of {} µm (a = {}). With n = {} the relief "
         "delays green light (550 nm) by up to {} waves across the pupil.",
         *(hint("relief"), rounded(low), rounded(high), rounded(radius), rounded(eye.relative_aperture)),
         *(rounded(index, 4), rounded(waves)),
@@ -132,8 +132,9 @@ def _psf(light: WhiteLight) -> Html:
         svg = inline(drawn, "psf", f"Point spread function over {2 * edge:.3g} µm, peak {peak / 1e12:.3g} per µm².")
     plan = light.psf.plan
     caption = html(
-        "<b>{}</b> of a distant point, all {} weighted by white daylight; logarithmic, "
-        "{} decades. White square: one {}, {} µm wide. Least accurate band: {}, predicted error {}.",
+        "<b>{}</b> of a distant point: sum over all {}, weighted by white daylight, on a logarithmic scale of {} "
+        "decades. The white square is one {}, {} µm wide. The least accurate band was computed by the method {}, with "
+        "a predicted error of {}.",
         *(hint("psf", "Point spread function"), hint("bands"), DECADES, hint("receptor"), rounded(pitch)),
         *(plan.method.replace("_", " "), f"{plan.predicted_error:.2g}"),
     )
@@ -203,9 +204,9 @@ def _mtf(light: WhiteLight) -> Html:
     strehl = optics.strehl_ratio(light.psf.of_wavelength(green))[0]
     of_whom = "" if _is_round(eye.pupil) else " of a circle of this width"
     caption = html(
-        "<b>{}</b> in white daylight, mean of all orientations ({}), and the diffraction "
-        "limit{} (dashed). Dotted: the receptors' Nyquist frequency, {} cycles per degree; contrast there {}. {} "
-        "{} at {} nm; image quality {} (in 0 to 1: contrast above the noise, times throughput).",
+        "<b>{}</b> in white daylight, averaged over all orientations ({}), and the diffraction limit{} (dashed). The "
+        "dotted line is the receptors' Nyquist frequency, {} cycles per degree, where the contrast is {}. The {} is {} "
+        "at {} nm. The image quality is {} (from 0 to 1: contrast above the noise, times throughput).",
         *(hint("mtf", "Modulation transfer function"), key("accent"), of_whom, rounded(nyquist * scale)),
         *(
             rounded(at_nyquist),

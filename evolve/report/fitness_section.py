@@ -12,7 +12,9 @@ from evolve.store.directory import Run
 
 __all__ = ["POPULATION", "fitness_section"]
 
-POPULATION = html("{} 10–90 % of the population, {} its median", key("muted band"), key("muted"))
+POPULATION = html(
+    "{} range from the 10th to the 90th percentile of the population, {} its median", key("muted band"), key("muted")
+)
 
 
 def fitness_section(run: Run) -> Html:
@@ -22,10 +24,10 @@ def fitness_section(run: Run) -> Html:
     rows, best = generation_statistics(run.candidates), run.best
     minus = ", minus costs" if any_costs(run.candidates) else ""
     caption = html(
-        "<b>{} over generations.</b> {} best so far and, pale, its 95 % bootstrap interval; "
-        '{}; a dot per candidate, <span class="vermillion">×</span> failed. Fitness is the mean return of {} '
-        "evaluation episodes after training{}. The best of many candidates is partly best by chance (selection bias); "
-        "the interval does not include that.",
+        "<b>{} over generations.</b> {} best so far, with its 95 % bootstrap interval in a pale shade; "
+        '{}; one dot for each candidate; <span class="vermillion">×</span> failed candidate. Fitness is the '
+        "mean return of {} evaluation episodes after training{}. The best of many candidates is partly best by chance "
+        "(selection bias); the interval does not include that.",
         *(hint("fitness", "Fitness"), key("accent"), POPULATION, run.config.evaluation.episodes, minus),
     )
     figures = figure(fitness_figure(rows, run.candidates), caption)
@@ -33,7 +35,7 @@ def fitness_section(run: Run) -> Html:
         figures += figure(costs_figure(run.candidates), _costs_caption(run))
     caption = html(
         "<b>Episodes solved.</b> Fraction of a candidate's evaluation episodes in which the task was solved (dots), "
-        "{} mean of the generation.",
+        "and {} the mean of the generation.",
         key("muted"),
     )
     figures += figure(success_figure(run.candidates), caption)
@@ -45,7 +47,7 @@ def fitness_section(run: Run) -> Html:
         figures += figure(learning_figure(run.candidates, best), caption)
         caption = html(
             "<b>Genealogy.</b> Each candidate and the nearest of its parents (click one for its row in the table); "
-            "{} the line of candidate {}: {}.",
+            "{} the line of descent of candidate {}: {}.",
             *(key("accent"), best.id, ", ".join(str(c.id) for c in descent(best, run.candidates))),
         )
         figures += figure(genealogy_figure(run.candidates, best), caption)
@@ -56,7 +58,7 @@ def _costs_caption(run: Run) -> Html:
     costs = run.config.costs
     prices = f"{costs.per_receptor:g} per receptor, {costs.per_eye:g} per eye, {costs.per_neuron:g} per neuron"
     return html(
-        "<b>Parts of fitness.</b> Task fitness is the mean return, and costs are {}: a dot per candidate, {} the best "
-        "so far. Fitness is their difference.",
+        "<b>Parts of fitness.</b> Task fitness is the mean return, and costs are {}. Each dot is a candidate; {} is "
+        "the best so far. Fitness is the task fitness minus the costs.",
         *(prices, key("accent")),
     )

@@ -34,10 +34,14 @@ from evolve.store.directory import Run
 __all__ = ["render"]
 
 VISION = {
-    "image quality": ("IQ", "image_quality", "area of the MTF above the noise, times throughput"),
-    "contrast": ("MTF", "contrast", "at half the receptors’ Nyquist frequency, in white daylight"),
-    "PSNR": ("PSNR [dB]", "psnr_db", "of the signals, scaled to equal brightness, relative to a perfect lens"),
-    "SSIM": ("SSIM", "ssim", "structural similarity to the signals behind a perfect lens"),
+    "image quality": ("IQ", "image_quality", "area between the MTF and the noise level, times throughput"),
+    "contrast": ("MTF", "contrast", "contrast (MTF) at half the receptors’ Nyquist frequency, in white daylight"),
+    "PSNR": (
+        "PSNR [dB]",
+        "psnr_db",
+        "peak signal-to-noise ratio, relative to the equally bright signals behind a perfect lens",
+    ),
+    "SSIM": ("SSIM", "ssim", "structural similarity of the signals to those behind a perfect lens"),
 }
 
 
@@ -121,13 +125,14 @@ def _dimensionless(gene: Gene) -> str:
 def _acuity(run: Run) -> Html:
     path, upwards = (trajectory(run.candidates, acuity) for acuity in (acuity_cpd, acuity_vertical_cpd))
     caption = html(
-        "<b>{}</b>: finest grating that the sampling allows, 1 / (2 min(placement range / (eyes − 1), fov / width))",
+        "<b>{}</b>: finest grating that the spacing of receptors can resolve, 1 / (2 min(placement range / (eyes − 1), "
+        "fov / width))",
         hint("acuity"),
     )
     drawn = figure(gene_figure("acuity", "cycles / degree", path, None), caption)
     if all(acuity_cpd(c.phenotype) == acuity_vertical_cpd(c.phenotype) for c in run.candidates):
         return drawn
-    caption = html("<b>vertical acuity</b>: the same for level gratings, 1 / (2 vertical fov / height)")
+    caption = html("<b>vertical acuity</b>: the same for gratings with horizontal bars, 1 / (2 vertical fov / height)")
     return drawn + figure(gene_figure("vertical-acuity", "cycles / degree", upwards, None), caption)
 
 
@@ -136,8 +141,8 @@ def _relief(run: Run, genes: list[Gene]) -> Html:
     left_out = "Frozen genes" + (", and genes that mirror others," if run.config.eye.relief_symmetric else "")
     turned = ", before the pupil is rotated by 180°" if run.config.eye.pupil_turned else ""
     caption = html(
-        "<b>{} … {}</b>: the {}, with each panel where its gene lies over the pupil (from in front of the eye: x to "
-        "the right, y up{}). {} are left out.",
+        "<b>{} … {}</b>: the genes of the {}. Each panel is at the position of its gene over the pupil, seen from in "
+        "front of the eye (x to the right, y up{}). {} are left out.",
         *(genes[0].name, genes[-1].name, hint("relief"), turned, left_out),
     )
     return html('<div class="wide">{}</div>\n', figure(relief_figure(paths), caption))
@@ -159,7 +164,8 @@ def vision_section(run: Run, doing: Doing) -> Html:
         if any(math.isfinite(value) for value in values):
             figures += figure(vision_figure(name, label, generations, values), html("<b>{}</b>: {}", name, meaning))
     content = html(
-        "<p>The best eye so far in each generation. Signals are without noise, at {} starts of episodes.</p>\n"
+        "<p>Values of the best eye so far in each generation. Signals are computed without noise at the starts of {} "
+        "episodes.</p>\n"
         '<div class="figures small">{}</div>\n',
         *(SCENES, figures),
     )
@@ -170,7 +176,9 @@ def candidates_section(run: Run) -> Html:
     """Return the section with the tables of all candidates and of failures."""
     what = "Task fitness" if any_costs(run.candidates) else "Fitness"
     intro = html(
-        "<p>{} is the mean return of the evaluation episodes; lowest and highest are single episodes.</p>\n", what
+        "<p>{} is the mean return of the evaluation episodes. The lowest and the highest returns are of single "
+        "episodes.</p>\n",
+        what,
     )
     everybody = tables.all_candidates(run) + tables.failures(run)
     return section("candidates", "Candidates", intro + everybody + tables.episode_failures(run))

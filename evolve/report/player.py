@@ -93,8 +93,8 @@ def _sights(episode: Episode) -> Html:
     pairs = [_pair(eye, name, size) for eye, name in enumerate(eyes.names())]
     brighter = "" if gain == 1 else f", brightened {rounded(gain)} times (1/a², to compensate for the pupil's area)"
     note = html(
-        "<b>Signals of the eyes</b>, left to right: receptor signals shown as linear red, green and blue, noise "
-        "included{}; next to them the same receptors behind a perfect lens, without noise.",
+        "<b>Signals of the eyes</b>, from left to right: receptor signals with noise, shown as linear red, green and "
+        "blue{}; next to them the signals of the same receptors behind a perfect lens, without noise.",
         brighter,
     )
     return html(
@@ -134,8 +134,9 @@ def _score(episode: Episode) -> Html:
     )
     return html(
         '<figure class="score"><canvas class="rewards" role="img" aria-label="Cumulated reward terms over time">'
-        "</canvas><dl>{}</dl><figcaption><b>Reward so far</b> (dimensionless), by term, weighted as in fitness and "
-        "including the current action. In the player, arrow keys step (with shift: ten steps) and space plays."
+        "</canvas><dl>{}</dl><figcaption><b>Reward so far</b> (dimensionless), by term. Terms have the same weights as "
+        "in the fitness and include the current action. In the player, the arrow keys move by one step (with shift: by "
+        "ten steps), and the space key starts and stops the replay."
         "</figcaption></figure>\n",
         cells,
     )

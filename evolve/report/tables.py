@@ -67,7 +67,7 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
         (
             html("Its {}", hint("acuity")),
             f"{_acuities(best.phenotype)} cpd",
-            f"cycles per degree{_directions([best])}, by sampling alone",
+            f"cycles per degree{_directions([best])}; limit by receptor spacing alone",
         ),
     ]
 

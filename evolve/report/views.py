@@ -25,13 +25,13 @@ def what_it_sees(episode: Episode) -> Html:
     shown = range(min(len(names), MOST_EYES))
     rows = joined(_row(episode, eye, names[eye], frame, lens) for eye in shown)
     brighter = f", brightened {rounded(gain)} times (1/a²)" if gain != 1 else ""
-    rest = f" The first {MOST_EYES} of {len(names)} eyes." if len(names) > MOST_EYES else ""
+    rest = f" Only the first {MOST_EYES} of {len(names)} eyes are shown." if len(names) > MOST_EYES else ""
     quality = psnr(episode.signals, episode.perfect_signals, gain)
     caption = html(
-        "<b>Views</b> at {} s of the episode above, left to right: the scene's {}, finely sampled; its {}’ {}s "
-        "behind a perfect lens; the signals behind its own optics, without noise{}; and the same signals with noise, "
-        "which are the input of the brain.{} Over the whole episode the signals have a PSNR of {} dB relative to those "
-        "of the perfect lens.",
+        "<b>Views</b> at {} s of the episode above, from left to right: the scene's {} on a fine grid; the {}’ {}s "
+        "behind a perfect lens; the signals behind the eye's own optics, without noise{}; and the same signals with "
+        "noise, which are the input of the brain.{} Over the whole episode the signals have a PSNR of {} dB relative "
+        "to those of the perfect lens.",
         *(rounded(time * episode.seconds), hint("radiance"), hint("receptor", "receptors"), hint("signal")),
         *(brighter, rest, rounded(quality)),
     )

@@ -1,5 +1,7 @@
-"""Evaluation of all candidates that are missing in a run. An executor evaluates them, and watchers show the
-progress."""
+"""Evaluation of all candidates that are missing in a run.
+
+An executor evaluates them, and watchers show the progress.
+"""
 
 from __future__ import annotations
 

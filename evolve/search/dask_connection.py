@@ -96,8 +96,9 @@ class Connection:
         self._pass_time(2 * LISTEN_S)
 
     def ask(self, call: Callable[[], Awaitable[Any]], timeout: float = math.inf) -> Any:
-        """Return the result of a call of Dask. By default, its duration is unlimited while the connection shows signs
-        of life.
+        """Return the result of a call of Dask.
+
+        By default, its duration is unlimited while the connection shows signs of life.
 
         Raises:
             ConnectionLost: the connection was lost during the call.
@@ -156,7 +157,7 @@ class Connection:
     def _pass_time(self, longest: float) -> None:
         """Add the time since the last check, note a long silence, and raise an error at the end of the patience.
 
-        longest: limit of the added time [s], because this process may have been stopped meanwhile
+        longest: limit of the added time [s]; this process may have been suspended since the last check
         """
         before, self._checked = self._checked, time.monotonic()
         self.signs.wait(min(self._checked - before, longest))

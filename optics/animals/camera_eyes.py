@@ -51,7 +51,7 @@ def human(receptors_across: int = 60, pupil_diameter: float = 3e-3) -> Eye:
     pupil_diameter: diameter [m] of the pupil, at most 6 mm.
 
     Raises:
-        ValueError: an argument outside its range.
+        ValueError: an argument is outside its range.
     """
     eye = HumanEye(pupil_diameter / 2)
     nodal = eye.focal_length / float(medium("chromatic_eye").at(570e-9))
@@ -69,7 +69,7 @@ def mouse(receptors_across: int = 40, pupil_diameter: float = 1e-3) -> Eye:
     pupil_diameter: diameter [m] of the pupil.
 
     Raises:
-        ValueError: an argument outside its range.
+        ValueError: an argument is outside its range.
     """
     nodal = 31e-6 * 180 / math.pi
     return _patch(_lens(pupil_diameter, nodal), 0.5, nodal, receptors_across, "mouse")
@@ -120,7 +120,7 @@ def goldfish(receptors_across: int = 40, radius: float = 1.4e-3) -> Eye:
     radius: radius [m] of the lens.
 
     Raises:
-        ValueError: an argument outside its range.
+        ValueError: an argument is outside its range.
     """
     lens = goldfish_lens(radius)
     return _patch(lens.pupil(0.9 * radius), 60 / 26, lens.focal_length(), receptors_across, "goldfish")
@@ -141,7 +141,7 @@ def jumping_spider(receptors_across: int = 30, eye: str = "principal") -> Eye:
     eye: "principal" or "secondary".
 
     Raises:
-        ValueError: an unknown eye, or receptors_across outside its range.
+        ValueError: the eye is unknown, or receptors_across is outside its range.
     """
     minutes, diameter, focal = SPIDER_EYES[one_of("eye", eye, SPIDER_EYES)]
     return _patch(_lens(diameter, focal), 30 / minutes, focal, receptors_across, "jumping_spider")

@@ -82,7 +82,7 @@ def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
     rings: rings of ommatidia around the central one.
 
     Raises:
-        ValueError: an unknown species, or rings outside 0 to 60.
+        ValueError: the species is unknown, or the number of rings is outside 0 to 60.
     """
     return AppositionEye(HONEYBEES[one_of("species", species, HONEYBEES)].ommatidium(), rings, 2.1)
 

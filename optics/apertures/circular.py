@@ -58,7 +58,7 @@ class Annulus(Aperture):
     """The unit disk without the disk of radius `inner`.
 
     Raises:
-        ValueError: inner outside (0, 1).
+        ValueError: inner is outside (0, 1).
     """
 
     inner: float

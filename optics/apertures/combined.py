@@ -40,7 +40,7 @@ class Combined(Aperture):
     shapes: apertures, or `Disk`, `Oblong` and `Spider`, which may lie anywhere.
 
     Raises:
-        ValueError: unknown rule, an argument that is not a shape, or an empty opening.
+        ValueError: the rule is unknown, an argument is not a shape, or the opening is empty.
     """
 
     rule: str
@@ -103,7 +103,7 @@ def union(*shapes: Shape) -> Combined:
 
 
 def difference(shape: Shape, *closed: Shape) -> Combined:
-    """Return an aperture that is open wherever the first shape, but none of the others, is open, within the pupil.
+    """Return an aperture that is open where the first shape is open and all others are closed, within the pupil.
 
     `difference(Annulus(0.3), Spider(4, 0.02))` is the aperture of a telescope.
 
@@ -135,8 +135,8 @@ def hexagonal_segments(
         from `rotation_deg` + 30 degrees. The mirror of the James Webb telescope has 2 rings without segment 0.
 
     Raises:
-        ValueError: rings outside 0 to 12, gap outside [0, 1), the number of a segment that does not exist, or no
-            segment left.
+        ValueError: rings is outside 0 to 12, gap is outside [0, 1), a segment in `without` does not exist, or no
+            segment is left.
     """
     rings = whole("rings", rings, 0, MOST_RINGS)
     in_range("gap", gap, 0, 0.999)

@@ -30,8 +30,8 @@ class Polygon(Aperture):
     vertices: (n, 2), x and y in units of R, clockwise or counterclockwise. They are stored counterclockwise.
 
     Raises:
-        ValueError: fewer than 3 vertices, NaN, a vertex outside the unit circle, two vertices that coincide, or edges
-            that cross.
+        ValueError: there are fewer than 3 vertices, one is NaN or outside the unit circle, two coincide, or edges
+            cross.
     """
 
     vertices: np.ndarray
@@ -50,7 +50,7 @@ class Polygon(Aperture):
         rotation_deg: angle of the first vertex from the x axis.
 
         Raises:
-            ValueError: n not a whole number from 3 to 10,000, or rotation_deg not finite.
+            ValueError: n is not a whole number from 3 to 10,000, or rotation_deg is not finite.
         """
         turned = np.deg2rad(finite("rotation_deg", rotation_deg))
         angle = turned + 2 * np.pi * np.arange(whole("n", n, 3, MOST_SIDES)) / n
@@ -100,7 +100,7 @@ class Slit(Aperture):
     """A centred rectangle of full `width` along x and `height` along y, in units of R.
 
     Raises:
-        ValueError: a side not positive, or a diagonal longer than the unit circle's diameter.
+        ValueError: a side is not positive, or the diagonal is longer than the unit circle's diameter.
     """
 
     width: float

@@ -30,7 +30,7 @@ class Rings(Aperture):
         open centre.
 
     Raises:
-        ValueError: radii that do not ascend, an odd number of radii, more than 500 radii, or a radius outside [0, 1].
+        ValueError: the radii do not ascend, their number is odd or above 500, or one is outside [0, 1].
     """
 
     radii: Any
@@ -54,7 +54,7 @@ class Rings(Aperture):
         radius √(nλf + n²λ²/4) (Fresnel). A tenth of the light, 1/π², reaches this focus.
 
         Raises:
-            ValueError: a length that is not positive, fewer than two zones, or more than 500.
+            ValueError: a length is not positive, or the number of zones is outside 2 to 500.
         """
         radius = positive("aperture_radius", aperture_radius)
         focal = positive("focal_length", focal_length)

@@ -36,7 +36,7 @@ class Disk:
     """A disk of the given radius about a centre (x, y), in units of R.
 
     Raises:
-        ValueError: a radius that is not positive or above 10, or a coordinate of the centre beyond 10.
+        ValueError: the radius is not positive or is above 10, or a coordinate of the centre is beyond ±10.
     """
 
     radius: float
@@ -61,8 +61,8 @@ class Oblong:
     """A rectangle about a centre (x, y), rotated by an angle. `width` and `height` are full lengths in units of R.
 
     Raises:
-        ValueError: a side that is not positive or above 20, a coordinate of the centre beyond 10, or an angle that is
-            not finite.
+        ValueError: a side is not positive or is above 20, a coordinate of the centre is beyond ±10, or the angle is not
+            finite.
     """
 
     width: float
@@ -100,7 +100,7 @@ class Spider:
     rotation_deg: angle of the first vane from the x axis.
 
     Raises:
-        ValueError: vanes outside 1 to 64, or a width outside (0, 1].
+        ValueError: vanes is outside 1 to 64, or width is outside (0, 1].
     """
 
     vanes: int

@@ -28,7 +28,7 @@ Shape: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 def parabola(u: np.ndarray) -> np.ndarray:
-    """Return 1 - u², Matthiessen's profile."""
+    """Return Matthiessen's profile 1 - u² at u = r/R."""
     return 1 - u * u
 
 
@@ -47,7 +47,7 @@ class BallLens:
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states, or the profile traps light inside
-            the lens (n r must grow from the centre to the surface).
+            the lens. No light is trapped if n r grows from the centre to the surface.
     """
 
     radius: float
@@ -75,7 +75,7 @@ class BallLens:
         lenses of fish (Matthiessen, Pflügers Archiv 27, 510, 1882).
 
         Raises:
-            ValueError: focal_ratio outside [1, 20].
+            ValueError: focal_ratio is outside [1, 20].
         """
         relative = generalized_luneburg(focal_ratio)
         core, medium = float(relative(np.zeros(1))[0]), float(index_of("medium_n", medium_n).at(MIDDLE))
@@ -83,8 +83,10 @@ class BallLens:
 
     @classmethod
     def maxwell(cls, radius: float, medium_n: float = 1.0) -> BallLens:
-        """Return Maxwell's fish-eye, n = 2 n_medium/(1 + (r/R)²): it images each point of its surface on the opposite
-        point."""
+        """Return Maxwell's fish-eye, n = 2 n_medium/(1 + (r/R)²).
+
+        It images each point of its surface on the opposite point.
+        """
         medium = float(index_of("medium_n", medium_n).at(MIDDLE))
         return cls(radius, 2 * medium, medium, medium, lambda u: (1 - u * u) / (1 + u * u))
 
@@ -101,7 +103,7 @@ class BallLens:
         height: distance [m] at which the ray would pass the centre without the lens, below R and above 0.
 
         Raises:
-            ValueError: a height outside the lens.
+            ValueError: a height is outside the lens.
         """
         return _profile(self, wavelength).turning(self._relative(height))
 

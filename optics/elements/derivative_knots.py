@@ -1,9 +1,9 @@
 """Inputs of a PSF that carry derivatives, and the cells in which these derivatives are polynomials.
 
 A small change of one sample of a map multiplies the light behind the pupil by a cardinal spline. This spline is a
-different cubic polynomial in every cell between two knots, whatever the values of the map are: the derivative with
-respect to the samples of a flat map has the same detail as that of a rough map. Samples of the pupil that resolve only
-the light therefore give wrong derivatives, and quadrature nodes are placed in each cell instead.
+different cubic polynomial in every cell between two knots, whatever the values of the map are. The derivative with
+respect to the samples of a flat map therefore has the same detail as that of a rough map. Samples of the pupil that
+resolve only the light therefore give wrong derivatives, and quadrature nodes are placed in each cell instead.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ class DerivativeKnots:
     names: tuple[str, ...]
 
     def without_maps(self, pupil: Pupil) -> Pupil:
-        """Return the pupil without the maps. The cells resolve them, so that their bandwidth does not matter."""
+        """Return the pupil without the maps. The cells between knots resolve them, so their bandwidth does not
+        matter.
+        """
         without: dict[str, Any] = dict.fromkeys(self.names)
         return replace(pupil, **without)
 

@@ -93,8 +93,8 @@ class ExitPupil:
     def moved(self, shift: float, origin: tuple[float, float] | None = None) -> ExitPupil:
         """Return the exit pupil for a parallel image plane, `shift` [m] farther along the light.
 
-        To compute PSFs out of focus, move the image plane in this way: light that arrives at an angle also moves along
-        the plane, and `optics.psf` at another sensor distance would ignore that.
+        To compute PSFs out of focus, move the image plane in this way. Light that arrives at an angle then also moves
+        along the plane, which `optics.psf` at another sensor distance would ignore.
 
         origin: point (x, y) [m] of the image plane that becomes the origin of the PSF. Exit pupils of several
             wavelengths with a common origin include lateral colour. None: the ray through the pupil's centre.
@@ -119,9 +119,9 @@ def read_exit_pupil(
 ) -> ExitPupil:
     """Convert a lens from another program to a pupil with a wavefront.
 
-    The pupil is a circle, an ellipse or, if a lens mount cuts off part of the light, a convex polygon. The PSF is that
-    on the image plane, which the light may reach at an angle: the pupil has the direction sines of the rays along the
-    image plane, minus those of the ray through its centre.
+    The pupil is a circle, an ellipse or, if a lens mount cuts off part of the light, a convex polygon. The light may
+    reach the image plane at an angle. The PSF is then the PSF on this plane: the pupil has the direction sines of the
+    rays along the plane, minus those of the ray through its centre.
 
     system: an object of one of two kinds. The first has pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like
         optiland's WavefrontData with any distribution of rays. The second has data (complex), dx [mm] and wavelength
@@ -134,8 +134,8 @@ def read_exit_pupil(
         of the lens. Objects of the second kind contain no directions; their image plane is parallel to the pupil.
 
     Raises:
-        ValueError: an object with neither set of attributes; too few samples; a pupil that is obscured, not convex or
-            unevenly illuminated; an argument that the object does not support; or an invalid argument.
+        ValueError: the object has neither set of attributes, an argument is invalid or not supported by the object,
+            there are too few samples, or the pupil is obscured, not convex or unevenly illuminated.
     """
     vacuum_wavelength(wavelength)
     count = whole("order", order, 1, 30)

@@ -50,8 +50,8 @@ class ExitPupils(ReadOnlyArrays):
 
         Sums over the PSFs of these pupils include lateral colour. The origin is the image at the middle wavelength.
 
-        field: number of the field, counted from 0. shift: distance [m] by which the image plane is moved along the
-            light.
+        field: number of the field, counted from 0.
+        shift: distance [m] by which the image plane is moved along the light.
 
         Raises:
             ValueError: there is no such field, or the shift is not finite.

@@ -119,7 +119,7 @@ class HumanEye:
         `optics.MTF.profile` expects the result.
 
         Raises:
-            ValueError: a negative or invalid number.
+            ValueError: a number is negative or invalid.
         """
         return _not_negative(cycles_per_degree) * (180 / math.pi) / self._nodal_distance
 
@@ -129,7 +129,7 @@ class HumanEye:
         Use it as `sensor_width` of an `optics.Eye` with this eye's pupil.
 
         Raises:
-            ValueError: fov_deg outside [1e-3, 170].
+            ValueError: fov_deg is outside [1e-3, 170].
         """
         return 2 * self._nodal_distance * math.tan(math.radians(in_range("fov_deg", fov_deg, 1e-3, 170)) / 2)
 

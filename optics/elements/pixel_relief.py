@@ -22,13 +22,13 @@ REPETITIONS = 32  # choice: repetitions of the pixels' spectrum to include; at m
 class PixelRelief(Relief):
     """Heights [m] of n x n square pixels that fill the square [-a, a]²: a stepped diffractive optical element.
 
-    samples: heights [m], (n, n), (y, x). To wrap a smooth height h to one wave and quantise it to N levels, in glass of
-        index n, use `np.round(h / step) % N * step` with step = wavelength / (n - 1) / N.
+    samples: heights [m], (n, n), (y, x). To wrap a smooth height h to one wave and quantise it to N levels, use
+        `np.round(h / step) % N * step`. In glass of index n, step = wavelength / (n - 1) / N.
 
     A Dr.Jit or PyTorch tensor may carry derivatives. For smooth surfaces use `HeightMap`, which interpolates.
 
     Raises:
-        ValueError: not square, empty, or not finite.
+        ValueError: the array is not square, is empty, or contains a number that is not finite.
     """
 
     samples: np.ndarray | Array

@@ -96,7 +96,7 @@ class Sellmeier(Dispersion):
     poles_um2: C [µm²], one for each of the strengths.
 
     Raises:
-        ValueError: no terms, different numbers of strengths and poles, or numbers that are not finite.
+        ValueError: there are no terms, the numbers of strengths and poles differ, or a number is not finite.
     """
 
     strengths: tuple[float, ...]
@@ -162,7 +162,7 @@ def medium(name: str) -> Dispersion:
     name: "water", "cornea", "aqueous", "vitreous", or "chromatic_eye", the single medium of Thibos' reduced human eye.
 
     Raises:
-        ValueError: unknown medium.
+        ValueError: the medium is unknown.
     """
     return MEDIA[one_of("medium", name, MEDIA)]
 

@@ -87,7 +87,7 @@ class BSplineRelief(Relief):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: not 4 x 4 finite numbers.
+        ValueError: control_points are not 4 x 4 finite numbers.
     """
 
     scatters = False  # the slopes of a polynomial describe all its content
@@ -167,7 +167,7 @@ class HeightMap(Relief):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: not of two dimensions, empty, or not finite.
+        ValueError: the array is not two-dimensional, is empty, or contains a number that is not finite.
     """
 
     samples: np.ndarray | Array

@@ -115,7 +115,7 @@ def generalized_luneburg(focal_ratio: float) -> Callable[[np.ndarray], np.ndarra
     Sources: Luneburg, Mathematical Theory of Optics, 1964, §29; Morgan, J. Appl. Phys. 29, 1358, 1958.
 
     Raises:
-        ValueError: focal_ratio outside [1, 20].
+        ValueError: focal_ratio is outside [1, 20].
     """
     s = in_range("focal_ratio", focal_ratio, 1.0, 20.0)
     v, weights = gauss_legendre(NODES)

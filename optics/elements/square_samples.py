@@ -20,7 +20,7 @@ def square_samples(samples: Any, name: str = "height", what: str = "heights [m]"
     """Return samples with equal numbers of rows and columns, without derivatives, as a read-only array.
 
     Raises:
-        ValueError: not square, empty, or not finite.
+        ValueError: the array is not square, is empty, or contains a number that is not finite.
     """
     heights = map_samples(samples, name, what)
     if heights.shape[0] != heights.shape[1]:
@@ -32,7 +32,7 @@ def map_samples(samples: Any, name: str = "height", what: str = "heights [m]") -
     """Return rows and columns of samples without derivatives, as a read-only array.
 
     Raises:
-        ValueError: not of two dimensions, empty, or not finite.
+        ValueError: the array is not two-dimensional, is empty, or contains a number that is not finite.
     """
     heights = np.array(plain_reals(name, samples))
     if heights.ndim != 2 or heights.size == 0:

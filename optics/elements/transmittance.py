@@ -67,7 +67,7 @@ class GaussianMask(Mask):
     waist: w [m]; a number of Dr.Jit or PyTorch may carry a derivative.
 
     Raises:
-        ValueError: not positive.
+        ValueError: waist is not positive.
     """
 
     waist: Scalar
@@ -110,7 +110,7 @@ class MaskMap(Mask):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: samples that are not two-dimensional, are empty or are not finite; or an amplitude outside [-1, 1].
+        ValueError: the samples are not two-dimensional, are empty or are not finite, or one is outside [-1, 1].
             The spline can exceed this range at jumps of the samples.
     """
 

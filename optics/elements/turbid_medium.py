@@ -70,7 +70,7 @@ class TurbidMedium:
     refractive_index: refractive index of the medium, such as `optics.medium("water")`; None: air
 
     Raises:
-        ValueError: an argument of another type.
+        ValueError: an argument has the wrong type.
     """
 
     attenuation: Spectrum
@@ -123,18 +123,18 @@ class TurbidMedium:
 def sea_water(chlorophyll: float) -> TurbidMedium:
     """Return sea water with this concentration of chlorophyll [mg/m³], in [0, 30].
 
-    Absorption and scattering follow the classic model of case 1 waters: a = a_w + a_p + 0.2 a_p(440) exp(-0.014 (λ -
-    440)), with a_p = 0.06 A(λ) C^0.65, and b = b_w + 0.30 C^0.62 (550/λ), λ in nm. Pure sea water scatters b_w = 16.06
-    · 4.72e-4 (400/λ)^4.32. The veiling light is ½ b/(a + b): water scatters light that comes from above, equally from
-    all directions of the upper hemisphere.
+    Absorption and scattering follow the classic model of case 1 waters, with λ in nm. Absorption is a = a_w + a_p + 0.2
+    a_p(440) exp(-0.014 (λ - 440)) with a_p = 0.06 A(λ) C^0.65. Scattering is b = b_w + 0.30 C^0.62 (550/λ). Pure sea
+    water scatters b_w = 16.06 · 4.72e-4 (400/λ)^4.32. The veiling light is ½ b/(a + b): water scatters light that comes
+    from above, equally from all directions of the upper hemisphere.
 
     Sources: Gordon & Morel (1983), Remote Assessment of Ocean Color; Morel (1974); Mobley (1994), Light and Water,
-    equations 3.27 and 3.40. For absorption: `water_absorption`, `phytoplankton_absorption`. Below 400 nm, A is assumed
-    to be constant, which is uncertain. With 0.15 and 1 mg/m³, c at 514 nm is 0.15 and 0.40 per metre, as Petzold (1972)
-    measured in clear ocean water and in coastal water.
+    equations 3.27 and 3.40. The sources of the absorption are in `water_absorption` and `phytoplankton_absorption`.
+    Below 400 nm, A is assumed to be constant, which is uncertain. With 0.15 and 1 mg/m³, c at 514 nm is 0.15 and 0.40
+    per metre, as Petzold (1972) measured in clear ocean water and in coastal water.
 
     Raises:
-        ValueError: a concentration outside the range.
+        ValueError: the concentration is outside its range.
     """
     chlorophyll = in_range("chlorophyll", chlorophyll, 0.0, 30.0)
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1, STEP_NM)
@@ -148,12 +148,12 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
 def fog(visibility: float) -> TurbidMedium:
     """Return fog of this meteorological visibility [m], in [1, 1e6].
 
-    Droplets are large compared with wavelengths, so c = ln(50) / visibility is the same at all wavelengths
-    (Koschmieder 1924): a black object at this distance has a contrast of 2 % with the horizon. They absorb almost no
-    light, so the veiling light is as bright as a white surface in daylight.
+    The coefficient c = ln(50) / visibility is the same at all wavelengths, because droplets are large compared with
+    wavelengths. At the distance `visibility`, a black object has a contrast of 2 % with the horizon (Koschmieder 1924).
+    Droplets absorb almost no light, so the veiling light is as bright as a white surface in daylight.
 
     Raises:
-        ValueError: a visibility outside the range.
+        ValueError: the visibility is outside its range.
     """
     c = -math.log(JUST_VISIBLE) / in_range("visibility", visibility, 1.0, 1e6)
     return TurbidMedium(Spectrum(LIMITS_NM, (c, c)), Spectrum(LIMITS_NM, (FROM_EVERYWHERE,) * 2))
@@ -170,7 +170,7 @@ def turbid_medium(name: str) -> TurbidMedium | None:
     name: "air", "clear_ocean" (`sea_water(0.15)`), "coastal_water" (`sea_water(1)`) or "fog" (`fog(50)`)
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: the name is unknown.
     """
     one_of("medium", name, MEDIA_OF_WORLDS)
     made = {"clear_ocean": lambda: sea_water(0.15), "coastal_water": lambda: sea_water(1.0), "fog": lambda: fog(50.0)}

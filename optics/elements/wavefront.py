@@ -89,10 +89,10 @@ class Zernike(Aberration):
     radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: the pupil's
         radius.
 
-    A vector of Dr.Jit or PyTorch, or their numbers in a dictionary, carry derivatives.
+    A Dr.Jit or PyTorch vector, or a dictionary of such numbers, may carry derivatives.
 
     Raises:
-        ValueError: an unknown mode, an order above 30, or a coefficient that is not finite.
+        ValueError: a mode is unknown, its order is above 30, or a coefficient is not finite.
     """
 
     # A mode has n/2 cycles; its slopes, which grow with n² at the rim, cover higher frequencies.
@@ -121,7 +121,7 @@ class Zernike(Aberration):
         Noll's polynomials have the normalisation of OSA, a variance of 1. Astronomy and poppy use them.
 
         Raises:
-            ValueError: a number outside 1 to 496, or see `Zernike`.
+            ValueError: a number is outside 1 to 496, or a coefficient is invalid, see `Zernike`.
         """
         return cls(numbered(coefficients_um, noll_mode), radius)
 
@@ -133,7 +133,7 @@ class Zernike(Aberration):
         divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use them.
 
         Raises:
-            ValueError: a number outside 1 to 36, or see `Zernike`.
+            ValueError: a number is outside 1 to 36, or a coefficient is invalid, see `Zernike`.
         """
         named = numbered(coefficients_um, fringe_mode)
         return cls({key: value / norm(*key) for key, value in named.items()}, radius)
@@ -210,7 +210,7 @@ class WavefrontMap(Aberration):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: not of two dimensions, empty, or not finite.
+        ValueError: the array is not two-dimensional, is empty, or contains a number that is not finite.
     """
 
     samples: np.ndarray | Array

@@ -33,7 +33,7 @@ def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
     interommatidial_deg: interommatidial angle Δφ.
 
     Raises:
-        ValueError: an argument that is not positive, or an angle above 180°.
+        ValueError: an argument is not positive, or an angle is above 180°.
     """
     angle = positive("interommatidial_deg", interommatidial_deg, "degrees")
     return positive("diameter", diameter) * math.radians(in_range("interommatidial_deg", angle, 0.0, 180.0))
@@ -48,7 +48,7 @@ def least_eye_parameter(wavelength: float, lattice: str = "hexagon") -> float:
     wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
 
     Raises:
-        ValueError: an invalid wavelength or an unknown lattice.
+        ValueError: the wavelength is invalid, or the lattice is unknown.
     """
     one_of("lattice", lattice, PERIODS)
     return vacuum_wavelength(wavelength) / PERIODS[lattice]
@@ -61,7 +61,7 @@ def sampling_acuity(spacing_deg: float, lattice: str = "hexagon") -> float:
     lattice: "hexagon" or "square".
 
     Raises:
-        ValueError: an angle that is not positive, or an unknown lattice.
+        ValueError: an angle is not positive, or the lattice is unknown.
     """
     one_of("lattice", lattice, PERIODS)
     return 1 / (PERIODS[lattice] * positive("spacing_deg", spacing_deg, "degrees"))
@@ -77,7 +77,7 @@ def anatomical_acuity(density: float, nodal_distance: float, lattice: str = "hex
     lattice: "hexagon" or "square".
 
     Raises:
-        ValueError: an argument that is not positive, or an unknown lattice.
+        ValueError: an argument is not positive, or the lattice is unknown.
     """
     cell = 1 / positive("density", density, "1/m²")
     one_of("lattice", lattice, PERIODS)
@@ -100,15 +100,15 @@ def ideal_contrast_sensitivity(
     cycles_per_degree: frequencies of the gratings.
     contrast: contrast T that optics and receptors transfer at these frequencies, in [0, 1], of the same shape. For
         example `mean_human_mtf(cycles_per_degree, 2e-3)`.
-    photons: number N of photons that the receptors absorb from one square degree during the presentation, such as
-        `PhotonBudget.photons` with the etendue pupil area · (π/180)² times the fraction of the retina that receptors
-        cover.
+    photons: number N of photons that the receptors absorb from one square degree during the presentation.
+        `PhotonBudget.photons` returns it, if the etendue is the pupil's area times (π/180)² times the fraction of the
+        retina that receptors cover.
     area: area A of the grating [square degrees], a number or one for each frequency. For n · n cycles at the frequency
         u, it is (n/u)². For a smooth window, it is the integral of the squared window.
     d_prime: detectability d' at the threshold. 0.954 corresponds to 75 % correct choices between two intervals.
 
     Raises:
-        ValueError: numbers outside their ranges, or arrays of different shapes.
+        ValueError: a number is outside its range, or arrays have different shapes.
     """
     u, transferred = reals("cycles_per_degree", cycles_per_degree), reals("contrast", contrast)
     sizes = reals("area", area)

@@ -87,16 +87,16 @@ def camera_image(
     integrated over pixels and weighted by the filters. Electrons are counted with shot noise, up to the full well. Read
     noise is added, and the sum is rounded to digital numbers.
 
-    scene: sRGB image (Y, X, 3) with values in [0, 1], as in image files, or radiance (band, Y, X) of the bands of
-        `camera_eye(lens, sensor).spectral_bands`, relative to a white surface. An sRGB image becomes reflectances in
-        daylight (`srgb_basis`). The scene has samples_per_pixel² cells for each pixel, and may exceed the sensor by an
-        even number of cells along each axis. It is upright: row 0 is the top, column 0 the left.
+    scene: sRGB image (Y, X, 3) with values in [0, 1], as in image files, or radiance (band, Y, X). The radiance is
+        relative to a white surface, in the bands of `camera_eye(lens, sensor).spectral_bands`. An sRGB image becomes
+        reflectances in daylight (`srgb_basis`). The scene has samples_per_pixel² cells for each pixel, and may exceed
+        the sensor by an even number of cells along each axis. It is upright: row 0 is the top, column 0 the left.
     lens: a pupil, or an eye, which has its own receptors and noise.
     sensor: the sensor behind a pupil; None for an eye.
     depth: distance [m] of the scene along the axis: a number, or a map with one distance per cell (Y, X).
     samples_per_pixel: cells of the scene per pixel along each axis. Defocused edges need more than one.
     field_zones: number of PSFs across the width of the field, or "auto", see `Eye.sight`. 1 uses the PSF on the axis.
-    rng: random generator of the noise. None: no noise; electrons are their mean numbers.
+    rng: random generator of the noise. None: no noise; the result contains mean numbers of electrons.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         focuses an infinitely distant point.
     tolerance: relative error of the PSF, see `Eye`.

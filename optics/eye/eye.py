@@ -39,8 +39,8 @@ class Eye(EyeSpec):
 
     Pupil and retina have the axes of the OSA and of ANSI Z80.28, as seen by an observer in front of the eye: x to the
     right, which is the owner's left, and y up. The image is inverted. Rows that ascend with y and columns that ascend
-    with x are therefore in the order of the visual field: row 0 sees the top, column 0 the left. All arrays have this
-    order.
+    with x are therefore in the order of the visual field. Row 0 sees the top, and column 0 sees the left. All arrays
+    have this order.
 
     pupil: a Pupil. None is a perfect lens without blur and with a throughput of 1.
     resolution: number of receptors (height, width). Receptors are square with the side sensor_width / width, unless
@@ -50,9 +50,9 @@ class Eye(EyeSpec):
     sensor_width: L, width [m] of the retina or of the modelled patch of it.
     full_aperture: diameter [m] of a pupil with a throughput of 1 (None: L).
     eccentricity_deg: (right, up), viewing direction of the middle of the patch in the visual field.
-    bands: number of spectral bands, 1 to 64, or "auto": the fewest that keep the predicted error of a receptor's signal
-        within the tolerance. "auto" computes PSFs at many wavelengths, which is worthwhile for an eye that is used
-        often. This field then contains the chosen number.
+    bands: number of spectral bands, 1 to 64. "auto": the smallest number for which the predicted error of a receptor's
+        signal is within the tolerance. It requires PSFs at many wavelengths, which is worthwhile for an eye that is
+        used often. This field then contains the chosen number.
     noise_sigma: standard deviation of a receptor's Gaussian noise, in units of the signal.
     photon_budget: light level. Shot noise is added before the Gaussian noise (None: no shot noise).
     receptors: types of receptor: "rgb" (three channels: red, green, blue), "lms" (human cones), "honeybee", "goldfish",
@@ -79,7 +79,7 @@ class Eye(EyeSpec):
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
-        AccuracyError: microvilli behind a pupil whose rays are too steep for the tolerance.
+        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance.
     """
 
     @property
@@ -171,8 +171,9 @@ class Eye(EyeSpec):
 
         z: distances [m] in the scene, a number or an array. Only the nearest and the farthest distance matter, except
             for "distinct" layers.
-        depth_layers: number of kernels between the nearest and the farthest distance, evenly spaced in 1/z; or "auto",
-            the fewest within the tolerance; or "distinct", one kernel for each different distance in z, at most 64.
+        depth_layers: number of kernels between the nearest and the farthest distance, evenly spaced in 1/z. "auto": the
+            smallest number that meets the tolerance. "distinct": one kernel for each different distance in z, at most
+            64.
         field_zones: number of kernels across the width of the field; or "auto". With 1, the kernel on the axis is used
             for the whole retina.
         tolerance: largest error of a receptor's signal, relative to the signal of a white surface, for any scene at
@@ -223,15 +224,15 @@ class Eye(EyeSpec):
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or a map with one per cell (Y, X). In a map, near surfaces
             hide far ones at jumps of depth (see `optics.eye.occlusion`). Behind them, far surfaces continue with their
-            nearest visible cell. Up to 17 different distances have a kernel each, more share kernels within the
-            tolerance.
+            nearest visible cell. Up to 17 different distances have one kernel each. If there are more, distances share
+            kernels within the tolerance.
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its
             range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
             last call are kept. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
-        polarization: (degree, angle_deg) of the light, for an eye with microvilli: the degree of linear polarisation in
-            [0, 1], and the angle of the electric field, from right towards up. Each is a number or an array (band,),
-            (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do not
-            distinguish.
+        polarization: (degree, angle_deg) of the light, for an eye with microvilli. These are the degree of linear
+            polarisation in [0, 1], and the angle of the electric field, from right towards up. Each is a number or an
+            array (band,), (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do
+            not distinguish.
 
         Raises:
             ValueError: radiance has another shape or is not finite; z has another shape, is not positive or holds NaN;

@@ -137,8 +137,10 @@ class EyeSpec:
 
     @property
     def aperture_throughput(self) -> Scalar:
-        """Throughput without the mask, by which signals from kernels are multiplied. Kernels contain the mask's
-        transmission."""
+        """Throughput without the mask, by which signals from kernels are multiplied.
+
+        Kernels contain the mask's transmission.
+        """
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
     @property

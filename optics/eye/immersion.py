@@ -23,10 +23,10 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
     and the field of view does not change. A perfect lens is perfect in every medium. Air and fog have no effect.
 
     eye: an `optics.Eye`
-    medium: None: air
+    medium: the medium in front of the pupil; None: air
 
     Raises:
-        ValueError: an argument of another type.
+        ValueError: an argument has the wrong type.
     """
     of_kind("eye", eye, EyeSpec, "optics.Eye()")
     if medium is not None:

@@ -54,8 +54,9 @@ def microvilli_of(given: Any) -> Tile | None:
 
 
 def polarised_error(pupil: Pupil, distance: float) -> float:
-    """Return an upper bound on the error in polarised signals due to oblique rays, relative to a white surface's
-    signal.
+    """Return an upper bound on the error in polarised signals due to oblique rays.
+
+    It is relative to the signal of a white surface.
 
     distance: distance [m] of the retina from the pupil.
     """

@@ -18,7 +18,7 @@ hankel               the angular spectrum of rotationally symmetric pupils, alon
 low_rank             one matrix product, with a Fourier kernel times a slow factor
 slow_factor          this factor, and the points of the window that interpolate it
 window_sampling      the same method at coarse tolerances: few samples, from the light in the window
-window_check error of such a PSF, by a sum over other samples in a few rows and columns
+window_check         error of such a PSF, by a sum over other samples in a few rows and columns
 window_sums          their sums, and the adjoint of these sums
 far_field            one Fourier transform onto directions for each of a few nodes of the window
 far_field_nodes      the choice of these nodes, and their weights in every direction

@@ -172,8 +172,8 @@ def _slow_part(
 ) -> np.ndarray:
     """Return the slow factor (ρ/D)² (1 + i/(kD)) exp(ik(D - ρ + s·ξ)).
 
-    D is the distance from the pupil's point ξ to the point (z tan(angle), y, z), ρ the distance from the pupil's centre
-    to that point, and s the direction from the centre to it.
+    P is the point (z tan(angle), y, z). D is the distance from the pupil's point ξ to P, ρ is the distance from the
+    pupil's centre to P, and s is the direction from the centre to P.
     """
     x = problem.distance * np.tan(angle)
     rho = np.sqrt(x * x + y * y + problem.distance**2)

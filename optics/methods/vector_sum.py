@@ -6,8 +6,8 @@ plane wave:
     E(c + x) = -ik/2π ∫ P(ξ) e^{ik(L + D)} g(ξ) e(ξ) e^{ik s·x} dξ,   s = (c - ξ)/D,   g = z/D².
 
 L is the path through the pupil, and e is the field of rays behind it (`ray_field`). With e = 1, this is the
-Rayleigh-Sommerfeld integral about c with one approximation: for all points of the pupil, the term ik(|x|² - (s·x)²)/2D
-of the exponent is replaced by its value at the pupil's centre. With rotational symmetry, the sum equals the integral of
+Rayleigh-Sommerfeld integral about c with one approximation. The term ik(|x|² - (s·x)²)/2D of the exponent is replaced
+by its value at the pupil's centre for all points of the pupil. With rotational symmetry, the sum equals the integral of
 Richards and Wolf (1959).
 """
 

@@ -178,7 +178,7 @@ def _samples(problem: Problem, half: float, density: float, ripple: float, shift
 def _rank(problem: Problem, pupil: SineSamples, half: float) -> int | None:
     """Return the necessary rank.
 
-    It is sufficient for the end points of rays, around which the light is. Derivatives may change this light, so the
+    It is sufficient for the end points of rays, near which the light arrives. Derivatives may change this light, so the
     rank is then sufficient for all points. The Fourier kernel does not change with the distance of the window, so that
     a derivative with respect to the distance needs at least linear interpolation.
     """

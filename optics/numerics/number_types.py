@@ -1,5 +1,7 @@
-"""Checks of arrays from the user. They refuse half precision and masked elements, and carry out lazy operations of
-PyTorch."""
+"""Checks of arrays from the user.
+
+They refuse half precision and masked elements, and carry out lazy operations of PyTorch.
+"""
 
 from __future__ import annotations
 

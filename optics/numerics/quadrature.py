@@ -1,8 +1,8 @@
 """The number of quadrature nodes that a wave needs, and Gauss-Legendre nodes.
 
 The error of both rules here is due to aliasing. With n equidistant nodes on a circle, harmonics of e^{iz cos φ} of
-order n and above alias; their amplitudes are J_n(z) and beyond (Jacobi-Anger expansion). n Gauss-Legendre nodes are
-exact for polynomials up to degree 2n - 1. The Chebyshev series of a wave whose phase is ±z radians at the ends has the
+orders m >= n alias. Their amplitudes are J_m(z) (Jacobi-Anger expansion). n Gauss-Legendre nodes are exact for
+polynomials up to degree 2n - 1. The Chebyshev series of a wave whose phase is ±z radians at the ends has the
 coefficients 2 J_m(z). The same number therefore determines both rules: the smallest m from which on 2 |J_m(z)| stays
 below the requested error.
 """

@@ -27,7 +27,7 @@ def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
     The angle between neighbours is Δφ, and rows run along x.
 
     Raises:
-        ValueError: rings outside 0 to 60, or an angle that is not positive.
+        ValueError: rings is outside 0 to 60, or the angle is not positive.
     """
     whole("rings", rings, 0, MOST_RINGS)
     apart = math.radians(positive("interommatidial_deg", interommatidial_deg, "degrees"))
@@ -101,7 +101,7 @@ class AppositionEye:
         1/(√3 Δφ).
 
         Raises:
-            ValueError: a negative frequency, or numbers that are not finite.
+            ValueError: a frequency is negative, or a number is not finite.
         """
         in_range("cycles_per_degree", cycles_per_degree, 0.0, 1e9)
         turn = math.radians(finite("azimuth_deg", azimuth_deg))

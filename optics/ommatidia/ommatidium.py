@@ -76,7 +76,7 @@ class Ommatidium:
             opposite direction, so the angles of its `PointSource` are the negative of these.
 
         Raises:
-            ValueError: an angle whose sine is above 0.5, angles of different shapes, or a rhabdom without guided modes.
+            ValueError: an angle's sine is above 0.5, the angles have different shapes, or the rhabdom has no modes.
         """
         x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)
         try:
@@ -169,7 +169,7 @@ def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wave
     focal_length: focal length f = n₀/P [m] in front of the lens.
 
     Raises:
-        ValueError: a length that is not positive.
+        ValueError: a length is not positive.
     """
     for name, value in (("diameter", diameter), ("focal_length", focal_length), ("rhabdom", rhabdom)):
         positive(name, value)

@@ -104,9 +104,10 @@ def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
 def _at_edge(request: Request) -> Array:
     """Return the factor on the evanescent light of an edge that is due to the directions of rays at the edge.
 
-    In units of 1/λ, the light at a point of the edge is spread along the line s + t n, where s is the frequency of the
-    ray, and n the normal of the edge. Its power is proportional to 1/t². The line leaves the unit circle at t = -s·n ±
-    √((s·n)² + 1 - s²), beyond which lies √((s·n)² + 1 - s²) / (1 - s²) times the power for s = 0.
+    The light at a point of the edge is spread along the line s + t n of frequencies, in units of 1/λ. Here s is the
+    frequency of the ray, and n is the normal of the edge. Its power is proportional to 1/t². The line leaves the unit
+    circle at t = -s·n ± √((s·n)² + 1 - s²). The power outside the circle is √((s·n)² + 1 - s²) / (1 - s²) times the
+    power for s = 0.
     """
     import drjit as dr
 
@@ -210,7 +211,8 @@ class _Sum:
     def _slopes(at: Sequence[Array], places: Sequence[Array], back: Sequence[Array], total: Array) -> tuple[Array, ...]:
         """Return the derivatives of the sum by h, by the waves and by the amplitudes of the nodes.
 
-        at: h, waves and amplitudes · places: x, y of the nodes, sx, sy of the frequencies
+        at: h, waves and amplitudes
+        places: x, y of the nodes, and sx, sy of the frequencies
         back: w times the conjugate of the spectrum at each frequency, real and imaginary part
         """
         import drjit as dr
@@ -237,7 +239,8 @@ def _turned(re: Array, im: Array, turns: Array) -> tuple[Array, Array]:
 def _sums(to: tuple[Array, Array, float], of: Sequence[Array]) -> tuple[Array, Array]:
     """Return the real and imaginary part of Σ (a + ib) exp(2πi (c W - fx x - fy y)) at every (fx, fy).
 
-    to: fx, fy (point,), and the factor c · of: x, y, W, a, b (term,)
+    to: fx, fy (point,), and the factor c
+    of: x, y, W, a, b (term,)
     """
     import drjit as dr
 

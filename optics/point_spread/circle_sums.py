@@ -1,8 +1,9 @@
 """Sums over samples within circles about one centre, computed for all circles at once.
 
-Sums over samples are integrals if frequencies that alias onto those of the intensity are removed. The weight of a
-sample at the distance ρ from the centre of a circle of radius R is therefore the circle, convolved with a kernel whose
-radial spectrum G is 1 at the intensity's frequencies, and 0 at frequencies that alias onto them:
+Sums over samples are integrals if frequencies that alias onto those of the intensity are removed. The weights for a
+circle of radius R are therefore the circle's indicator function, convolved with a kernel. The kernel's radial spectrum
+G is 1 at the intensity's frequencies, and 0 at frequencies that alias onto them. At the distance ρ from the centre, the
+weight is
 
     w(ρ, R) = 2π R ∫ G(f) J₁(2πRf) J₀(2πρf) df
 

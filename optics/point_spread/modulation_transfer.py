@@ -206,7 +206,7 @@ class MTF(ReadOnlyArrays):
     def _radial_errors(self, f: np.ndarray) -> np.ndarray:
         """Return the mean of `errors` over the orientations at radial frequencies f, (wavelength, frequency).
 
-        It is interpolated between rings one step of the grid wide. Below one step, errors are as large as they can be.
+        It is interpolated between rings one step of the grid wide. Below one step, the largest possible error is used.
         """
         step, side = float(self.fx[1] - self.fx[0]), self.fx.size
         ring = np.rint(np.hypot.outer(self.fy, self.fx) / step).astype(np.intp).ravel()

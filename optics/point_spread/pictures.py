@@ -1,5 +1,7 @@
-"""Computation of requested PSFs. Each PSF is planned, computed and compared with the direct sum; if it fails, it is
-repeated."""
+"""Computation of requested PSFs.
+
+Each PSF is planned, computed and compared with the direct sum; if it fails, it is repeated.
+"""
 
 from __future__ import annotations
 
@@ -207,9 +209,9 @@ def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) ->
     """Return the error that follows from the PSF itself, for a PSF without a spot check.
 
     Sampling causes an error of up to half the tolerance. Rounding adds an error δU to the field U, which is as large in
-    a dark window as in a bright one. If the transform spreads the error evenly over a plane of width W, the mean square
-    of δU is ε² times the mean intensity of the pupil's light on this plane, which is 1/W² in the units of a PSF. The
-    error of the intensity is then 2|U| |δU| + |δU|², so
+    a dark window as in a bright one. Assume that the transform spreads the error evenly over a plane of width W. The
+    mean square of δU is then ε² times the mean intensity of the pupil's light on this plane, which is 1/W² in the units
+    of a PSF. The error of the intensity is then 2|U| |δU| + |δU|², so
 
         rounding = (2 ε √(mean PSF / W²) + ε² / W²) / √(mean PSF²).
 

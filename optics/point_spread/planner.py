@@ -13,9 +13,9 @@ angular spectrum. They differ in where they place samples:
     intensity but not the complex field.
 - "angular_spectrum": two transforms, from the pupil to its spectrum and from there to the sensor's plane, on grids with
     the same period. It is best at short distances.
-- "split_angular_spectrum": the same, but the transfer function exp(ikz cos θ) is split into the paraxial part, whose
-    Fourier transform is known, and a remainder, which moves light only a short way to the side. Period and number of
-    samples then do not grow with the distance.
+- "split_angular_spectrum": the same with a transfer function exp(ikz cos θ) that is split into two factors. The Fourier
+    transform of the paraxial factor is known, and the other factor moves light only a short way to the side. Period and
+    number of samples then do not grow with the distance.
 - "rayleigh_sommerfeld": the direct sum over quadrature nodes that are fitted to the pupil's edge. Its time is
     proportional to the number of nodes times that of output samples. It is the reference for all other methods.
 

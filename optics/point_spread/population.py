@@ -7,7 +7,8 @@ window's centre,
 
 Pupils are sampled in units of their radius, so all share the soft edge, the samples' positions, and B-splines (reliefs)
 and powers (Zernike polynomials) at these positions. Slight changes of the slow factor's phase over the window are
-neglected. The error is predicted for each PSF from its own light. Above the tolerance, `optics.psf` computes the PSF.
+neglected. The error is predicted for each PSF from its own light. If the error exceeds the tolerance, `optics.psf`
+computes the PSF instead.
 """
 
 from __future__ import annotations
@@ -183,8 +184,7 @@ def _splines_and_slopes(t: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarra
 
 
 def _sine(stack: _Stack, window: Grid, at: np.ndarray) -> np.ndarray:
-    """Return the sine ξ/c(ξ) along one axis. c² is z² + ξ² plus estimates of the mean squares of the other
-    coordinates."""
+    """Return the sine ξ/c(ξ) along one axis; c² is z² + ξ² plus mean squares of the other coordinates."""
     elsewhere = np.square(stack.radius) / 4 + np.float32((0.4 * window.own_half_width) ** 2)
     found: np.ndarray = at / np.sqrt(np.square(stack.distance) + np.square(at) + elsewhere)
     return found

@@ -40,8 +40,8 @@ class Effort:
     fewest: number of points below which the estimate is useless.
     spare_digits: digits of the direct sum in addition to the requested accuracy. The first affordable value is used.
     share: time limit of the check, relative to the time of the PSF.
-    share_of_few: the same for windows with fewer than `few` samples. Of a direct sum over so few samples, `share`
-        affords fewer than `fewest` points. Without a check, the error may be as large as its bound.
+    share_of_few: the same for windows with fewer than `few` samples. In windows of so few samples, a direct sum at
+        `fewest` points takes longer than `share` permits. Without a check, the error may be as large as its bound.
     seconds: time [s] that every check may take.
     """
 
@@ -219,7 +219,7 @@ def _chances(bright: np.ndarray, window: Grid) -> np.ndarray:
     It is the mean of six distributions. The first is uniform. The others are proportional to the following quantities:
 
     - Intensity: if the amplitude has the same error everywhere, the error of the intensity is proportional to the
-        square root of the intensity. Beside a bright focus, only this distribution detects such an error.
+        square root of the intensity. Next to a bright focus, only this distribution detects such an error.
     - Squared intensity, spread over neighbouring samples: the errors of a focus of one sample lie next to it.
     - Nearness of a side, and nearness of a corner: phases change fastest there, so quadratures fail there first, and
         within a few samples. In a window off the axis, phases change fastest at the sides that are farthest from the
@@ -268,8 +268,9 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of sides and corners, flat, and the sum of the three parts of the probabilities that do not
-    depend on the PSF.
+    """Return the nearness of sides and corners, and the part of the probabilities that does not depend on the PSF.
+
+    Both are flat arrays, and the second one is the sum of three terms.
 
     centre: position (x, y) of the window, in samples.
     """

@@ -47,9 +47,9 @@ def vector_focus(
 
     wavelength: wavelength [m] in vacuum.
     sensor_distance: distance [m] behind the pupil; None: the focus of the lens.
-    polarization: polarisation of the light in front of the pupil: a Jones vector (x, y), or Stokes parameters (S0, S1,
-        S2, S3) with S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey), S3 = 2 Im(Ex* Ey). None: unpolarised. For oblique light, the
-        x and y of these definitions are rotated with the light's direction.
+    polarization: polarisation of the light in front of the pupil: a Jones vector (x, y) or Stokes parameters (S0, S1,
+        S2, S3). Here S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey) and S3 = 2 Im(Ex* Ey). None: unpolarised. For oblique light,
+        the x and y of these definitions are rotated with the light's direction.
     source_angle: direction (x, y) [rad] of the light, as in `optics.psf`. The window lies around the image.
     apodization: "flat" for uniform light over a flat pupil, or "aplanatic" for light along the axis of a corrected
         objective. With the latter, the ray from ξ arrives at the focus with the sine ξ/z, and the light is a sum of
@@ -59,8 +59,8 @@ def vector_focus(
 
     Raises:
         ValueError: an argument is invalid, the relief is pixelated, or a parameter carries derivatives.
-        AccuracyError: no method meets the tolerance within the limits on memory and time; or the Fresnel number of an
-            aplanatic lens is below 20, so that its rays do not meet in a point.
+        AccuracyError: no method meets the tolerance within the limits on memory and time, or an aplanatic lens has a
+            Fresnel number below 20. The rays of such a lens do not meet in a point.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
     lambda_ = vacuum_wavelength(wavelength)

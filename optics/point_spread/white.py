@@ -166,7 +166,7 @@ def white_psf(
 
     Raises:
         ValueError: an argument is invalid, or a type of receptor does not absorb the light.
-        AccuracyError: there are too few wavelengths (the message states a sufficient number), or see `optics.psf`.
+        AccuracyError: there are too few wavelengths (the message states a sufficient number). See also `optics.psf`.
     """
     by_itself = isinstance(waves, str) and waves == "auto"
     count = FIRST if by_itself else whole("waves", waves, 5, MOST_WAVES)

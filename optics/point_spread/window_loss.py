@@ -1,6 +1,6 @@
 """Errors of contrasts at each spatial frequency.
 
-Light outside the window is missing in the sum ∫ PSF(x) exp(-2πi f·x) dx. Near f = 0, its whole share is missing. At
+Light outside the window is missing in the sum ∫ PSF(x) exp(-2πi f·x) dx. Near f = 0, all of this light is missing. At
 other frequencies, contributions of different places cancel, and most of the error results from the sharp end of the
 samples at the sides of the window. If the samples fade towards the sides instead, this error disappears. The difference
 between the spectra of sharp and fading samples therefore estimates it. At some frequencies, such as those of the rings

@@ -2,8 +2,8 @@
 
 Each plane has its own lateral coordinates about the centre of its pupil, so a decentred pupil only moves the window of
 the propagation to its plane. The plane of a tilted pupil has the depth ζ(x) = x·tan α. Light arrives there as the field
-at the depth ζ, and it leaves from there. If the light's angles to the axis are at most θ, the field is a carrier
-exp(ikcζ) with c = (1 + cos θ)/2 times a function that varies slowly with the depth. This function is interpolated
+at the depth ζ, and it leaves from there. If the light's angles to the axis are at most θ, the field is the product of a
+carrier exp(ikcζ) with c = (1 + cos θ)/2 and a function that varies slowly with the depth. This function is interpolated
 between a few planes at Chebyshev nodes z_j. For light that arrives at the tilted plane, and for light that leaves it,
 
     U(x, ζ) = exp(ikcζ) Σ_j L_j(ζ) exp(-ikcz_j) U(x, z_j),   w → Σ_j exp(ikcz_j) P(-z_j) [L_j(ζ) exp(-ikcζ) w],
@@ -42,7 +42,7 @@ Point = tuple[float, float]
 class Misaligned:
     """A pupil of a system that is decentred, and tilted about its centre.
 
-    decentre: position (x, y) [m] of the pupil's centre beside the axis.
+    decentre: position (x, y) [m] of the pupil's centre relative to the axis.
     tilt: angles (x, y) [rad]. A positive angle moves the pupil's +x (or +y) side in the direction of the light.
 
     Raises:

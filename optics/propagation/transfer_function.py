@@ -1,5 +1,6 @@
-"""Free space between two planes as a filter: its transfer function, and the band of frequencies that can reach the
-window.
+"""Free space between two planes as a filter.
+
+The module computes the filter's transfer function, and the band of frequencies that can reach the window.
 
     H = exp(2πi z √((n/λ)² - fx² - fy²))     (Goodman, §3.10.2)
 

@@ -102,8 +102,11 @@ class TransformSampling:
 
 @dataclass(frozen=True)
 class KeptLight:
-    """The light that can reach a window: its band, and the distance [m] from the far edge of one plane to the far edge
-    of the other, along the longer axis."""
+    """The light that can reach a window.
+
+    It is described by its band of frequencies and by the distance [m] along the longer axis from the far edge of one
+    plane to the far edge of the other.
+    """
 
     band: Band
     reach: float

@@ -40,7 +40,7 @@ def optical_sensitivity(
     light: "white" or "peak".
 
     Raises:
-        ValueError: a length or a coefficient that is not positive, or an unknown kind of light.
+        ValueError: a length or a coefficient is not positive, or the kind of light is unknown.
     """
     for name, value in (("diameter", diameter), ("focal_length", focal_length), ("receptor", receptor)):
         positive(name, value)

@@ -53,13 +53,16 @@ class PhotonBudget:
 
     @property
     def spectral_irradiance(self) -> float:
-        """Spectral irradiance of daylight on the scene at 560 nm [W/m³]: E_v = K_m E_560 ∫ daylight(λ) ȳ(λ) dλ."""
+        """Spectral irradiance E_560 of daylight on the scene at 560 nm [W/m³].
+
+        It follows from E_v = K_m E_560 ∫ daylight(λ) ȳ(λ) dλ with K_m = 683 lm/W and the CIE 1931 function ȳ.
+        """
         wavelengths = np.arange(360, 781, 5) * 1e-9
         visible = daylight(wavelengths) * cie_1931(wavelengths)[:, 1]
         return self.illuminance / (LUMENS_PER_WATT * float(visible.sum()) * 5e-9)
 
     def photons(self, bands: SpectralBands, etendue: float) -> np.ndarray:
-        """Return the photons absorbed per integration time from a white Lambertian surface, (channel,):
+        """Return the number of photons from a white Lambertian surface absorbed per integration time, (channel,):
 
             N_c = η Δt G ∫ E_λ/π · λ/(hc) · S_c(λ) dλ
 
@@ -87,6 +90,6 @@ def light_level(name: str) -> float:
         of civil twilight), "sunset" (clear sky), "overcast" (midday) or "sunlight".
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: the name is unknown.
     """
     return LIGHT_LEVELS[one_of("light level", name, LIGHT_LEVELS)]

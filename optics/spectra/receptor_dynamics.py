@@ -20,7 +20,7 @@ class ReceptorDynamics:
     time_constant_ms: time constant τ of the low-pass filter [ms]
     order: order n of the filter, 1 or 2: h(t) = tⁿ⁻¹ exp(-t/τ) / τⁿ
     latency_ms: additional delay [ms], rounded to whole frames
-    adaptation: gain control by the mean b of the signal over `adaptation_ms`, an exponentially weighted mean. "none";
+    adaptation: gain control by b, the exponentially weighted mean of the signal over `adaptation_ms`. "none";
         "naka_rushton": s / (s + b), which is 1/2 in constant light (Naka & Rushton 1966, J. Physiol. 185:536);
         "logarithmic": ln(s / b), which is 0 in constant light. `dark_light` is added to s and b in the logarithm, and
         to b in the quotient
@@ -30,16 +30,16 @@ class ReceptorDynamics:
         occurs whenever ln(s + dark_light) has changed by θ since the last event (Lichtsteiner et al. 2008, IEEE J.
         Solid-State Circuits 43:566). None: no events
     motion: elementary motion detectors between neighbours in a row. Their outputs are channels that follow those of the
-        receptors. "hassenstein_reichardt" (1956): D(a) b - a D(b). "barlow_levick" (1965): max(a - D(b), 0) - max(b -
-        D(a), 0): an object that moves in the null direction reaches the inhibiting neighbour first. "none": no
-        detectors. a is the left receptor, b the right one, and D is a low-pass filter. Motion to the right gives
-        positive output
+        receptors. a is the left receptor, b is the right one, and D is a low-pass filter. "hassenstein_reichardt"
+        (1956): D(a) b - a D(b). "barlow_levick" (1965): max(a - D(b), 0) - max(b - D(a), 0). In it, an object that
+        moves in the null direction reaches the inhibiting neighbour first. "none": no detectors. Motion to the right
+        gives positive output
     motion_ms: time constant of D [ms]
     frames: number of frames per action that environments render, a divisor of the number of physics steps per action.
         None: the smallest number whose error is acceptable
 
     Raises:
-        ValueError: an argument is outside its range; or events together with adaptation.
+        ValueError: an argument is outside its range, or events are combined with adaptation.
     """
 
     time_constant_ms: float = 10.0

@@ -92,7 +92,7 @@ class Receptors:
         receptors count photons, while radiance is energy.
 
         Raises:
-            ValueError: invalid wavelengths.
+            ValueError: a wavelength is invalid.
         """
         nm = reals("nm", nm)
         light = daylight(nm * 1e-9)
@@ -185,7 +185,7 @@ def receptors_of(receptors: Any) -> Receptors:
     receptors: `Receptors`, a name such as "rgb" or "lms" (the keys of RECEPTORS), or a sequence of receptor types.
 
     Raises:
-        ValueError: an unknown name (the message suggests the most similar one), no types, or invalid types.
+        ValueError: a name is unknown (the message suggests a similar one), or there are no types or invalid ones.
     """
     if isinstance(receptors, Receptors):
         return receptors

@@ -146,7 +146,7 @@ def illuminant(name: str) -> Spectrum:
     """Return the relative spectral power of a CIE illuminant on 300-780 nm. It is 1 at 560 nm.
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: the name is unknown.
     """
     one_of("illuminant", name, ILLUMINANTS)
     if name == "E":
@@ -171,7 +171,7 @@ def reflectance(name: str) -> Spectrum:
     """Return the reflectance of a patch of the ColorChecker, measured on 380-780 nm and constant below 380 nm.
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: the name is unknown.
     """
     one_of("reflectance", name, REFLECTANCES)
     return _spectrum(_table("reflectances.csv")[1][0], _columns("reflectances.csv")[name])

@@ -26,7 +26,7 @@ def ink_radiance(bands: SpectralBands, receptors: Any, uv: float = 1.0) -> np.nd
 
     The three add up to white, see `srgb_basis`.
 
-    uv: factor on the reflectances below 400 nm, of which an sRGB image contains nothing.
+    uv: factor on the reflectances below 400 nm, about which an sRGB image contains no information.
     """
 
     def radiance(ink: Spectrum) -> Callable[[np.ndarray], np.ndarray]:

@@ -108,7 +108,7 @@ def make_vec_env(
     both.
 
     Raises:
-        ValueError: a bad argument.
+        ValueError: an argument is invalid.
     """
     if episode_steps is not None:
         _require_whole("episode_steps", episode_steps, 1)
@@ -146,7 +146,7 @@ def make_parallel_env(
         animal
 
     Raises:
-        ValueError: a bad argument.
+        ValueError: an argument is invalid.
         ImportError: PettingZoo is not installed.
     """
     if not isinstance(encounter, Encounter):

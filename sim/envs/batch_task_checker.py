@@ -33,7 +33,8 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     - After a stored state has been restored, the same actions have the same results.
 
     Raises:
-        ValueError: one line that states the method, the array, the world, and the correct behaviour.
+        ValueError: the task does not behave as described. The message states the method, the array, the world, and the
+        correct behaviour.
         RuntimeError: a method of the task fails.
     """
     if not isinstance(task, BatchTask):

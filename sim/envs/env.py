@@ -25,7 +25,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         least_return, episode_steps, spectra, medium, render_mode: see `sim.make_vec_env`
 
     Raises:
-        ValueError: a bad argument.
+        ValueError: an argument is invalid.
     """
 
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
@@ -45,8 +45,10 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     @property
     def state(self) -> Any:
-        """Current state of the world as a batch of one, as its physics represents it: `WorldState` for the built-in
-        tasks."""
+        """Current state of the world as a batch of one, in its physics' own type.
+
+        This is `WorldState` for the built-in tasks.
+        """
         return self._batch.state
 
     def reset(
@@ -66,7 +68,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
         Raises:
             ValueError: the action is not real, finite numbers of the right shape, or it is masked.
-            RuntimeError: before the first reset, or after `close`.
+            RuntimeError: there has been no reset yet, or `close` has been called.
         """
         observation, reward, terminated, truncated, info = self._batch.step_once(action)
         info[0].pop("episode", None)  # entry of Stable-Baselines3; Gymnasium reserves this name for its wrappers
@@ -76,7 +78,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         """Return an image (y, x, 3) uint8 as set by `render_mode`; None without a mode.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         return None if self.render_mode is None else self._batch.get_images()[0]
 

@@ -38,7 +38,7 @@ class OneEnvironment(VecEnv):
         environment, so it handles the mode "eyes" itself.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         if self.render_mode == "eyes" and mode in (None, "eyes"):
             return tile_images(self.get_images())

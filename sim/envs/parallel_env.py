@@ -78,7 +78,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
 
         Raises:
             ValueError: an action is missing, belongs to an unknown animal, has the wrong shape, or is not finite.
-            RuntimeError: before the first reset, or after `close`.
+            RuntimeError: there has been no reset yet, or `close` has been called.
         """
         self._calls.require_begun()
         if not self.agents:
@@ -108,7 +108,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         `render_mode` selects which of the two; without a mode, None is returned.
 
         Raises:
-            RuntimeError: before the first reset, if there is a render mode.
+            RuntimeError: there is a render mode, and there has been no reset yet.
         """
         if self.render_mode is None:
             return None

@@ -25,7 +25,7 @@ class RegisteredEnv(EyesEnv):
     """An `EyesEnv` whose episodes are truncated by Gymnasium's wrapper `TimeLimit`.
 
     Raises:
-        ValueError: a bad argument, or the argument `episode_steps`, which Gymnasium calls `max_episode_steps`.
+        ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """
 
     def __init__(self, task: str | Task | type[Task], *args: Any, **options: Any) -> None:
@@ -36,7 +36,7 @@ class RegisteredVectorEnv(EyesVectorEnv):
     """An `EyesVectorEnv` that truncates its episodes after `max_episode_steps` actions.
 
     Raises:
-        ValueError: a bad argument, or the argument `episode_steps`, which Gymnasium calls `max_episode_steps`.
+        ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """
 
     def __init__(

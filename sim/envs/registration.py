@@ -26,8 +26,9 @@ def register() -> None:
 
 
 def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
-    """Register a user task, for `gymnasium.make` and `gymnasium.make_vec`. An existing registration of the id is
-    replaced.
+    """Register a user task, for `gymnasium.make` and `gymnasium.make_vec`.
+
+    An existing registration of the id is replaced.
 
     id_: id, such as "FindBall-v0"
     task: the task, or its class; its `episode_steps` is the length of episodes, unless `gymnasium.make` receives

@@ -1,5 +1,7 @@
-"""Observations of one agent in all worlds: noisy signals of its eyes, proprioception, its last action and other
-entries."""
+"""Observations of one agent in all worlds.
+
+They contain noisy signals of its eyes, proprioception, its last action and other entries.
+"""
 
 from __future__ import annotations
 

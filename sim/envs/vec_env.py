@@ -24,15 +24,14 @@ from sim.tasks.simulation import LEAST_RETURN, Simulation
 
 
 class EyesVecEnv(OneEnvironment):
-    """Many worlds of one task: a built-in one, a `sim.BatchTask`, a `sim.Task`, or a `sim.Encounter` whose animals are
-    alike and learn a single policy.
+    """Many worlds of one task.
 
-    Observations, rewards, endings and `info` are documented in docs/tasks.md. When an episode ends, its world starts
-    the next one automatically. The returned observation is then the first observation of the new episode, and
-    info["terminal_observation"] is the last observation of the old episode. `reset_infos` contains the info of each
-    episode's first observation. A world's episodes depend only on the seed and on the world's index, not on the number
-    of worlds. In an encounter, the rows of the first animal in all worlds come first, followed by the rows of the
-    second animal.
+    In a `sim.Encounter`, all animals must be alike and learn a single policy. The rows of the first animal in all
+    worlds come first, followed by the rows of the second animal. Observations, rewards, endings and `info` are
+    documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
+    observation is then the first observation of the new episode, and info["terminal_observation"] is the last
+    observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
+    episodes depend only on the seed and on the world's index, not on the number of worlds.
 
     simulation: the worlds
     renderers: renderers of every agent's eyes
@@ -69,7 +68,7 @@ class EyesVecEnv(OneEnvironment):
         """Current state of all worlds, as their physics represents it: `WorldState` for the built-in tasks.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         return self.simulation.state
 
@@ -111,11 +110,12 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations)
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
-        """Seed each world with its own number at the next reset. Its episodes are then those of a single environment
-        with this seed. None: the world continues its own random numbers.
+        """Seed each world with its own number at the next reset; None: the world continues its random numbers.
+
+        An episode is then the same as in a single environment with this seed.
 
         Raises:
-            ValueError: another number of seeds, or a seed that is not a whole number from 0 on.
+            ValueError: there is not one seed per world, or a seed is not a whole number above or equal to 0.
         """
         self._calls.require_open()
         own = self.simulation.streams.episodes
@@ -130,7 +130,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the actions are not real numbers, are masked, or have another shape.
-            RuntimeError: before the first reset, after `close`, or after another `step_async`.
+            RuntimeError: there has been no reset yet, `close` has been called, or another `step_async` is pending.
         """
         self._calls.require_begun()
         self._commanded = actions_of("actions", actions, self._commanded.shape)
@@ -143,7 +143,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the action is not finite, or `step_async` would refuse it.
-            RuntimeError: before the first reset, or after `close`.
+            RuntimeError: there has been no reset yet, or `close` has been called.
         """
         self._calls.require_begun()
         self.step_async(one_worlds_action("action", action, self.action_space.shape)[None])
@@ -181,7 +181,7 @@ class EyesVecEnv(OneEnvironment):
         The state does not contain such values.
 
         Raises:
-            RuntimeError: before the first reset, after `close`, or if the model enables MuJoCo's sleeping bodies.
+            RuntimeError: the worlds are not reset or are closed, or the model enables MuJoCo's sleeping bodies.
         """
         self._calls.require_begun()
         return self.animals.get_state()
@@ -191,7 +191,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
-            RuntimeError: before the first reset, after `close`, or if the model enables MuJoCo's sleeping bodies.
+            RuntimeError: the worlds are not reset or are closed, or the model enables MuJoCo's sleeping bodies.
         """
         held_state.checked(state, self.get_state())
         chosen = held_state.chosen_worlds(worlds, len(self._everyone))
@@ -208,7 +208,7 @@ class EyesVecEnv(OneEnvironment):
         """Return images (y, x, 3) uint8 of every world, as set by `render_mode`; an empty list without a mode.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         self._calls.require_begun()
         return self._pictures.taken()

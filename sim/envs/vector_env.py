@@ -31,7 +31,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     task, eyes, memory, mode ...: see `sim.make_vec_env`
 
     Raises:
-        ValueError: a bad argument.
+        ValueError: an argument is invalid.
     """
 
     metadata = {  # noqa: RUF012 (Gymnasium's own declaration)

@@ -1,5 +1,6 @@
-"""Images of eyes as OpenEXR files in the spectral layout of Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout
-for Spectral Images", JCGT 10(3).
+"""Images of eyes as OpenEXR files in the spectral layout.
+
+This layout is defined by Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout for Spectral Images", JCGT 10(3).
 
 A file has up to two parts for each eye. For an eye named "left", these are `left.spectral` (spectral radiance, channels
 `S0.450,000000nm` ..., and reflectance, channels `T.450,000000nm` ...) and `left.receptors` (photoreceptor signals,
@@ -99,7 +100,7 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can state any size
 
     Raises:
-        ExrError: the file is truncated, damaged, altered, too large, or has no spectral channels. One line.
+        ExrError: the file is truncated, damaged, altered, too large, or has no spectral channels.
         FileNotFoundError: the file does not exist.
     """
     import OpenEXR

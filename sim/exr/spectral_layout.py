@@ -1,5 +1,6 @@
-"""Channels of the spectral layout for OpenEXR files: Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout for
-Spectral Images", JCGT 10(3), section 3.
+"""Channels of the spectral layout for OpenEXR files.
+
+Source: Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout for Spectral Images", JCGT 10(3), section 3.
 
 A channel's name consists of its quantity and its wavelength or frequency, with a comma as decimal sign:
 

@@ -25,8 +25,8 @@ class View:
     rgb: (y, x, 3) float32 linear sRGB preview of the radiance, or of the reflectance in daylight; None: computed when
         written
     attributes: further values that JSON can represent, such as seed, time step or position
-    peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the longest as red. None: channels
-        are in descending order of their peaks.
+    peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the channel with the longest peak
+        as red. None: channels are in descending order of their peaks.
     reflectance: reflectance or transmittance, (band, y, x) float32, or None
     directions: viewing directions of the receptors, unit vectors (ahead, left, up) in the frame of the mount, (3, y, x)
         float32, or None

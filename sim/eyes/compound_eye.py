@@ -49,8 +49,8 @@ class CompoundEye:
         None: all facets are at the mount, and their diameters are not compared with their distances
 
     Raises:
-        ValueError: an invalid argument; no ommatidium or more than 1,000,000; two equal directions; or facets that
-            overlap.
+        ValueError: an argument is invalid, the number of ommatidia is not in 1 to 1,000,000, two directions are equal,
+            or facets overlap.
     """
 
     directions: Any

@@ -64,8 +64,9 @@ class FieldAreas:
         return float(x[1] - x[0]), float(y[1] - y[0])
 
     def weights(self, fields: ReceptiveFields, receptors: np.ndarray) -> np.ndarray:
-        """Return the weight of each rectangle's mean light in the signals of some receptors, (plane, receptor,
-        rectangle).
+        """Return the weight of each rectangle's mean light in the signals of some receptors.
+
+        Its shape is (plane, receptor, rectangle).
 
         A receptor's weights sum to the power of its field.
 

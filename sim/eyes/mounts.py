@@ -81,10 +81,10 @@ class Mount:
         raise ValueError(f"Mount: no {what} {self.on!r} in the model{did_you_mean(self.on, names)}")
 
     def local(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the position of the pupil [m] (3,) and the eye's frame (3, 3), in the frame of the object that carries
-        the eye.
+        """Return the position of the pupil [m] (3,) and the eye's frame (3, 3).
 
-        The columns of the eye's frame are (right, up, ahead).
+        Both are given in the frame of the object that carries the eye. The columns of the eye's frame are (right, up,
+        ahead).
         """
         ahead, left, up = _AXES[kind]
         azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
@@ -114,7 +114,7 @@ def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
 
 
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
-    """Return mounts in a circle around a body's z axis, which look outwards, from left to right.
+    """Return mounts in a circle around a body's z axis, from left to right; they look outwards.
 
     `Eyes` uses the same arrangement on the built-in agent.
 

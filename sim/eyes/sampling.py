@@ -78,8 +78,10 @@ class BoxSampling:
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of the sensor with this number of areas, for these receptors only (numbered row by
-        row)."""
+        """Return the samples of these receptors of the sensor with this number of areas.
+
+        Receptors are numbered row by row.
+        """
         count = max(1, round(per_receptor))
         plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
         return Trial(plane, unused, self._means(len(receptors), count), extent)
@@ -245,8 +247,10 @@ WorldSampling = EyeSampling | OmmatidialSampling
 
 
 def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
-    """Return the mask (height + 2, width + 2) of the added squares, for a field extended by one square on every
-    side."""
+    """Return the mask of the squares that are added if a field is extended by one square on every side.
+
+    Its shape is (height + 2, width + 2).
+    """
     return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 

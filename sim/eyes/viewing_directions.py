@@ -24,8 +24,8 @@ def unit_directions(name: str, given: Any) -> np.ndarray:
     given: unit vectors (ahead, left, up), (n, 3), or angles [degrees] (azimuth to the left, elevation upwards), (n, 2)
 
     Raises:
-        ValueError: no direction, more than MOST_OMMATIDIA, another shape, values that are not finite, an elevation
-            beyond 90 degrees, or vectors whose length differs from 1 by more than OFF_UNIT.
+        ValueError: the shape is wrong, the number of directions is not in 1 to MOST_OMMATIDIA, or a value is not
+            finite. Elevations must be within ±90 degrees, and the length of a vector must be 1 to within OFF_UNIT.
     """
     if is_sized(given) and len(given) > MOST_OMMATIDIA:
         raise ValueError(f"{name}: {len(given)} ommatidia: must be at most {MOST_OMMATIDIA}")
@@ -113,7 +113,7 @@ def whole_head(interommatidial_deg: float) -> np.ndarray:
     interommatidial_deg: largest mean angle between neighbours [degrees]
 
     Raises:
-        ValueError: an angle below 0.2302 or above 180 degrees.
+        ValueError: the angle is below 0.2302 or above 180 degrees.
     """
     apart = math.radians(in_range("interommatidial_deg", interommatidial_deg, FINEST_DEG, 180.0))
     # Mean angle if the cells of all nodes, hexagons of area (√3/2) Δφ², cover the sphere.

@@ -124,8 +124,10 @@ class AgentPhysics:
         return self._motion(agents.position, *self._step_batch(models, *self._start_of(agents, velocity)))
 
     def _start_of(self, agents: Agents | WorldState, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's states (n, ...), and controls (n, substep, nu) for a constant commanded velocity [m/s] (n,
-        2)."""
+        """Return MuJoCo's states (n, ...), and its controls (n, substep, nu).
+
+        The commanded velocity [m/s] (n, 2) is constant.
+        """
         initial = self._initial(len(velocity))
         initial[:, self._columns.position] = agents.position - self._columns.origin
         initial[:, self._columns.heading] = agents.heading
@@ -143,8 +145,10 @@ class AgentPhysics:
     def _untouched(
         self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's path and velocity for these speeds and commands (n, 2) with contacts disabled; see
-        sim.physics.free_motion.FreeSteps."""
+        """Return MuJoCo's path and velocity with contacts disabled, for these speeds and commands (n, 2).
+
+        See `sim.physics.free_motion.FreeSteps`.
+        """
         model = copy.copy(self._model)
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         initial = self._initial(len(speed))

@@ -46,8 +46,10 @@ class FreeMotion:
     strongest: float
 
     def __call__(self, velocity: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the path relative to the agents' positions (n, substep, 2) [m], and the velocity at its end (n, 2)
-        [m/s]."""
+        """Return the path of each agent, and the velocity at its end (n, 2) [m/s].
+
+        The path (n, substep, 2) [m] is relative to the agents' positions.
+        """
         # The terms are summed explicitly, since the rounding of a matrix product depends on the number of worlds.
         paths, speeds = self.response
         path = paths[:, 0] * velocity[:, None] + paths[:, 1] * command[:, None]

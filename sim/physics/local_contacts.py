@@ -90,9 +90,9 @@ def local_contacts_of(
 ) -> LocalContacts | None:
     """Return the local contacts of a world's agent; None if small models cannot replace the whole model.
 
-    Small models cannot replace it if agents have no free motion or no obstacles, if an obstacle is not a simple
-    primitive that is fixed to the world, if bodies other than the agent move, or if the world's model has been changed
-    since it was compiled.
+    Small models cannot replace it if agents have no free motion or no obstacles, or if bodies other than the agent
+    move. Every obstacle must be a simple primitive that is fixed to the world, and the world's model must be as
+    compiled.
 
     whole: the world's complete model
     """

@@ -55,7 +55,7 @@ class SlidingAgents:
         """Current state of all worlds.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: the worlds have not been reset yet.
         """
         if self._state is None:
             raise RuntimeError("the worlds have not begun: call reset first")

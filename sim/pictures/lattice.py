@@ -48,8 +48,9 @@ class Lattice:
         return Lattice(size, pixels, nearest.ravel(), pairs)
 
     def between(self, differ: np.ndarray) -> np.ndarray:
-        """Return the numbers of pixels outside the lattice whose nearest lattice pixel differs from a neighbour in the
-        lattice.
+        """Return the indices of pixels outside the lattice that are near an edge of the image.
+
+        An edge is where the nearest pixel of the lattice differs from a neighbour in the lattice.
 
         differ: True for pairs of neighbours that differ, (m,)
         """

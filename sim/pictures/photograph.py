@@ -106,8 +106,8 @@ def see_photograph(
     progress: function that is called with the completed fraction. None: no calls.
 
     Raises:
-        ValueError: an argument outside its range, an image or depth with another shape, a field with more than 40,000
-            ommatidia, or the depth of a scene for a compound eye.
+        ValueError: an argument is outside its range, the image or `depth` has the wrong shape, the field has more than
+            40,000 ommatidia, or `depth` is given for a compound eye.
         AccuracyError: the depth varies too much for the kernels of one image; see `optics.Eye.see`.
     """
     one_of("animal", animal, ANIMALS)

@@ -78,7 +78,7 @@ class QuickCamera:
         camera: name or id of a camera of the model, or a Viewpoint
 
         Raises:
-            ValueError: an unknown camera, less than one pixel, or data that `Mirror.sync` refuses.
+            ValueError: the camera is unknown, the image has less than one pixel, or `Mirror.sync` refuses the data.
         """
         return self.render(data, camera, width, height).picture
 
@@ -101,8 +101,10 @@ class QuickCamera:
         return look
 
     def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[QuickImage, np.ndarray]:
-        """Return an image in which each pixel has the colour of its middle, and linear sRGB along the rays, (3,
-        ray)."""
+        """Return an image in which each pixel has the colour of its middle.
+
+        Also return the linear sRGB values along the rays, (3, ray).
+        """
         found = self._rays.trace(view, lattice.size, CODES * lattice.pixels)
         linear, planes, ray, shown = found.linear, found.plane, lattice.nearest, _displayed(found.linear)
         picture = shown.T.copy().take(ray, axis=0)

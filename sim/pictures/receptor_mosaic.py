@@ -50,7 +50,7 @@ class ReceptorMosaic:
         height: height of the image in pixels, 16 to 8192.
 
         Raises:
-            ValueError: a height outside its range.
+            ValueError: the height is outside its range.
         """
         from PIL import Image
 
@@ -70,7 +70,7 @@ class ReceptorMosaic:
         """Write `image` to a PNG file.
 
         Raises:
-            ValueError: a height outside its range.
+            ValueError: the height is outside its range.
             OSError: the file cannot be written.
         """
         from PIL import Image

@@ -32,8 +32,8 @@ class BatchedRenderer(EyeRenderer):
     brightest: signal of a white surface that faces all lights at once
 
     Raises:
-        ValueError: n_envs below 1, more rays than fit into memory, a fidelity that the world does not support, or
-            tracer="closed_form" for a world without a closed form.
+        ValueError: n_envs is below 1, the rays do not fit into memory, the world does not support the fidelity, or
+            tracer="closed_form" is given for a world without a closed form.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class BatchedRenderer(EyeRenderer):
         """Return the renderer of a prepared scene.
 
         Raises:
-            ValueError: as in the constructor, or a fidelity for another number of bands than the scene's.
+            ValueError: as in the constructor, or the numbers of bands of the fidelity and of the scene differ.
         """
         renderer = cls.__new__(cls)
         renderer._open(scene, n_envs, fidelity)

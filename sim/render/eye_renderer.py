@@ -141,8 +141,9 @@ class EyeRenderer:
         light: factors of all lights of each world, (env, band); None: lights as in the model
 
         Raises:
-            ValueError: another number of worlds, another model's poses, poses that are not finite or not computed yet,
-                a difference from the model that is not in `varied`, or light of another shape.
+            ValueError: the number of worlds or the shape of `light` is wrong; the poses belong to another model, are
+                not finite or have not been computed yet; or the worlds differ from the model in a part that is not in
+                `varied`.
         """
         return self.launch(poses, light).wait()
 

@@ -59,8 +59,8 @@ class Fidelity:
     levels: chosen level of each stage, with its reason
 
     Raises:
-        ValueError: bands, rays_per_receptor or a tolerance that are not numbers or out of range, unknown light or
-            samples, or light = "all" without areas.
+        ValueError: bands, rays_per_receptor or tolerance is not a number or is out of range, light or samples is
+            unknown, or light = "all" is combined with another kind of samples than areas.
     """
 
     rays_per_receptor: float

@@ -95,8 +95,8 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
 def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
     """Return direct light if a second reflection adds little, otherwise light after one and two reflections.
 
-    In the second case, the error due to further reflections is estimated from a geometric series: each further
-    reflection is assumed to have the same ratio to the one before as the second reflection has to direct light.
+    In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
+    further reflection to the one before is assumed to be the ratio of the second reflection to direct light.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

@@ -28,7 +28,7 @@ class Labels:
     scene: the model and its eyes; Mitsuba traces all rays
 
     Raises:
-        ValueError: a compound eye, which has no flat retina on which depth and flow are defined.
+        ValueError: the eye is a compound eye, which has no flat retina on which depth and flow are defined.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int) -> None:

@@ -18,7 +18,7 @@ class LightFactors:
         """Return a copy of the factors `light`.
 
         Raises:
-            ValueError: another shape.
+            ValueError: the shape is not (env, band).
         """
         if np.shape(light) != shape:
             raise ValueError(f"light has shape {np.shape(light)}: must be (env, band), {shape}")

@@ -68,21 +68,21 @@ def choose_model_fidelity(
     light: str = lighting.DIRECT,
     medium: optics.TurbidMedium | str | None = None,
 ) -> Fidelity:
-    """Return the fidelity with the fewest rays for `ModelRenderer` whose error at these poses is within the tolerance.
+    """Return the fidelity for `ModelRenderer` that has the fewest rays with an error within the tolerance.
 
     If there is none, a FidelityWarning states by how much the tolerance is exceeded. Bands are the eye's own.
 
     model, eye, mounts: see `ModelRenderer`
     poses: poses that are typical of later use, one set per moment
-    tolerance: allowed error of a signal (root mean square), over receptors without a uniform field; None: half of the
-        receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE` times the signal of a white surface
+    tolerance: allowed error of a signal (root mean square), over receptors whose field is not uniform; None: half of
+        the receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE` times the signal of a white surface
         behind the eye's pupil
     groups, spectra, varied, medium: see `ModelRenderer`
     light: "direct" or "bounce", see `Fidelity`; "auto": "bounce" if direct light alone has an error above the tolerance
         at these moments, over receptors that bounced light reaches
 
     Raises:
-        ValueError: a tolerance that is not positive, another light, or an argument that ModelRenderer refuses.
+        ValueError: the tolerance is not positive, `light` is unknown, or ModelRenderer refuses an argument.
     """
     if light not in (*FOLLOWED, AUTO):
         raise ValueError(f"light = {light!r}: must be 'direct', 'bounce' or 'auto'")

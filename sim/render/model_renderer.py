@@ -49,10 +49,10 @@ class ModelRenderer(EyeRenderer):
     lines for which the eye has too few bands.
 
     Raises:
-        ValueError: an invalid argument; a mount on a part that the model lacks; an eye with an eccentricity, or inside
-            a primitive or a closed mesh in the model's reference pose; a fidelity that the model does not support; or
-            more rays than fit into memory.
-        optics.AccuracyError: a pupil whose light spreads too far.
+        ValueError: an argument is invalid, the model lacks the part on which an eye is mounted, an eye has an
+            eccentricity, the model does not support the fidelity, or the rays do not fit into memory. No eye may be
+            inside a primitive or a closed mesh in the model's reference pose.
+        optics.AccuracyError: the light of a pupil spreads too far.
     """
 
     def __init__(

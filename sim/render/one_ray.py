@@ -22,7 +22,7 @@ def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarr
     """Return the noise-free signals of one world of a state, (eye, channel, height, width).
 
     Raises:
-        ValueError: a world with a medium.
+        ValueError: the world has a medium.
     """
     if world.medium is not None:
         raise ValueError("world: its medium must be None, a single ray renders clear air only")

@@ -33,7 +33,7 @@ class Population:
     counted: np.ndarray
 
     def rms(self, error: np.ndarray) -> float:
-        """Return the root mean square of an error (view, channel, receptor) over receptors that count, else 0."""
+        """Return the root mean square of an error (view, channel, receptor) over this population; 0 if it is empty."""
         counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
         return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 

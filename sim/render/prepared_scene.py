@@ -47,8 +47,9 @@ class PreparedScene:
         facets of a compound eye keep the index in front of them. None: clear air
 
     Raises:
-        ValueError: a mount on a part that the model lacks, an eye inside a geom in the model's reference pose, or a
-            model or tracer that `sim.BatchedRenderer` or `sim.ModelRenderer` refuses.
+        ValueError: the model lacks the part on which an eye is mounted, an eye is inside a geom in the model's
+            reference pose, or the renderer refuses the model or the tracer (see `sim.BatchedRenderer` and
+            `sim.ModelRenderer`).
     """
 
     def __init__(
@@ -118,7 +119,7 @@ class PreparedScene:
         """Return the tracer that uses area sampling.
 
         Raises:
-            ValueError: a world that has no closed form.
+            ValueError: the world has no closed form.
         """
         return self.tracers.areas(light)
 
@@ -149,7 +150,7 @@ class PreparedScene:
         tolerance: allowed error of a signal, see `sim.eyes.allowed_error`
 
         Raises:
-            optics.AccuracyError: a pupil whose light spreads too far to be computed.
+            optics.AccuracyError: the light of a pupil spreads too far to be computed.
         """
         if depth not in self._samplings:
             self._samplings[depth] = eye_sampling(self.eye, depth)
@@ -164,8 +165,8 @@ class PreparedScene:
         """Refuse poses that cannot be rendered.
 
         Raises:
-            ValueError: another number of worlds, another model's poses, poses that are not finite or not computed yet,
-                or a difference from the model that is not in `varied`.
+            ValueError: the number of worlds is wrong; the poses belong to another model, are not finite or have not
+                been computed yet; or the worlds differ from the model in a part that is not in `varied`.
         """
         if poses.n != n_envs:
             raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {n_envs}")

@@ -23,7 +23,7 @@ class ReceptorsInTime:
     seconds: duration of a frame [s]
 
     Raises:
-        ValueError: a latency of more than MOST_DELAYED frames.
+        ValueError: the latency is longer than MOST_DELAYED frames.
     """
 
     def __init__(self, dynamics: ReceptorDynamics, n: int, shape: tuple[int, ...], seconds: float) -> None:
@@ -121,8 +121,10 @@ class ReceptorsInTime:
         rows[:, self._others + 1] += events
 
     def _motion(self, signals: np.ndarray, past: np.ndarray) -> np.ndarray:
-        """Return the output of the motion detectors between each receptor and its right neighbour, 0 in the last
-        column."""
+        """Return the output of the motion detectors between each receptor and its right neighbour.
+
+        In the last column, it is 0.
+        """
         found = np.zeros_like(signals)
         a, b, past_a, past_b = signals[..., :-1], signals[..., 1:], past[..., :-1], past[..., 1:]
         if self.dynamics.motion == "hassenstein_reichardt":

@@ -43,9 +43,9 @@ class ReferenceRenderer:
     seed: seed of the samples; the attribute may be changed between images
 
     Raises:
-        ValueError: an invalid argument, a world with a medium, or receptors whose sides are not in the ratio of small
-            whole numbers.
-        optics.AccuracyError: a pupil whose light spreads too far.
+        ValueError: an argument is invalid, the world has a medium, or the sides of a receptor are not in the ratio of
+            small whole numbers.
+        optics.AccuracyError: the light of a pupil spreads too far.
     """
 
     def __init__(

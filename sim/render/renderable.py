@@ -13,8 +13,8 @@ def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
     """Refuse a fidelity that does not fit the eye.
 
     Raises:
-        ValueError: an eye with an eccentricity, another number of bands than the eye's, adaptive edge sampling that is
-            not possible, or a compound eye with areas or depth layers.
+        ValueError: the eye has an eccentricity, its number of bands differs from the fidelity's, adaptive edge sampling
+            is not possible, or the fidelity has areas or depth layers, which compound eyes do not support.
     """
     world_eye("eye", eye)
     if not isinstance(eye, CompoundEye) and any(eye.eccentricity_deg):

@@ -34,7 +34,7 @@ def choose_fidelity(
     tracer: tracer for the trials, see `sim.BatchedRenderer`
 
     Raises:
-        ValueError: a tolerance that is not positive, unknown bands, or a world that BatchedRenderer refuses.
+        ValueError: the tolerance is not positive, the bands are unknown, or BatchedRenderer refuses the world.
     """
     of_kind("world", world, World, "sim.build_world('detection')")
     of_kind("eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")

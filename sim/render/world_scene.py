@@ -29,7 +29,7 @@ class WorldScene(PreparedScene):
     tracer: method of tracing rays, see `sim.BatchedRenderer`
 
     Raises:
-        ValueError: a world or a tracer that `sim.BatchedRenderer` refuses.
+        ValueError: `sim.BatchedRenderer` refuses the world or the tracer.
     """
 
     eye: optics.Eye
@@ -62,8 +62,11 @@ class WorldScene(PreparedScene):
         return self.poses_at(state.position, state.heading, state.objects)
 
     def poses_at(self, position: np.ndarray, heading: np.ndarray, objects: np.ndarray) -> MovedBodies:
-        """Return the poses for agents' positions (world, 2) [m] and headings (world,) [rad], and objects' centres
-        (world, object, 3) [m]."""
+        """Return the poses of agents and objects.
+
+        Agents have positions (world, 2) [m] and headings (world,) [rad], and objects have centres (world, object, 3)
+        [m].
+        """
         positions = np.empty((len(position), 1 + len(self.world.objects), 3))
         positions[:, 0, :2], positions[:, 0, 2], positions[:, 1:] = position, EYE_HEIGHT, objects
         rotations = np.repeat(self._turns[None].reshape(1, -1, 3, 3), len(position), axis=0)

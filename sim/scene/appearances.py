@@ -95,7 +95,7 @@ def varied_geoms(
     A geom whose size or colour differs has no ids.
 
     Raises:
-        ValueError: no visible geom or no material of this name, or the reflectance is measured.
+        ValueError: no visible geom or material has this name, or its reflectance is a measured spectrum.
     """
     known = {model.geom(g).name: g for g in seen if model.geom(g).name}
     found = {}

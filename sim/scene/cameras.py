@@ -54,7 +54,7 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | PoseSnapshot, camera:
     """Return the current viewpoint of a camera of the model.
 
     Raises:
-        ValueError: an unknown camera, or one without plain perspective.
+        ValueError: the camera is unknown, or its projection is not a plain perspective.
     """
     if isinstance(camera, Viewpoint):
         return camera

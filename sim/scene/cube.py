@@ -53,8 +53,10 @@ def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uni
 
 
 def look_up(towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the faces (n,) for directions (n, 3), and positions on them (n, 2): column and row in [0, 1], row 0 at the
-    top."""
+    """Return the faces (n,) in these directions (n, 3), and the positions on the faces (n, 2).
+
+    A position is a column and a row, both in [0, 1]. Row 0 is at the top.
+    """
     axis = np.argmax(np.abs(towards), axis=1)
     face = 2 * axis + (np.take_along_axis(towards, axis[:, None], 1)[:, 0] < 0)
     return face, _on_face(towards, face)

@@ -74,8 +74,10 @@ def counted(n: int) -> Array:
 
 
 def in_fours(vectors: np.ndarray, fourth: np.ndarray | float) -> np.ndarray:
-    """Return vectors (..., 3) flat, each followed by a fourth number, because kernels gather four aligned floats in one
-    operation."""
+    """Return vectors (..., 3) as a flat array in which a fourth number follows each vector.
+
+    Kernels gather four aligned floats in one operation.
+    """
     rows = np.empty((*vectors.shape[:-1], 4), np.float32)
     rows[..., :3], rows[..., 3] = vectors, fourth
     return rows.ravel()

@@ -73,8 +73,10 @@ def _with_arrays(inputs: Any, arrays: Iterator[Array]) -> Any:
 
 @contextmanager
 def garbage_kept() -> Iterator[None]:
-    """Suspend Python's garbage collection inside the block. If it freed another renderer's kernels or scene during the
-    recording of a kernel, Dr.Jit would abort the process."""
+    """Suspend Python's garbage collection inside the block.
+
+    If it freed another renderer's kernels or scene during the recording of a kernel, Dr.Jit would abort the process.
+    """
     was_enabled = gc.isenabled()
     gc.disable()
     try:

@@ -51,7 +51,7 @@ class Emitter:
 
     @property
     def described(self) -> Description:
-        """Description for a scene of the active variant; without shadows if the light casts none."""
+        """Description for a scene of the active variant; it has no shadows if the light casts none."""
         return self.description if self.casts_shadow else shadowless(self.description)
 
     @property

@@ -55,8 +55,8 @@ def mirror(
     A MirrorWarning lists features that have no counterpart.
 
     Raises:
-        ValueError: a model that does not compile, an unknown body, a variant without spectra, a model without visible
-            geoms, or spectra for names that the model does not have.
+        ValueError: the model does not compile or has no visible geoms, a body is unknown, the variant has no spectra,
+            or `spectra` contains names that the model does not have.
     """
     return Mirror(
         source.load(model), data, bodies=bodies, groups=groups, variant=variant or default_variant(), spectra=spectra
@@ -113,7 +113,7 @@ class Mirror:
         A scene in which nothing moved is not rebuilt.
 
         Raises:
-            ValueError: the data of another model, or positions that are not finite.
+            ValueError: the data belong to another model, or a position is not finite.
         """
         self._places = PoseSnapshot.from_data(_checked(self.model, data))
         with in_variant(self.variant):
@@ -157,8 +157,8 @@ class Mirror:
         "direct" does not show what is behind a transparent geom; a MirrorWarning names such geoms once.
 
         Raises:
-            ValueError: an unknown camera, less than one pixel or sample, wavelengths beyond 300 to 780 nm, or an
-                integrator or sampler that Mitsuba would apply incorrectly.
+            ValueError: the camera is unknown, there is less than one pixel or sample, a wavelength is outside 300 to
+                780 nm, or Mitsuba would apply the integrator or the sampler incorrectly.
         """
         view = self.viewpoint(camera)
         rays.check_size(width, height, spp)
@@ -171,8 +171,7 @@ class Mirror:
             return taken.radiance(integrator, spp, asked, seed, sampler)
 
     def _warn_of_glass(self) -> None:
-        """Warn once about transparent geoms. Mitsuba's `direct` treats a mask's opacity as part of its colour, and
-        shows only emitters behind it."""
+        """Warn once about transparent geoms, behind which Mitsuba's `direct` shows only emitters."""
         glass = [int(g) for g in self.geoms if surfaces.rgba(self.model, int(g))[3] < 1]
         if glass and not self._has_warned_of_glass:
             listed = inventory.listed_geoms(self.model, glass)

@@ -1,5 +1,7 @@
-"""Snapshot of a model when its renderer is built. It refuses worlds that differ in ways that the renderer cannot
-show."""
+"""Snapshot of a model when its renderer is built.
+
+It refuses worlds that differ in ways that the renderer cannot show.
+"""
 
 from __future__ import annotations
 

@@ -36,8 +36,10 @@ class ReferencePose:
         return self._local[kind, index]
 
     def slots(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray | None:
-        """Return the indices in `bodies` of the bodies whose frames these geoms share; None if a geom has another
-        frame. Most geoms share their body's frame."""
+        """Return the indices in `bodies` of the bodies whose frames these geoms share.
+
+        Return None if a geom has another frame. Most geoms share their body's frame.
+        """
         key = tuple(geoms)
         if key not in self._slots:
             bodies = [int(self.body_of["geom"][geom]) for geom in key]

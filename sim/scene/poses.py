@@ -86,7 +86,10 @@ class Poses:
 
     @classmethod
     def from_data(cls, datas: Sequence[mujoco.MjData] | mujoco.MjData) -> Poses:
-        """Collect the poses of all worlds. datas: one mjData per world, or a single mjData for one world"""
+        """Collect the poses of all worlds.
+
+        datas: one mjData per world, or a single mjData for one world
+        """
         datas = [datas] if isinstance(datas, mujoco.MjData) else datas
         names = [f.name for f in fields(cls) if f.name not in OF_MODELS]
         stacked = {name: np.stack([getattr(data, name) for data in datas]) for name in names}

@@ -35,7 +35,7 @@ def checked_wavelengths(wavelengths: Any) -> np.ndarray:
     """Return wavelengths [m], (band,).
 
     Raises:
-        ValueError: no wavelength, or a wavelength outside the range of the spectra, for example because it is in
+        ValueError: there is no wavelength, or one is outside the range of the spectra, for example because it is in
             nanometres.
     """
     found = np.asarray(full_precision("wavelengths", wavelengths), float)
@@ -74,8 +74,9 @@ class Camera:
         seed: int,
         sampler: str = "independent",
     ) -> np.ndarray:
-        """Return the radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each
-        pixel.
+        """Return the radiance (band, y, x) at `wavelengths` [m], in float32.
+
+        It is the mean over `spp` random positions in each pixel.
 
         sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel. Its noise is lower
             than the standard error of independent samples. It is not available in scalar variants, or for an spp that
@@ -98,8 +99,10 @@ class Camera:
         return np.concatenate(bands).reshape(-1, height, width).astype(np.float32)
 
     def first_hits(self) -> tuple[list[str], np.ndarray]:
-        """Return the name of the shape visible at each pixel's centre ("" for none), row by row, and the hit points (n,
-        3)."""
+        """Return the name of the shape visible at each pixel's centre, and the hit points (n, 3).
+
+        The names are listed row by row, with "" where no shape is visible.
+        """
         width, height = self.size
         y, x = (a.ravel() for a in np.indices((height, width)))
         positions = np.stack([(x + 0.5) / width, (y + 0.5) / height]).astype(np.float32)

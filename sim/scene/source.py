@@ -31,8 +31,9 @@ def load(source: Source) -> mujoco.MjModel:
 
 
 def specification(source: mujoco.MjSpec | str | Path) -> mujoco.MjSpec:
-    """Return a copy of an MjSpec, or the specification in a file (MJCF or URDF) or in MJCF text, which can be compiled
-    again.
+    """Return a specification that can be compiled again.
+
+    It is a copy of an MjSpec, or is read from a file (MJCF or URDF) or from MJCF text.
 
     Raises:
         ValueError: the source does not give a specification; one line names it.

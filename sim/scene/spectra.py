@@ -27,8 +27,8 @@ def resolve(model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None)
     Tabulated spectra are those of `optics.REFLECTANCES` and `optics.ILLUMINANTS`.
 
     Raises:
-        ValueError: a name that is neither a material nor a light of the model, or both; a value that is not a spectrum;
-            or reflectances above 1.
+        ValueError: a name is neither a material nor a light of the model, or is both; a value is not a spectrum; or a
+            reflectance is above 1.
     """
     materials = [model.material(i).name for i in range(model.nmat)]
     lights = [*(model.light(i).name for i in range(model.nlight)), HEADLIGHT]

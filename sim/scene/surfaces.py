@@ -86,8 +86,11 @@ def texture_id(model: mujoco.MjModel, geom: int) -> int:
 
 
 def texture_repeat(model: mujoco.MjModel, geom: int, size: np.ndarray) -> np.ndarray:
-    """Return the repeats (u, v) over a geom: the material's repeats, times the size along x and y if they are
-    uniform."""
+    """Return the texture's repeats (u, v) over a geom.
+
+    They are the material's repeats, multiplied by the geom's size along x and y if the material's texture is
+    uniform.
+    """
     material = model.geom_matid[geom]
     repeat = model.mat_texrepeat[material].astype(float)
     if model.mat_texuniform[material]:
@@ -121,8 +124,10 @@ def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray
 
 
 def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> Description:
-    """Return the Mitsuba texture of a geom's reflectance; `to_uv` (3, 3) maps the shape's texture coordinates to
-    MuJoCo's."""
+    """Return the Mitsuba texture of a geom's reflectance.
+
+    to_uv: map from the shape's texture coordinates to MuJoCo's, (3, 3)
+    """
     color = rgba(model, geom)[:3]
     texture = texture_id(model, geom)
     if texture < 0 or not is_mirrored(model, geom, texture):

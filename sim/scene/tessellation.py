@@ -67,8 +67,9 @@ class Triangles:
 
 
 def join(parts: list[Triangles]) -> Triangles:
-    """Join several meshes into one. Either all or none have texture coordinates, and either all or none have
-    normals.
+    """Join several meshes into one.
+
+    Either all or none have texture coordinates, and either all or none have normals.
     """
     offsets = np.cumsum([0] + [len(p.vertices) for p in parts[:-1]])
     uvs = [p.uv for p in parts if p.uv is not None]
@@ -160,8 +161,9 @@ def capsule(radius: float, half_length: float) -> Triangles:
 
 
 def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
-    """Return a mesh asset with one vertex per corner of each face, since normals and texture coordinates have separate
-    indices.
+    """Return a mesh asset with one vertex per corner of each face.
+
+    This is necessary because normals and texture coordinates have separate indices.
 
     As in MuJoCo's renderer, a corner of a mesh without texture gets the normal of its face if its own normal deviates
     from it.

@@ -45,7 +45,7 @@ class Variation:
         = high, the value is the same in all episodes. "NAME.material": names of materials; one is drawn.
 
     Raises:
-        ValueError: an unknown name, or an invalid range.
+        ValueError: a name is unknown, or a range is invalid.
     """
 
     ranges: Mapping[str, Range]
@@ -157,7 +157,7 @@ def kind_of(name: str) -> str:
     """Return the quantity of a range: LIGHT, TEMPERATURE, or one of OF_THINGS.
 
     Raises:
-        ValueError: an unknown quantity.
+        ValueError: the quantity is unknown.
     """
     if name in (LIGHT, TEMPERATURE):
         return name

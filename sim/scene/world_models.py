@@ -106,7 +106,7 @@ class WorldModels:
         """Set a world's sizes, colours and materials, and reset all other fields of its model to the compiled values.
 
         Raises:
-            ValueError: a material that is not one of the geom's.
+            ValueError: a material is not one of the geom's.
         """
         mine = self.models[world]
         if self.own and self.get_state(world) != self._compiled:

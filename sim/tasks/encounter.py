@@ -36,7 +36,7 @@ class Frozen:
         not rendered.
 
     Raises:
-        ValueError: an argument has another type.
+        ValueError: an argument has the wrong type.
     """
 
     task: Task
@@ -61,7 +61,7 @@ class Frozen:
         shape: shape of the actions, (world, number)
 
         Raises:
-            RuntimeError: the policy fails, or returns another shape.
+            RuntimeError: the policy fails, or returns actions of another shape.
         """
         try:
             predict = getattr(self.policy, "predict", None)

@@ -89,7 +89,7 @@ class Simulation:
         """Current state of all worlds; the type depends on the physics.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         if not self.begun:
             raise RuntimeError("the worlds have not begun: call reset first")
@@ -131,7 +131,7 @@ class Simulation:
         Return the worlds that could not continue, each with the reason.
 
         Raises:
-            RuntimeError: before the first reset.
+            RuntimeError: there has been no reset yet.
         """
         if not self.begun:
             raise RuntimeError("the worlds have not begun: call reset first")

@@ -1,5 +1,7 @@
-"""Rendering fidelity of the eyes in a task: set by the task, or chosen automatically from a few moments of its
-episodes."""
+"""Rendering fidelity of the eyes in a task.
+
+The task sets it, or it is chosen automatically from a few moments of the task's episodes.
+"""
 
 from __future__ import annotations
 

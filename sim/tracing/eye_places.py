@@ -77,7 +77,7 @@ class EyePlaces:
     mounts: one for each eye
 
     Raises:
-        ValueError: no mount, or a mount on a part that the model lacks.
+        ValueError: there is no mount, or the model lacks the part on which an eye is mounted.
     """
 
     def __init__(self, model: mujoco.MjModel, mounts: Sequence[Mount]) -> None:

@@ -59,7 +59,7 @@ class ModelScene:
     as_built: snapshot of the model, with which worlds are compared
 
     Raises:
-        ValueError: a model without visible geoms; spectra or variation of a part that the model lacks.
+        ValueError: the model has no visible geoms, or lacks a part that has spectra or is varied.
     """
 
     def __init__(

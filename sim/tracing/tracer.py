@@ -75,7 +75,7 @@ class Tracers:
     stand: the body that the eyes are fixed to; None: derived from their mounts
 
     Raises:
-        ValueError: an unknown name, or "closed_form" for a scene without a closed form.
+        ValueError: the name is unknown, or it is "closed_form" and the scene has no closed form.
     """
 
     def __init__(
@@ -135,8 +135,7 @@ class Tracers:
         """Return the tracer that uses area sampling.
 
         Raises:
-            ValueError: a world without closed forms for areas, or a request for the tracer "mitsuba", which traces only
-                rays.
+            ValueError: the world has no closed forms for areas, or the tracer is "mitsuba", which traces only rays.
         """
         if self._name == ModelTracer.name:
             raise ValueError(f"samples = 'areas': tracer = {self._name!r} traces rays only")

@@ -45,8 +45,9 @@ class Footprints(Protocol):
     tables: CellTables | None
 
     def hit(self, ray: Array, cells: CellTables | None) -> tuple[Array, Array, Array]:
-        """Return the distance [m] to the nearest wall (inf: none; 0: inside one), the number of the hit face, and its
-        normal.
+        """Return the distance [m] to the nearest wall, the number of the hit face, and its normal.
+
+        The distance is infinite if there is no wall, and 0 inside a wall.
 
         cells: `tables`, passed as an argument of the kernel
         """

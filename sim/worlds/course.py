@@ -37,8 +37,8 @@ class Course:
 
     Raises:
         ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
-            start; a start lies in the goal, has no path to it, or has only paths on which the distance from the start
-            decreases by more than MOST_FALL; or episode_steps is not a whole number above 0.
+            start; a start lies in the goal or has no suitable path to it; or episode_steps is not a whole number above
+            0. On a suitable path, the distance from the start never decreases by more than MOST_FALL.
     """
 
     drawing: str

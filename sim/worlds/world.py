@@ -50,9 +50,9 @@ class World(ReadOnlyArrays):
     """A compiled world.
 
     model: MuJoCo model. It contains static geoms and mocap bodies for the objects. The body "agent" has the slide
-        joints agent_x and agent_y, the hinge agent_heading, the actuators agent_x and agent_y (commanded velocity [m/s]
-        along the world's axes) and the sensor agent_touch (above 0 in contact with a wall). If the world was built with
-        eyes, the agent has a camera for each, with the name that `Eyes.names()` states
+        joints agent_x and agent_y and the hinge agent_heading. The actuators agent_x and agent_y command its velocity
+        [m/s] along the world's axes. The sensor agent_touch is above 0 in contact with a wall. If the world was built
+        with eyes, the agent has a camera for each, with the name that `Eyes.names()` states
     objects: names of the objects' bodies: ("goal", "adversary_0", "adversary_1"), or () in navigation and mazes
     starts: starting positions of the agent, at the centres of cells
     object_spawn: possible positions of objects, at the centres of cells, (m, 2) [m]
@@ -102,8 +102,8 @@ def build_world(
     """Build the world of a task.
 
     task: one of `sim.TASKS`
-    seed: seed of the mazes and of the stripes on walls in mazes and courses; the world of the other tasks does not
-        depend on it
+    seed: seed of the mazes and of the stripes on walls in mazes and courses; the worlds of other tasks do not depend on
+        it
     mazes: number of different mazes in the task "maze"; an episode starts in any of them
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
     layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
@@ -118,9 +118,9 @@ def build_world(
         clear air
 
     Raises:
-        ValueError: the task or the course is unknown, the seed is negative, `mazes`, `course` or `layouts` is given for
-            another task, `layouts` is given together with `seed`, `mazes` or `course`, the height is out of range, or
-            `spectra` contains a name that does not exist.
+        ValueError: the task or the course is unknown, the seed is negative, the height is out of range, or `spectra`
+            contains a name that does not exist. Other causes are that `mazes`, `course` or `layouts` is given for a
+            task without it, or that `layouts` is combined with `seed`, `mazes` or `course`.
     """
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")

@@ -176,7 +176,9 @@ class _Finder:
     def _unary(self, node: ast.UnaryOp) -> Iterator[Site]:
         kind = "sign" if isinstance(node.op, ast.USub) else "logic"
         if not isinstance(node.op, ast.UAdd):
-            yield self._site(kind, self._start(node), self._start(node.operand), "")
+            start = self._start(node)
+            length = re.match(rb"not\s+|.", self.source[start:]).end()  # type: ignore[union-attr]
+            yield self._site(kind, start, start + length, "")
 
     def _logic(self, node: ast.BoolOp) -> Iterator[Site]:
         words = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")
@@ -199,7 +201,7 @@ class _Finder:
 
     def _attribute(self, node: ast.Attribute) -> Iterator[Site]:
         if node.attr == "T":
-            yield self._site("axes", self._end(node.value), self._end(node), "")
+            yield self._site("axes", self._end(node) - len(".T"), self._end(node), "")
 
     def _subscript(self, node: ast.Subscript) -> Iterator[Site]:
         parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]

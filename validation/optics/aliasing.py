@@ -14,7 +14,10 @@ the largest angle that the samples represent leaves the grid at one edge and re-
 samples then do not reduce the error, and at larger distances it reaches 100 %. In terms of frequencies, the phase of
 the transfer function changes by more than half a wave between neighbouring samples.
 
-`optics.propagate` receives the same samples of the aperture, which have a hard edge. It chooses its own period, and removes light that would land far outside the window. Its error falls with N at any distance. The remaining error comes from the pixelated edge of the aperture. In `optics.psf` the user does not choose N: the function low-pass filters the edge and plans its own sampling.
+`optics.propagate` receives the same samples of the aperture, which have a hard edge. It chooses its own period, and
+removes light that would land far outside the window. Its error falls with N at any distance. The remaining error comes
+from the pixelated edge of the aperture. In `optics.psf` the user does not choose N: the function low-pass filters the
+edge and plans its own sampling.
 
 **First table.** Each row is one Fresnel number R²/λz. N* is the number of samples for which this distance is the
 critical one. The last columns show the error of `optics.psf`, its predicted error and the method that it chose.

@@ -1,9 +1,10 @@
 """Real eyes: published values of animals' eyes and computed ones
 
 Do the models reproduce what biologists measured and calculated for real eyes? The table compares published with
-computed values. Each row states the range in which the ratio computed/published must lie, and the command fails if a
-row leaves its range. Some ranges are wide, because the values differ for the reasons given below. These ranges only
-detect a change of the computed value; they do not claim agreement. The inputs come from `optics.animals`.
+computed values. Each row states the range in which the ratio computed/published must lie. If a ratio is outside its
+range, the command fails. Some ranges are wide, because the values differ for the reasons given below. A wide range does
+not mean that the values agree. Its only purpose is to detect a change of the computed value. The inputs come from
+`optics.animals`.
 
 **Method.** Land's sensitivity S is `optics.optical_sensitivity` in white light with k = 0.0067 per µm. Acceptance
 angles Δρ are full widths at half maximum of `optics.Ommatidium.sensitivity`, which is computed by wave optics with
@@ -11,16 +12,16 @@ waveguide modes. All rhabdoms have the refractive index 1.363 in a medium of 1.3
 Acuity is that of a hexagonal lattice.
 
 **Sources.** The last column states which part of the source was read: the article, a table, an appendix, the caption of
-a figure, the abstract, or a press release ("press"). The source of a "quoted" value was not accessible: the value comes
-from a later article, or was proposed for this page. Rows with "closed form" are compared with a formula.
+a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible, and that the
+value comes from a later article or was proposed for this page. "Closed form" means that the value comes from a formula.
 
-- Honeybees: Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1. Its Δρ is d/f. This ratio ignores diffraction,
-  so computed angles are larger, by 20 to 65 %. Electrophysiology supports them: 2.6° on average in dark-adapted eyes,
-  and less than 1.9° in the acute zone of light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017).
-  A closed pupil removes the higher modes (Stavenga 2004), so the light-adapted angle is computed from the first mode.
-  *Apis cerana* has V = 2.55 at 540 nm, just above the cut-off of the second mode at 2.405. Its angle is therefore
-  sensitive to the refractive indices. For *Apis dorsata*, S and the other columns of the table (D, f, Δρ and l) agree
-  only to within 9 %.
+- Honeybees: Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1. The published Δρ is d/f, which ignores
+  diffraction. The computed angles are therefore larger, by 20 to 65 %. Angles measured by electrophysiology agree
+  better with the computed ones: 2.6° on average in dark-adapted eyes, and less than 1.9° in the acute zone of
+  light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017). A closed pupil removes the higher modes
+  (Stavenga 2004), so the light-adapted angle is computed from the first mode. *Apis cerana* has V = 2.55 at 540 nm,
+  just above the cut-off of the second mode at 2.405. Its angle is therefore sensitive to the refractive indices. For
+  *Apis dorsata*, S and the other columns of the table (D, f, Δρ and l) agree only to within 9 %.
 - *Drosophila*: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1.
 - Blowfly: Stavenga, J. Exp. Biol. 207, 1703, 2004, caption of fig. 4. Dark-adapted angles approach d/f, and
   light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves could not be

@@ -12,10 +12,9 @@ an eye needs. The error of a PSF is its relative L2 distance from our direct sum
 The table states the median and the largest error over every fifth eye.
 
 **Table.** `psf_batch` runs with five tolerances and `psf` with three. The peers run with 32 to 256 samples across the
-pupil. The second table is for the design of lenses: pupils with a radius of 1 mm and a focal length of 10 mm, whose
-wavefront is a map of heights or a sum of Zernike modes. It states CPU times of single PSFs, without and with the
-gradient with respect to all heights or coefficients. They are compared with a matrix Fourier transform in NumPy, which
-predicts no error.
+pupil. The second table is for the design of lenses. The pupils have a radius of 1 mm, a focal length of 10 mm, and a
+map of heights or Zernike modes. The table states CPU times of single PSFs, without and with the gradient with respect
+to all heights or coefficients. They are compared with a matrix Fourier transform in NumPy, which predicts no error.
 
 **Limits.** The other codes cannot share a plan between the eyes of a population. They also have no exact propagator
 with a freely chosen output grid, as `optics.psf` has. Instead, their matrix Fourier transform from the pupil to the

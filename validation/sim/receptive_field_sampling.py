@@ -4,8 +4,13 @@ Do rays sample receptive fields without bias? Yes: errors fall with the number n
 n^-0.51 wherever a slope can be fitted. The automatically chosen sampling has an error of at most 0.165 of the receptor
 noise σ.
 
-**Method.** Behind a pupil, all receptors of an eye use one set of rays, whose directions are drawn from the mean of their receptive fields. The signal of a receptor is a weighted sum over these rays. These signals are compared with the published method, in which an image of the scene is convolved with the PSF (`Eye.see`). The image extends beyond the field of view by the width of the kernel on every side. Its grid differs from the grid on which the receptive fields of the rays are tabulated. Each cell of the image is rendered with many rays or, if light may be reflected any number of times, with many areas ([area sampling](../concepts/rendering.md#area-sampling)). Rays and reference use the same light, so they differ only in
-sampling.
+**Method.** Behind a pupil, all receptors of an eye use one set of rays, whose directions are drawn from the mean of
+their receptive fields. The signal of a receptor is a weighted sum over these rays. These signals are compared with the
+published method, in which an image of the scene is convolved with the PSF (`Eye.see`). The image extends beyond the
+field of view by the width of the kernel on every side. Its grid differs from the grid on which the receptive fields of
+the rays are tabulated. Each cell of the image is rendered with many rays or, if light may be reflected any number of
+times, with many areas ([area sampling](../concepts/rendering.md#area-sampling)). Rays and reference use the same light,
+so they differ only in sampling.
 
 Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection world.
 They are in units of the receptor noise σ = 0.01, where white gives a signal of 1 behind a pupil as wide as the retina

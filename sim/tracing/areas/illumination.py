@@ -1,5 +1,7 @@
-"""The light that reaches a patch of a surface. Walls and bodies block parts of it, and reflect light towards the
-patch."""
+"""The light that reaches a patch of a surface.
+
+Walls and bodies block parts of it, and reflect light towards the patch.
+"""
 
 from __future__ import annotations
 

@@ -63,7 +63,9 @@ def test_the_eyes_are_beside_it(short, frames):
         y, x = 0.5 + np.indices(eye.shape[:2]).reshape(2, -1)
         at = zip(number * (high + GAP) + y * high / len(eye), width + GAP + x * wide / len(eye[0]), strict=True)
         pixels = [frames[12][0].getpixel((int(right), int(down))) for down, right in at]
-        assert np.abs(np.subtract(pixels, eye.reshape(-1, 3))).mean() < 8, "the palette's colours"
+        errors = [np.abs(np.subtract(pixels, one.reshape(-1, 3))).mean() for one in (eye, receptors[1 - number])]
+        assert errors[0] < 16, "the palette has few colours"
+        assert errors[0] < 0.5 * errors[1], "eyes are in order"
 
 
 @pytest.mark.parametrize(

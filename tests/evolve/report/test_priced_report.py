@@ -192,7 +192,7 @@ def test_reports_show_both_where_they_differ(priced, call):
     assert acuity_text(replace(HIGH, n_eyes=1), "cpd") == "0.0500 cpd horizontally, 0.0250 vertically"
     header, *rows = Page(all_candidates(priced).markup).rows["all-candidates"]
     assert rows[0][header.index("acuity, horizontal × vertical [cpd]")] == "0.0500 × 0.0250"
-    assert "cycles per degree, horizontal × vertical, by sampling alone" in headline(priced).markup
+    assert "cycles per degree, horizontal × vertical; limit by receptor spacing alone" in headline(priced).markup
     rows = {line.split("  ")[0]: line.split()[-1] for line in call("compare", priced.path)[1].splitlines()}
     assert (rows["acuity [cpd]"], rows["vertical acuity [cpd]"]) == ("0.05", "0.025")
     table = evolve.Run.open(priced.path).to_dataframe()

@@ -10,7 +10,7 @@ successive_halving: test_successive_halving.py
 job: test_local_executor.py, test_dask_executor.py
 local_executor: test_local_executor.py
 worker: test_local_executor.py
-dask_executor: test_dask_executor.py, test_silent_cluster.py, test_dask_connection.py
+dask_executor: test_dask_rounds.py, test_dask_executor.py, test_silent_cluster.py, test_dask_connection.py
 dask_connection: test_dask_connection.py, test_silent_cluster.py
 signs_of_life: test_signs_of_life.py
 scheduler: test_scheduler.py, test_dask_connection.py, test_dask_executor.py

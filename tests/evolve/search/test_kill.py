@@ -14,7 +14,7 @@ from tests.slow_part import slow
 
 ROOT = Path(__file__).parents[3]
 KILLS = int(os.environ.get("RHABDOM_KILLS", "50"))
-TRAINING_KILLS = int(os.environ.get("RHABDOM_TRAINING_KILLS", "3"))
+TRAINING_KILLS = int(os.environ.get("RHABDOM_TRAINING_KILLS", "2"))
 SMALL = """
 seed = 11
 workers = 1

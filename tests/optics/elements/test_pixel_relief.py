@@ -87,7 +87,7 @@ class TestLenses:
     @pytest.mark.slow
     def test_finer_pixels_become_the_smooth_relief(self):
         """Each pixel's phase error is its slope times the position in it; the mean falls with the width squared."""
-        counts, off = (48, 96, 144), []
+        counts, off = (64, 128, 256), []
         smooth = Pupil(self.RADIUS, thin_lens_focal_length=self.FOCAL_LENGTH)
         limit = optics.strehl_ratio(optics.psf(smooth, [WAVELENGTH], self.FOCAL_LENGTH, shape=(65, 65)))[0]
         for count in counts:

@@ -35,9 +35,11 @@ class TestPerfectLens:
     def test_white_in_daylight_gives_one_in_every_channel(self):
         eye = Eye(resolution=(5, 8))
         signal = eye.see(white(eye, (20, 32)), S)
-        assert signal.shape == (3, 5, 8)
+        assert signal.shape == (eye.channels, 5, 8) == (3, 5, 8)
         assert signal.dtype == np.float32
         np.testing.assert_allclose(signal, 1, rtol=1e-6)
+        mosaic = Eye(resolution=(5, 8), receptors=eye.receptors.arranged([[0, 1], [2, 1]]))
+        assert mosaic.see(white(mosaic, (20, 32)), S).shape == (mosaic.channels, 5, 8) == (1, 5, 8)
 
     def test_a_point_of_light_falls_on_the_receptor_that_looks_at_it(self):
         eye = Eye(resolution=(6, 10))

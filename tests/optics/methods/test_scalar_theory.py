@@ -134,7 +134,7 @@ def errors(light, rng):
 def ratios():
     """Actual errors over predicted ones, (case, window and polarisation)."""
     rng, found = np.random.default_rng(5), []
-    for _ in range(60):
+    for _ in range(36):
         pupil, sine, defocus = pupils(rng)
         z, window = F + defocus * WAVE / sine**2, {"dx": WAVE / sine / 8, "shape": (65, 65)}
         plan = optics.plan(pupil, WAVE, z, tolerance=0.1, method="rayleigh_sommerfeld", **window)

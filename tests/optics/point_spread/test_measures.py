@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import optics
+from optics.point_spread.concentration import FINE, _around
 from validation import reference
 
 WAVELENGTH, FOCAL_LENGTH = 550e-9, 240e-6
@@ -230,3 +231,18 @@ def test_a_mean_of_a_mean_is_the_mean():
     pupil = optics.Pupil(30e-6, thin_lens_focal_length=240e-6)
     seen = optics.psf(pupil, [450e-9, 550e-9], dx=0.5e-6, shape=(33, 33)).mean([0.3, 0.7])
     assert optics.strehl_ratio(seen.mean([1.0])) == optics.strehl_ratio(seen)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("dx", [0.5e-6, 3e-6])
+def test_samples_extend_beyond_a_circle_by_the_reach_of_its_soft_edge(share, dx):
+    """This holds on all four sides, also for a circle beside the window's middle."""
+    result = ideal(4, dx, 9)
+    middle = (0.3 * dx, -0.7 * dx)
+    edge = float(result.x[-1]) - 0.7 * dx
+    seen, kernel = _around(result, middle, share * edge, edge)
+    needed = share * edge + kernel.reach / result.highest_cutoff
+    sides = [middle[0] - seen.x[0], seen.x[-1] - middle[0], middle[1] - seen.y[0], seen.y[-1] - middle[1]]
+    assert needed * (1 - 1e-9) <= min(sides)
+    assert max(sides) <= needed + 1.001 * seen.dx
+    assert seen.dx == pytest.approx(min(dx, FINE / result.highest_cutoff))

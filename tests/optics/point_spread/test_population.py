@@ -10,7 +10,14 @@ from optics import Grid
 from optics.apertures.aperture import EDGE_REACH
 from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.interpolation import cubic_bsplines
-from optics.point_spread.population import _sine, _spread, _Stack, _turns, population_pictures
+from optics.point_spread.population import (
+    _sine,
+    _splines_and_slopes,
+    _spread,
+    _Stack,
+    _turns,
+    population_pictures,
+)
 from optics.point_spread.population_members import HIGHEST_ORDER, Member, powers
 from tests.optics.device_types import Float64
 from validation.reference import relative_l2
@@ -166,3 +173,12 @@ def test_cycles_per_radius_are_differences_of_the_phase(pupil, source):
     tilt = radius * window.half_diagonal / (wavelength * z)
     assert turns == pytest.approx(steepest(1, everywhere) + tilt + member.detail, rel=1e-3)
     assert sine == pytest.approx((steepest(0, inside) + member.detail + 1) * wavelength / radius, rel=1e-3)
+
+
+def test_slopes_of_splines_are_their_differences():
+    x, step = np.linspace(-1.1, 1.1, 23), 1e-6
+    values, slopes = _splines_and_slopes((x + 1) / 2)
+    np.testing.assert_allclose(values, cubic_bsplines((x + 1) / 2))
+    for k, slope in enumerate(slopes):
+        ahead, behind = (cubic_bsplines((x + sign * step + 1) / 2)[k] for sign in (1, -1))
+        np.testing.assert_allclose(slope, (ahead - behind) / (2 * step), atol=1e-8)

@@ -191,3 +191,20 @@ def test_direct_sums_of_few_samples_are_checked(shape):
     exact = optics.psf(pupil, **asked, tolerance=1e-8, dtype="float64")
     off = np.linalg.norm(found.psf - exact.psf) / np.linalg.norm(exact.psf)
     assert off < found.plan.predicted_error < 0.1 * 1e-3
+
+
+def test_the_check_of_a_window_of_few_samples_may_take_a_larger_share_of_the_time():
+    """The number of points is proportional to the time, between a least time and the largest number."""
+    effort = spot_check_module.EFFORT
+    beam = Beam(Pupil(5e-4, optics.BSplineRelief(5e-5 * np.eye(4))), PointSource(), 550e-9, 2.5e-3)
+
+    def points(samples, seconds):
+        task = Problem.from_beam(beam, Grid((1, samples), 1e-6), 1e-4, "float64")
+        return spot_check_module._affordable(beam, task, 0.0, seconds).points
+
+    few, many = effort.few - 1, effort.few
+    assert points(many, 0.0) == points(few, effort.seconds) < effort.fewest
+    assert 20 < points(few, 0.03 / effort.share_of_few) == points(many, 0.03 / effort.share) < effort.points
+    assert points(few, 0.01) == pytest.approx(points(few, 0.03) / 3, abs=1)
+    assert points(many, 1e3) == effort.points
+    assert points(3, 1e3) == 3

@@ -3,6 +3,7 @@
 import itertools
 import math
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -47,9 +48,25 @@ def test_points_of_the_plane():
         assert level.pixel[i] == pytest.approx(up)
 
 
+def opacity(ahead, left, width, half):
+    """Return the opacity of a point in an eye's frame: of the field, of three receptors' directions, or of its edges.
+
+    Receptors are equally wide on the retina. width: size of a pixel at the point [m]
+    """
+    found = overlay.FILL if abs(math.atan2(left, ahead)) <= half else 0.0
+    centres = [math.atan(part * math.tan(half)) for part in (-2 / 3, 0.0, 2 / 3)]
+    for ray, strength in [*((ray, overlay.RAY) for ray in centres), (-half, overlay.RIM), (half, overlay.RIM)]:
+        across = abs(left * math.cos(ray) - ahead * math.sin(ray)) / width
+        if ahead * math.cos(ray) + left * math.sin(ray) > 0:
+            found = max(found, strength * min(1.0, max(0.0, overlay.LINE / 2 + 0.5 - across)))
+    return found
+
+
 @pytest.mark.parametrize("azimuth", [0.4, -2.9])
 def test_pixels_within_a_field_of_view(azimuth):
-    """A pixel is within the field if its point is in front of the eye and not too far from the axis."""
+    """A pixel is within the field if its point is in front of the eye and not too far from the axis. Lines with soft
+    edges show the field's edges and the receptors' directions.
+    """
     eye, half = np.array([0.13, -0.21]), math.radians(EYES.fov_deg) / 2
     field = overlay._field(overlay._level(VIEW, SIZE), EYES, azimuth, eye)
     shown = dict(zip(field.pixels.tolist(), range(len(field.pixels)), strict=True))
@@ -61,15 +78,16 @@ def test_pixels_within_a_field_of_view(azimuth):
         angle, distance = math.atan2(left, ahead), math.hypot(ahead, left)
         if distance > overlay.FARTHEST:
             assert pixel not in shown
-        elif abs(angle) < half:
+            continue
+        width = 2 * depth * math.tan(math.radians(VIEW.fovy_deg) / 2) / SIZE[0]
+        expected = opacity(ahead, left, width, half)
+        assert (field.opacity[shown[pixel]] if pixel in shown else 0) == pytest.approx(expected, abs=1e-5)
+        if abs(angle) < half:
             i, inside = shown[pixel], inside + 1
-            assert field.opacity[i] >= np.float32(overlay.FILL)
             assert field.distance[i] == pytest.approx(distance, rel=1e-5)
             assert field.depth[i] == pytest.approx(depth, rel=1e-5)
             near = rays[field.ray[i]] + field.share[i] * (rays[1] - rays[0])
             assert near == pytest.approx(angle, abs=1e-5)
-        elif pixel in shown:  # the antialiased rim
-            assert field.opacity[shown[pixel]] <= np.float32(overlay.RIM)
     assert inside > 5
 
 
@@ -80,6 +98,34 @@ def test_visibility_is_interpolated_between_rays():
     distance = (end + np.array([-1e-3, 1e-3, -1e-3, -1e-3])).astype(np.float32)
     field = overlay._Field(np.arange(4), np.ones(4), np.ones(4), distance, rays, share)
     np.testing.assert_array_equal(field.visible(reach), [True, False, True, True])
+
+
+@pytest.mark.parametrize("task", ["detection", "maze"])
+def test_rays_end_at_the_first_surface_except_the_own_body(task):
+    """Single rays of MuJoCo are the reference. In the maze, most of them hit walls."""
+    model = sim.build_world(task).model
+    data = mujoco.MjData(model)
+    data.qpos[:2] += 0.1
+    mujoco.mj_forward(model, data)
+    eye, azimuths = data.qpos[:2] + np.array([0.05, 0.0]), np.linspace(-3, 3, 40)
+    groups, hit = np.array([1, 1, 1, 0, 0, 0], np.uint8), np.zeros(1, np.int32)
+    expected = []
+    for azimuth in azimuths:
+        way = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+        origin = np.array([*eye, overlay.EYE_HEIGHT])
+        found = mujoco.mj_ray(model, data, origin, way, groups, 1, model.body("agent").id, hit)
+        expected.append(found if 0 <= found <= overlay.FARTHEST else overlay.FARTHEST)
+    assert np.ptp(expected) > 1
+    np.testing.assert_allclose(overlay._reach(azimuths, eye, model, data), expected, rtol=1e-5)
+
+
+def test_a_fan_covers_a_field_and_directions_of_many_receptors_are_thinned_out():
+    fan = overlay._fan(EYES)
+    np.testing.assert_allclose(fan[[0, -1]], np.radians([-35, 35]))
+    np.testing.assert_allclose(np.diff(fan), np.radians(70) / (overlay.FAN - 1))
+    wide = sim.Eyes(n_eyes=1, resolution=(1, 40), fov_deg=90)
+    centres = -np.arctan((2 * np.arange(40) + 1 - 40) / 40)
+    np.testing.assert_allclose(overlay._receptor_rays(wide), centres[::3])
 
 
 def test_colours_repeat():

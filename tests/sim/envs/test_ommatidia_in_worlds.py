@@ -8,7 +8,7 @@ from gymnasium import spaces
 
 import optics
 import sim
-from sim.envs.hexagon_images import hexagon_map
+from sim.envs.hexagon_images import _projected, _unprojected, hexagon_map
 from sim.envs.ommatidia_space import OmmatidiaBox
 from sim.envs.retina_images import BETWEEN
 
@@ -175,3 +175,24 @@ def test_auxiliary_entries_are_refused():
 
     with pytest.raises(ValueError, match="Deep: depth, ids and flow: are defined on a flat retina"):
         sim.make_vec_env(Deep(), n_envs=1)
+
+
+def test_the_map_is_hammers_projection():
+    """The projection keeps areas, and its inverse leads back. Its rim is an ellipse with half-axes 2√2 and √2."""
+    rng = np.random.default_rng(4)
+    ways = rng.normal(size=(200, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    places = _projected(ways)
+    back, inside = _unprojected(*places.T)
+    assert inside.all()
+    np.testing.assert_allclose(back, ways, atol=1e-9)
+    known = {(1, 0, 0): (0, 0), (0, 0, 1): (0, 2**0.5), (0, 0, -1): (0, -(2**0.5)), (-1, -1e-12, 0): (2 * 2**0.5, 0)}
+    np.testing.assert_allclose(_projected(np.array(list(known), float)), list(known.values()), atol=1e-6)
+    assert _projected(np.array([[0.8, 0.6, 0]]))[0, 0] < 0, "left is on the left"
+    step = 1e-5
+    x, y = places[np.hypot(places[:, 0] / 2, places[:, 1]) < 1.3].T
+    along_x = (_unprojected(x + step, y)[0] - _unprojected(x - step, y)[0]) / (2 * step)
+    along_y = (_unprojected(x, y + step)[0] - _unprojected(x, y - step)[0]) / (2 * step)
+    np.testing.assert_allclose(np.linalg.norm(np.cross(along_x, along_y), axis=1), 1, atol=1e-6)
+    for scale, expected in ((0.999, True), (1.001, False)):
+        assert _unprojected(*(scale * 2**0.5 * np.array([2 * np.cos(0.7), np.sin(0.7)])))[1] == expected

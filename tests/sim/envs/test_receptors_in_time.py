@@ -9,6 +9,7 @@ import pytest
 
 import optics
 import sim
+from sim.envs.frame_choice import with_frames
 from sim.envs.prepared_task import PreparedTask
 from sim.physics.mujoco_worlds import MujocoWorlds
 from sim.render.fidelity import Fidelity, Level
@@ -227,6 +228,20 @@ def test_the_table_of_a_fidelity_states_the_frames_and_their_error():
     assert (level.stage, level.level) == ("frames", f"{prepared.fidelity.frames} per action")
     assert 0 < level.predicted_error <= 0.01
     assert f"{prepared.fidelity.frames} per action" in str(prepared.fidelity)
+
+
+def test_stated_frames_are_added_once_and_only_to_eyes_in_use():
+    task = task_of(sim.build_world("detection"), "training", eyes=eyes(SLOW))
+    given = Fidelity(4, 2, levels=(Level("rays", "4", None, "as requested"),))
+    [agent] = task.agents()
+    [once] = with_frames(task, [{kind.name: given for kind in agent.kinds}], None)
+    for fidelity in once.values():
+        assert fidelity.frames == 5
+        assert fidelity.levels == (*given.levels, Level("frames", "5 per action", None, "as requested"))
+    assert with_frames(task, [once], None) == [once]
+    assert with_frames(task, [None], None) == [None]
+    [plain] = with_frames(task, [dict.fromkeys(once, replace(given, levels=()))], None)
+    assert all((fidelity.frames, fidelity.levels) == (5, ()) for fidelity in plain.values())
 
 
 def test_dynamics_of_another_type_are_refused():

@@ -29,7 +29,6 @@ LIGHTS = ("direct", "bounce")
 FINER = 4  # the reference has this many times the chosen rays: its own error raises the measured one by 3 to 9 %
 CASES = {
     "detection, a = 1/4": ("detection", behind_lens(DETECTION, 0.25)),
-    "detection, a = 0.6": ("detection", behind_lens(FEW, 0.6)),
     "navigation, a = 0.6": ("navigation", behind_lens(NAVIGATION, 0.6)),
     "navigation, perfect": ("navigation", replace(NAVIGATION, noise_sigma=0.03)),
 }
@@ -127,10 +126,9 @@ def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
         eyes = behind_lens(replace(FEW, noise_sigma=noise_sigma), a)
         return sim.choose_fidelity(world, eyes, bands="own", tracer="mitsuba").rays_per_receptor
 
-    found = [rays(a) for a in (0.1, 0.25, 0.6)]
-    assert found == sorted(found)
-    assert found[0] < 1 < found[-1]
-    assert found[0] < rays(0.1, noise_sigma=0.002) < PUPIL_RAYS[-1]
+    narrow, wide = (rays(a) for a in (0.1, 0.6))
+    assert narrow < 1 < wide
+    assert narrow < rays(0.1, noise_sigma=0.002) < PUPIL_RAYS[-1]
 
 
 @pytest.mark.slow

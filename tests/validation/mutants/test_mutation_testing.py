@@ -50,7 +50,9 @@ def test_places_are_those_where_people_err():
     )
 
 
-@pytest.mark.parametrize("source", ["é = 'ü'; y = a < b", "y = (a\n     < b)", "y = a.T @ arctan2(p, q)"])
+@pytest.mark.parametrize(
+    "source", ["é = 'ü'; y = a < b", "y = (a\n     < b)", "y = a.T @ arctan2(p, q)", "y = not (a + b).T, -(a), ~a"]
+)
 def test_a_mistake_changes_its_place_alone_and_is_still_python(source):
     for site in sites("a.py", source.encode()):
         wrong = site.applied(source.encode()).decode()
