@@ -26,7 +26,7 @@ from experiments.eye_factors_design import (
 )
 from experiments.eye_prices import PRICES, fittest, probability_of_finer
 from experiments.factorial import Effects, effects
-from experiments.means import Interval, difference, mean_of
+from experiments.means import Interval, mean_of
 from experiments.page import Figure, Page, markdown_table
 from experiments.store import Origin
 
@@ -86,9 +86,13 @@ def effects_in(rows: Sequence[Trained], task: str) -> Effects | None:
 
 
 def advantage(rows: Sequence[Trained], task: str, control: Control) -> Interval | None:
-    """Return the mean return of many coarse eyes minus that of few fine ones; None with fewer than two runs of each."""
-    many, few = (np.array([row.held_out for row in runs_of(rows, task, one)]) for one in (control.many, control.few))
-    return difference(many, few) if min(many.size, few.size) > 1 else None
+    """Return the mean return of many coarse eyes minus that of few fine ones; None with fewer than two pairs of runs.
+
+    Runs with the same seed have the same layouts. They form pairs, so that differences between layouts cancel.
+    """
+    many, few = ({row.seed: row.held_out for row in runs_of(rows, task, one)} for one in (control.many, control.few))
+    pairs = np.array([many[seed] - few[seed] for seed in sorted(many.keys() & few.keys())])
+    return mean_of(pairs) if pairs.size > 1 else None
 
 
 def factor_name(names: Sequence[str]) -> str:

@@ -27,15 +27,14 @@ from optics.eye import camera
 from optics.eye.sensor_pixels import SensorPixels
 from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths, wavelength_row
 from optics.numerics.autodiff import Array, plain
-from optics.numerics.backend import BackendError
-from optics.numerics.device import VARIABLE, make_ready
 from optics.numerics.grid import Grid
 from optics.numerics.number_types import full_precision
-from optics.numerics.precision import padded_for_packets, precision
 from optics.numerics.renamed import warn_once
+from optics.point_spread.coarse_stack import coarse_stack
 from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
 from optics.point_spread.psf_result import OF_CELLS
+from optics.torch_graph import DrJitOperation, Once, common_device, torch_place
 
 __all__ = ["PointSpread", "camera_image", "psf"]
 
@@ -75,6 +74,9 @@ def psf(
     pupils only if a sequence of pupils is passed, and an axis of distances only if a distance is a row. Each gradient
     has the device and the precision of its tensor. Only first derivatives are available.
 
+    At tolerances of 3e-4 or more, the source distances and wavelengths of a pupil share a plan and samples. One call is
+    then much faster than a call for each.
+
     A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
 
     Raises:
@@ -93,22 +95,77 @@ def psf(
     lambdas, numbers = wavelength_row(wavelengths), torch_numbers(light)
     if flag("requires_grad", requires_grad) and not numbers:
         raise ValueError("no tensor requires a gradient: at least one must have requires_grad=True")
-    place = torch.device(device) if device is not None else _common_device(numbers)
+    place = torch.device(device) if device is not None else common_device(numbers)
     if not torch.is_grad_enabled():
         light, numbers = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()}), {}
     integrated = flag("pixel_means", pixel_means) and view.get("method") not in OF_CELLS
     pixels = _pixels(light, lambdas, view) if integrated else None
-
-    def images(own: Sequence[Array]) -> Array:
-        changed = with_numbers(light, dict(zip(numbers, own, strict=True)))
-        return changed.images(lambdas, view if pixels is None else {**view, **vars(pixels.samples)})
-
-    found = _Evaluation.apply(images, *numbers.values()).to(place)
+    view = _completed(view if pixels is None else {**view, **vars(pixels.samples)})
+    found = _images(light, numbers, lambdas, view).to(place)
     if pixels is not None:
         rows, columns = (torch.tensor(part).to(found) for part in (pixels.rows, pixels.columns))
         found = rows @ found @ columns.T
+    found = found.unflatten(0, (len(light.pupils), len(light.distances)))
     found = found if is_row(sensor_distance) or is_row(source_distance) else found[:, 0]
     return found[0] if isinstance(pupil, Pupil) else found
+
+
+def _images(
+    light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
+) -> torch.Tensor:
+    """Return the PSFs of all members of a batch, (member, wavelength, y, x).
+
+    At coarse tolerances, PyTorch computes members with the same pupil and sensor's distance as one stack. Dr.Jit
+    computes all others.
+    """
+    images: dict[int, torch.Tensor] = {}
+    if torch_place() == "cpu" and all(tensor.device.type == "cpu" for tensor in numbers.values()):
+        images = _stacked(light, numbers, wavelengths, view)
+    rest = [place for place in range(len(light.members)) if place not in images]
+    if rest:
+
+        def others(own: Sequence[Array]) -> Array:
+            changed = with_numbers(light, dict(zip(numbers, own, strict=True)))
+            return changed.images(rest, wavelengths, view)
+
+        computed = DrJitOperation.apply(others, *numbers.values())
+        if len(rest) == len(light.members):
+            return computed
+        images |= dict(zip(rest, computed, strict=True))
+    return torch.stack([images[place] for place in range(len(images))])
+
+
+def _stacked(
+    light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
+) -> dict[int, torch.Tensor]:
+    """Return the PSFs of those members that a stack computes within the tolerance, (wavelength, y, x), by index."""
+    found: dict[int, torch.Tensor] = {}
+    fixed = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()})
+    asked = wavelengths, Grid(view["shape"], view["dx"], view["centre"]), view["dtype"]
+    without = carrying = fixed.stacks(*asked, np.asarray)
+    if numbers:
+        once = with_numbers(light, {name: Once.apply(tensor) for name, tensor in numbers.items()})
+        carrying = once.stacks(*asked, torch.from_numpy)
+    for (places, own), (_, plain_stack) in zip(carrying, without, strict=True):
+        part = coarse_stack(own, plain_stack, view["tolerance"], view["method"])
+        if part is not None:
+            images, met = torch.as_tensor(part[0]), np.all(part[1], axis=1)
+            found |= {place: image for place, image, right in zip(places, images, met, strict=True) if right}
+    return found
+
+
+def _completed(view: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `optics.psf` for window, tolerance and method, with its defaults."""
+    known = {name: value.default for name, value in inspect.signature(drjit_psf).parameters.items()}
+    named = ("dx", "shape", "tolerance", "method", "dtype", "centre")
+    return {name: known[name] for name in named} | dict(view)
+
+
+def _pixels(light: LightBatch, wavelengths: np.ndarray, view: Mapping[str, Any]) -> SensorPixels:
+    asked = _completed(view)
+    window = Grid(asked["shape"], asked["dx"], asked["centre"])
+    tolerance = in_range("tolerance", asked["tolerance"], 1e-12, 0.5)
+    return SensorPixels.around(window, light.cutoff(wavelengths), tolerance)
 
 
 def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any = None, **view: Any) -> torch.Tensor:
@@ -125,7 +182,7 @@ def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any
         AccuracyError: see `optics.psf`.
     """
     numbers = torch_numbers(of_kind("pupil", pupil, Pupil, "optics.Pupil(1e-3)"))
-    place = torch.device(device) if device is not None else _common_device(numbers)
+    place = torch.device(device) if device is not None else common_device(numbers)
     if not numbers or not torch.is_grad_enabled():
         fixed = with_numbers(pupil, {name: plain(tensor)[()] for name, tensor in numbers.items()})
         return torch.from_numpy(np.asarray(camera.camera_image(scene, fixed, sensor, **view))).to(place)
@@ -133,92 +190,7 @@ def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any
     def electrons(own: Sequence[Array]) -> Array:
         return camera.camera_image(scene, with_numbers(pupil, dict(zip(numbers, own, strict=True))), sensor, **view)
 
-    return _Evaluation.apply(electrons, *numbers.values()).to(place)
-
-
-def _pixels(light: LightBatch, wavelengths: np.ndarray, view: Mapping[str, Any]) -> SensorPixels:
-    asked = {name: value.default for name, value in inspect.signature(drjit_psf).parameters.items()} | dict(view)
-    window = Grid(asked["shape"], asked["dx"], asked["centre"])
-    tolerance = in_range("tolerance", asked["tolerance"], 1e-12, 0.5)
-    return SensorPixels.around(window, light.cutoff(wavelengths), tolerance)
-
-
-class _Evaluation(torch.autograd.Function):
-    """A function of Dr.Jit arrays as an operation of PyTorch. Its graph serves any number of backward passes."""
-
-    @staticmethod
-    def forward(ctx: Any, function: Callable[[list[Array]], Array], *numbers: Any) -> Any:
-        import drjit as dr
-
-        place, types = _place(), precision("float64")
-        own = [_on_drjit(tensor.double(), types.Tensor64, place) for tensor in numbers]
-        dr.enable_grad(own)
-        found = function(own)
-        dr.eval(found)
-        ctx.own, ctx.found, ctx.kinds = own, found, [(t.shape, t.dtype, t.device) for t in numbers]
-        return _on_torch(dr.detach(found), place)
-
-    @staticmethod
-    def backward(ctx: Any, *gradients: Any) -> Any:
-        import drjit as dr
-
-        place = _place()
-        dr.set_grad(ctx.found, _on_drjit(gradients[0], type(ctx.found), place))
-        dr.backward_from(ctx.found, flags=dr.ADFlag.ClearVertices)  # keeps the edges for further passes
-        slopes = dr.grad(ctx.own)
-        dr.eval(slopes)
-        found = [
-            _on_torch(slope, place).reshape(shape).to(place_of, dtype)
-            for slope, (shape, dtype, place_of) in zip(slopes, ctx.kinds, strict=True)
-        ]
-        dr.clear_grad(ctx.own)
-        if torch.is_grad_enabled():
-            found = _FirstDerivative.apply(*(slope.requires_grad_() for slope in found))
-        return None, *found
-
-
-class _FirstDerivative(torch.autograd.Function):
-    """First derivatives, which refuse to be differentiated."""
-
-    @staticmethod
-    def forward(ctx: Any, *slopes: Any) -> Any:
-        return tuple(slope.clone() for slope in slopes)
-
-    @staticmethod
-    def backward(ctx: Any, *gradients: Any) -> Any:
-        raise RuntimeError("optics.torch.psf has no second derivatives: must be differentiated once")
-
-
-def _on_drjit(tensor: torch.Tensor, kind: Any, place: str) -> Array:
-    tensor = tensor.detach().resolve_neg().to(place).reshape(tensor.shape or (1,)).contiguous()
-    return kind(padded_for_packets(tensor.numpy()), tuple(tensor.shape)) if place == "cpu" else kind(tensor)
-
-
-def _on_torch(tensor: Array, place: str) -> torch.Tensor:
-    return torch.from_numpy(np.array(tensor.numpy())) if place == "cpu" else tensor.torch().clone()
-
-
-def _place() -> str:
-    """Return the torch name of the device on which optics computes.
-
-    Raises:
-        BackendError: Dr.Jit or this build of torch cannot compute on this device.
-    """
-    place = make_ready()
-    if place == "cuda" and not torch.cuda.is_available():
-        raise BackendError(f"{VARIABLE} requires a GPU, but this torch has none: must be cpu, or torch built for CUDA")
-    return place
-
-
-def _common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
-    """Return the device of all tensors; single numbers on the processor fit any device, as in torch."""
-    places = {name: t.device for name, t in numbers.items() if t.ndim or t.device.type != "cpu"}
-    for first, known in places.items():
-        for name, place in places.items():
-            if place != known:
-                raise ValueError(f"{name} is on {place} and {first} on {known}: must be on one device, or pass device=")
-        return known
-    return torch.device("cpu")
+    return DrJitOperation.apply(electrons, *numbers.values()).to(place)
 
 
 def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:

@@ -26,7 +26,7 @@ def check_eye(eye: EyeConfig) -> None:
     """Check the names, the light, the rhabdoms and the temporal settings of eyes.
 
     Raises:
-        ConfigError: an unknown name, or settings that contradict each other.
+        ConfigError: a name is unknown, or settings contradict each other.
     """
     names = {"receptors": (*RECEPTORS, INHERITED), "vertical_fov": VERTICAL_FOVS}
     for name, known in {**names, "adaptation": ADAPTATIONS, "motion_detectors": MOTION}.items():

@@ -21,10 +21,12 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 
 
 def check_layouts(world: WorldConfig) -> None:
-    """Check words, sizes, and that no setting of the other kind of layouts is changed.
+    """Check the settings of layouts: names, sizes, and that settings without effect have their defaults.
+
+    Settings of random families have no effect on fixed layouts, and the other way round.
 
     Raises:
-        ConfigError: a word is unknown, a size is even, or a setting has no effect.
+        ConfigError: a name is unknown, a size is even, or a changed setting has no effect.
     """
     for name, known in CHOICES.items():
         if (word := getattr(world, name)) not in known:

@@ -12,7 +12,9 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """Return the source; for square eyes, equal settings of height and width are moved to the gene for both sides.
+    """Return the source with settings that suit square eyes, which have a single gene for height and width.
+
+    For square eyes, equal settings of height and width become the settings of this gene.
 
     A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes, the task's
     settings of height and width are ignored, and the preset's width applies to both sides.

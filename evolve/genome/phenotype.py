@@ -174,7 +174,7 @@ class Phenotype:
 
 
 def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
-    """Return the phenotype of a genome with the settings of a run. Overlaps are repaired.
+    """Return the phenotype of a genome with the settings of a run. Gene values with which eyes overlap are repaired.
 
     Every genome with the right number of finite coordinates has a phenotype.
     """

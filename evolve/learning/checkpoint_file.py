@@ -44,7 +44,10 @@ def metadata_of(content: bytes) -> dict[str, str]:
 
 
 def owned(owner: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, str]:
-    """Return the metadata of a checkpoint with these numbers. `sealed` then inserts the checksum."""
+    """Return the metadata of a checkpoint: its owner, `numbers` and a placeholder.
+
+    `sealed` replaces the placeholder by the checksum.
+    """
     return {ENTRY: json.dumps({**numbers, "owner": owner, "sha256": BLANK})}
 
 

@@ -89,7 +89,7 @@ def neighbourhoods(directions: np.ndarray) -> np.ndarray:
 
 
 def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Return the indices `near` with all but the first in the order of their azimuths around the first direction."""
+    """Return the indices `near`. All but the first are sorted by their azimuth around the first direction."""
     ahead, left, _ = directions[near[0]]
     level = np.hypot(ahead, left)
     rightwards = np.array([left, -ahead, 0]) / level if level > 0 else np.array([0.0, -1.0, 0.0])

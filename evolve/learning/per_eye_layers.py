@@ -36,8 +36,9 @@ class PerEyeLinear(nn.Module):
 
     @property
     def weights(self) -> tuple[Tensor, Tensor]:
-        """Return weights (eye, outputs, inputs) and biases (eye, outputs, 1), which are views of the same numbers if
-        eyes share them.
+        """Return weights (eye, outputs, inputs) and biases (eye, outputs, 1).
+
+        If eyes share them, both are views of the same numbers.
         """
         return self.weight.expand(self.n_eyes, -1, -1), self.bias.expand(self.n_eyes, -1, -1)
 

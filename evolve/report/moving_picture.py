@@ -121,6 +121,7 @@ def _world(episode: Episode, time: int) -> Image.Image:
 
 
 def _from_above(episode: Episode, plan: GroundPlan, time: int) -> Image.Image:
+    """Return the plan of the world at one time, as high as a frame."""
     x0, y0, x1, y1 = plan.bounds
     scale = SMOOTH * HEIGHT / (y1 - y0)
     width = round((x1 - x0) * scale / SMOOTH)

@@ -23,8 +23,8 @@ def _ignore(note: str) -> None:
 def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
     """Repair a run, hold its lock within the context, and yield whether candidates remain to be evaluated.
 
-    If candidates remain, the run has also been checked, and versions.json contains this start. Otherwise, obsolete
-    checkpoints have been removed.
+    If candidates remain, the run has also been checked, and this start has been recorded in versions.json. Otherwise,
+    obsolete checkpoints have been removed.
 
     note: function that is called with each remark for the user: on damaged files, on settings that have changed, and
         on software that has changed

@@ -86,7 +86,7 @@ def eagle(receptors_across: int = 60) -> Eye:
     receptors_across: receptors along each side of the patch, 1 to 1000.
 
     Raises:
-        ValueError: receptors_across outside its range.
+        ValueError: receptors_across is outside its range.
     """
     diameter = 157 * math.degrees(1) * 550e-9
     return _patch(_lens(diameter, 22e-3), 140.0, 22e-3, receptors_across, (567.0,))

@@ -131,7 +131,7 @@ class Aperture(ABC):
         Frequencies of a varying amplitude count as well.
 
         Raises:
-            ValueError: cycles outside [0, 1e5] or digits outside [0, 16].
+            ValueError: cycles is outside [0, 1e5], or digits is outside [0, 16].
         """
         return self._nodes(in_range("cycles", cycles, 0.0, 1e5), in_range("digits", digits, 0.0, 16.0))
 
@@ -146,7 +146,7 @@ class Aperture(ABC):
         the fewest samples.
 
         Raises:
-            ValueError: passband negative, ripple outside [1e-13, 0.5], or widest_reach not positive.
+            ValueError: passband is negative, ripple is outside [1e-13, 0.5], or widest_reach is not positive.
         """
         in_range("passband", passband, 0.0, MOST_CYCLES)
         in_range("ripple", ripple, LEAST_RIPPLE, 0.5)

@@ -20,6 +20,7 @@ turbid_medium     TurbidMedium: water and fog between surfaces and eyes
 ball_lens         BallLens: gradient-index ball lenses
 spherical_index   rays through spheres with a radial index profile
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
+pupil_path        parts of the optical path that do not depend on the wavelength
 pupil_slopes      slopes of the wavefront behind a pupil
 wavefront_slopes  directions of a wavefront's rays
 beam              light of one wavelength between source and sensor plane

@@ -45,8 +45,9 @@ class DerivativeKnots:
     names: tuple[str, ...]
 
     def without_maps(self, pupil: Pupil) -> Pupil:
-        """Return the pupil without the maps. The cells between knots resolve them, so their bandwidth does not
-        matter.
+        """Return the pupil without the maps.
+
+        The cells between knots resolve them, so their bandwidth does not matter.
         """
         without: dict[str, Any] = dict.fromkeys(self.names)
         return replace(pupil, **without)

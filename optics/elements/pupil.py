@@ -12,6 +12,7 @@ import numpy as np
 from optics.apertures.aperture import Aperture
 from optics.apertures.circular import Circle
 from optics.elements.pixel_relief import PixelRelief
+from optics.elements.pupil_path import lens_path, relief_height, wavefront_ahead
 from optics.elements.pupil_slopes import all_slopes, sampled_slopes
 from optics.elements.refractive_index import Dispersion, index_of, material
 from optics.elements.relief import HeightMap, Relief
@@ -20,7 +21,7 @@ from optics.elements.transmittance import Mask
 from optics.elements.wavefront import Aberration
 from optics.elements.wavefront_slopes import Slopes
 from optics.numerics.arguments import finite, of_kind, positive, reals
-from optics.numerics.array_library import library, like
+from optics.numerics.array_library import like
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.precision import precision
 
@@ -226,19 +227,11 @@ class Pupil:
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource) -> Array:
         """Return the optical path [m] from the source through points (x, y) [m], arrays as in `Relief.height`."""
         total = source.path(x, y) * like(x, self.index_before(wavelength))
-        if self.thin_lens_focal_length is not None:
-            f, own = like(x, self.thin_lens_focal_length), library(x)
-            r2 = x * x + y * y
-            bent = r2 / (own.sqrt(r2 + f * f) + own.abs(f)) * own.sign(f)
-            total = total - bent * like(x, self.index_behind(wavelength))
+        if (shorter := lens_path(self, x, y)) is not None:
+            total = total - shorter * like(x, self.index_behind(wavelength))
         if self.bends(wavelength):
-            scale = 1 / like(x, self.aperture_radius)
-            total = total + like(x, self.index_step(wavelength)) * self.height.height(x * scale, y * scale)
-        if self.wavefront is not None:
-            own = self.aperture_radius if self.wavefront.radius is None else self.wavefront.radius
-            scale = 1 / like(x, own)
-            total = total - self.wavefront.ahead(x * scale, y * scale)
-        return total
+            total = total + like(x, self.index_step(wavelength)) * relief_height(self, x, y)
+        return total if (ahead := wavefront_ahead(self, x, y)) is None else total - ahead
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
         """Return the gradient of the path over the disk and its soft edge. A relief's square pixels have no slope."""

@@ -171,7 +171,7 @@ def index_of(name: str, value: Any) -> Dispersion:
     """Convert a number or a curve to a curve; numbers must lie in [1, 10] and carry no derivatives.
 
     Raises:
-        ValueError: neither a number nor a curve.
+        ValueError: the index is neither a number nor a curve.
     """
     if isinstance(value, Dispersion):
         if value.is_differentiable:

@@ -198,15 +198,14 @@ class HeightMap(Relief):
         """Return the spline coefficients as an array like `x`. They are linear in the samples, M h Nᵀ."""
         if not is_differentiable(self.samples) or library(x) is np:
             return like(x, self._coefficients)
-        down, across = (_spline_coefficients(np.eye(n)) for n in self._heights.shape)
+        down, across = map(_spline_matrix, self._heights.shape)
         found = matrix_like(x, down) @ matrix_like(x, self.samples) @ matrix_like(x, np.ascontiguousarray(across.T))
         return like(x, found)
 
     def height(self, x: Array, y: Array) -> Array:
         rows, columns = self._heights.shape
         if _open_grid(x, y):
-            found: np.ndarray = _basis(y[:, 0], rows) @ self._coefficients @ _basis(x[0], columns).T
-            return found
+            return _basis(y[:, 0], rows) @ self._coefficients @ _basis(x[0], columns).T
         values = self._values(x)
         (column, across), (row, along) = _cell(x, columns), _cell(y, rows)
         stride = like(row, _width(columns))
@@ -214,8 +213,7 @@ class HeightMap(Relief):
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
         """Return heights (y, x) at positions in units of the radius; NumPy arrays without derivatives."""
-        found: np.ndarray = self.height(at[None, :], at[:, None])
-        return found
+        return np.asarray(self.height(at[None, :], at[:, None]))
 
     def bandwidth(self, level: float) -> float:
         return band_of(self._heights, level)
@@ -287,6 +285,12 @@ def _spline_coefficients(samples: np.ndarray) -> np.ndarray:
     before = core[0] + (core[0] - core[1]) * steps[::-1]
     after = core[-1] + (core[-1] - core[-2]) * steps
     return np.concatenate([before, core, after])
+
+
+@lru_cache(maxsize=16)
+def _spline_matrix(n: int) -> np.ndarray:
+    """Return the matrix of `_spline_coefficients` for n samples, (coefficient, sample)."""
+    return _spline_coefficients(np.eye(n))
 
 
 @lru_cache(maxsize=16)

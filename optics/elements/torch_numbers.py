@@ -38,6 +38,8 @@ def refuse_torch(beam: Beam) -> None:
 
 def _children(element: Any) -> list[tuple[str, Any, Any]]:
     """Return (name in messages, key, value) of the fields of a dataclass or the entries of a dictionary or tuple."""
+    if isinstance(element, float | int | str | None):
+        return []  # most elements
     if is_dataclass(element) and not isinstance(element, type):
         return [(f".{field.name}", field.name, getattr(element, field.name)) for field in fields(element) if field.init]
     if isinstance(element, tuple):

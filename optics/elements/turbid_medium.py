@@ -183,7 +183,7 @@ def medium_of(name: str, value: Any) -> TurbidMedium | None:
     name: name of the argument, for the error message
 
     Raises:
-        ValueError: anything else.
+        ValueError: the argument is of another kind.
     """
     if value is None or isinstance(value, str):
         return None if value is None else turbid_medium(one_of(name, value, MEDIA_OF_WORLDS))

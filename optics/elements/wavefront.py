@@ -20,8 +20,8 @@ from optics.elements.square_samples import map_samples
 from optics.elements.zernike_modes import mode, norm, weighted_modes
 from optics.elements.zernike_order import HIGHEST, fringe_mode, noll_mode, numbered, osa_mode
 from optics.numerics.arguments import finite, plain_reals, positive, reals, shown
-from optics.numerics.array_library import gather, like
-from optics.numerics.autodiff import Array, is_differentiable, number
+from optics.numerics.array_library import gather, library, like
+from optics.numerics.autodiff import Array, carries_derivative, is_differentiable, number
 
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
 
@@ -140,9 +140,8 @@ class Zernike(Aberration):
 
     def ahead(self, x: Array, y: Array) -> Array:
         named = [key for key, value in self.modes.items() if value != 0 or self.asks]
-        if named and isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
-            coefficients = UM * np.array([self.modes[key] for key in named])
-            return weighted_modes(coefficients, tuple(named), x, y)
+        if named and library(x).__name__ != "drjit" and not carries_derivative(x):
+            return weighted_modes(self._coefficients(named, x), tuple(named), x, y)
         total = like(x, 0.0)
         for n, m in named:
             total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
@@ -190,6 +189,12 @@ class Zernike(Aberration):
     def order(self) -> int:
         """Highest radial order."""
         return max((n for (n, _), value in self.modes.items() if value != 0 or self.asks), default=0)
+
+    def _coefficients(self, named: list[tuple[int, int]], x: Array) -> Array:
+        """Return the coefficients [m] of modes as a row like `x`."""
+        if library(x) is np:
+            return UM * np.array([self.modes[key] for key in named])
+        return library(x).stack([self._coefficient(n, m, x) for n, m in named])
 
     def _coefficient(self, n: int, m: int, x: Array) -> Array:
         """Return the coefficient [m] of a mode as a number like `x`."""

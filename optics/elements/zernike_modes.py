@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.array_library import library, like
+from optics.numerics.autodiff import plain
+
 __all__ = ["mode", "norm", "weighted_modes"]
 
 MOST_CACHED = 4_000_000  # choice, limited by memory: largest number of values of polynomials that are cached together
@@ -33,13 +36,17 @@ def mode(n: int, m: int, x: Any, y: Any) -> Any:
     return norm(n, m) * now * (cosine if m >= 0 else sine)
 
 
-def weighted_modes(weights: np.ndarray, named: tuple[tuple[int, int], ...], x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return Σ w Z_n^m at (x, y). Many wavefronts have the same samples, so the polynomials are cached for them."""
+def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: Any) -> Any:
+    """Return Σ w Z_n^m at (x, y). Many wavefronts have the same samples, so the polynomials are cached for them.
+
+    weights, x, y: arrays of NumPy or PyTorch, in float64. Positions carry no derivatives.
+    """
     size = np.broadcast_shapes(x.shape, y.shape)
     if len(named) * math.prod(size) > MOST_CACHED:
-        return np.asarray(sum((w * mode(n, m, x, y) for w, (n, m) in zip(weights, named, strict=True)), np.zeros(size)))
-    known = _modes(named, x.tobytes(), x.shape, y.tobytes(), y.shape)
-    return np.asarray((weights @ known).reshape(size))
+        return sum((w * mode(n, m, x, y) for w, (n, m) in zip(weights, named, strict=True)), like(x, np.zeros(size)))
+    places = [plain(at) for at in (x, y)]
+    known = _modes(named, places[0].tobytes(), x.shape, places[1].tobytes(), y.shape)
+    return (weights @ (known if library(x) is np else library(x).from_numpy(known))).reshape(size)
 
 
 @lru_cache(maxsize=8)

@@ -63,7 +63,7 @@ def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
     """Return coefficients by mode from {number: coefficient}, or from a row that starts with number 1.
 
     Raises:
-        ValueError: neither of these, a number that does not exist, or a coefficient that is not finite.
+        ValueError: the argument is of another kind, a number does not exist, or a coefficient is not finite.
     """
     if isinstance(given, Mapping):
         for j, value in given.items():

@@ -4,6 +4,8 @@ eye                   Eye
 eye_spec              EyeSpec: parameters of an eye
 immersion             immersed: an eye under water
 geometry              lengths and directions, and checks of the pupil's width
+receptor_density      Fovea, VisualStreak: density of receptors over a retina
+receptor_lattice      receptors of different sizes, from their density
 cell_integrals        integrals of sampled functions over cells
 retina                the retina as a plane of cells
 sensor_pixels         means over the pixels of a sensor
@@ -21,6 +23,7 @@ polarization          microvilli over a retina and polarised scenes
 signals               signals of a scene
 photoreceptor         throughput, spectral weighting, noise
 camera                image of a scene on the sensor of a camera
+patch                 the receptor in one direction as an eye of its own
 summary               table of an eye's limits
 acuity                limits by the spacing of receptors, diffraction and photons
 """

@@ -199,9 +199,8 @@ def _distances(depth: Any, shape: tuple[int, ...]) -> Any:
 
 def _read(signals: np.ndarray | Array, sensor: Sensor, eye: Eye, rng: np.random.Generator | None) -> np.ndarray | Array:
     """Return electrons or digital numbers for the signals of pixels."""
-    budget = eye.photons
-    assert budget is not None
-    per_signal = budget[eye.mosaic][None] if eye.mosaic is not None else budget[:, None, None]
+    per_signal = eye.receptor_photons
+    assert per_signal is not None
     mean = np.maximum(plain(signals), 0) * per_signal
     noise = np.zeros_like(mean) if rng is None else photon_noise(mean, 1.0, rng) - mean
     read = 0.0 if rng is None else sensor.read_noise * rng.standard_normal(mean.shape)

@@ -74,7 +74,7 @@ def inverse_distances_in(shape: tuple[int, int], z: Any) -> np.ndarray:
     z: distances [m], a number or (Y, X).
 
     Raises:
-        ValueError: z of another shape, or invalid distances.
+        ValueError: z has the wrong shape, or a distance is invalid.
     """
     if is_differentiable(z):
         positive("z", z, infinite=True, carried=True)

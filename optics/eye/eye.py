@@ -14,6 +14,7 @@ from optics.eye.eye_spec import EyeSpec
 from optics.eye.geometry import direction, tangents
 from optics.eye.kernel_bank import KernelBank, prepare
 from optics.eye.kernel_interpolation import NodeError
+from optics.eye.patch import receptor_in, spacing_range
 from optics.eye.polarization import taken_by
 from optics.eye.receptive_field import perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
@@ -70,6 +71,10 @@ class Eye(EyeSpec):
     most_seconds: largest predicted time [s] of the PSF of a band. Pupils that need more are refused.
     dynamics: responses of the receptors over time, which environments compute. The methods of `Eye` return signals of
         constant light. None: receptors respond without delay.
+    density: receptors per area of the retina, of which only ratios matter: a function of the angles (right, up)
+        [degrees] from the eye's axis, such as `Fovea` and `VisualStreak`, an array (row, column) over the whole field,
+        with the top left first, or the `lattice` of an eye. Receptors are rectangles in rows. A signal is the mean over
+        a receptor, and large receptors have less shot noise (None: all receptors are alike).
     tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
         receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
@@ -122,8 +127,8 @@ class Eye(EyeSpec):
             cell is its geometric image.
 
         The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
-        enough to lose less than the tolerance (limits: see `receptive_field`). The kernel of the perfect lens is 1 x 1
-        with the value 1.
+        enough to lose less than the tolerance (limits: see `receptive_field`). Light of a steep relief may count as
+        blocked if it lands farther from the image than the longer side of the retina. A perfect lens has the kernel 1.
 
         The kernel treats the light of each scene cell as coming from its centre. Signals are then a² Σ_b weights[c, b]
         (kernel_b ⊗ radiance_b), averaged over each receptor's cells. By default, `see` assumes light from all over each
@@ -143,17 +148,17 @@ class Eye(EyeSpec):
         return to_user(receptor_kernel(self, retina, z, tangents(asked), self.waveguide is not None))
 
     def _retina(self, samples_per_receptor: int) -> Retina:
-        return self._retina_for(self.spectral_bands.wavelengths, samples_per_receptor)
+        return self._retina_of(self.spectral_bands.wavelengths, self.receptor_size, samples_per_receptor)
 
-    def _retina_for(self, wavelengths: np.ndarray, samples_per_receptor: int) -> Retina:
-        height, width = self.receptor_size
-        cell = height / samples_per_receptor, width / samples_per_receptor
-        settings = self.tolerance, self.dtype, self.pupil_turned, self.most_seconds
-        return Retina(self.retina_distance, wavelengths, cell, *settings)
+    def _retina_of(self, wavelengths: np.ndarray, receptor: tuple[float, float], samples: int) -> Retina:
+        size = self.resolution[0] * self.receptor_size[0], self.resolution[1] * self.receptor_size[1]
+        settings = size, samples, self.dtype, self.pupil_turned, self.most_seconds
+        cell = receptor[0] / samples, receptor[1] / samples
+        return Retina(self.retina_distance, wavelengths, cell, self.tolerance, *settings)
 
     def chosen_bands(self) -> SpectralBands:
         """Return the fewest bands that keep a receptor's predicted error within the tolerance."""
-        retina = self._retina_for(np.empty(0), CELLS_FOR_BANDS)
+        retina = self._retina_of(np.empty(0), self.smallest_receptor, CELLS_FOR_BANDS)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
 
     def sight(
@@ -201,8 +206,9 @@ class Eye(EyeSpec):
         def white() -> float:
             return number(self.white_signal) / number(self.aperture_throughput)
 
-        bank = prepare(kernel_at, self.resolution, s, z, counts, within, averaged=self.waveguide is None, white=white)
-        return replace(bank, parallax=self._parallax * s)
+        mean = 1 if self.waveguide is not None else max(1, int(s * self.smallest_share))
+        bank = prepare(kernel_at, self.resolution, s, z, counts, within, mean=mean, white=white)
+        return replace(bank, averaged=self.waveguide is None, parallax=self.parallax * s)
 
     def see(
         self,
@@ -276,24 +282,19 @@ class Eye(EyeSpec):
                 "sight=eye.sight(..., depth_layers=64)"
             ) from None
 
-    @property
-    def _parallax(self) -> float:
-        """Shift [receptors m] of the image across the pupil's diameter, per difference of inverse distance."""
-        if self.pupil is None:
-            return 0.0
-        return 2 * number(self.pupil.aperture_radius) * number(self.sensor_distance) / min(self.receptor_size)
-
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != LAST}
 
-    def in_bands(self, radiance: Any) -> np.ndarray:
-        """Convert a spectral radiance to values for this eye's bands (band,), for `see`.
+    def describe(self, z: Scalar = math.inf, direction_deg: tuple[float, float] | None = None) -> Description:
+        """Return a table of the eye's limits: see `summary.Description`.
 
-        Every receptor type then has the correct quantum catch, if there are at least as many bands as types. The value
-        of a band may be negative; see `SpectralBands.band_values`.
+        z: distance [m] of the scene.
+        direction_deg: angles (right, up) from the axis of the receptor that the table describes. None: the middle of
+            the field.
+
+        Raises:
+            ValueError: a direction outside the field.
         """
-        return self.spectral_bands.band_values(radiance, self.receptors)
-
-    def describe(self, z: Scalar = math.inf) -> Description:
-        """Return a table of the eye's limits: see `summary.Description`."""
-        return describe(self, number(self.white_signal), self.psf(z), partial(self.kernel, z=z))
+        own = self if self.lattice is None and direction_deg is None else receptor_in(self, direction_deg)
+        found = describe(own, number(own.white_signal), own.psf(z), partial(own.kernel, z=z))
+        return found if self.lattice is None else replace(found, interommatidial_range_deg=spacing_range(self))

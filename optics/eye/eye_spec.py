@@ -17,12 +17,15 @@ from optics.eye.geometry import (
     etendue,
     focal_length,
     receptor_size,
+    tangents,
 )
 from optics.eye.guided_field import check_guide
 from optics.eye.photoreceptor import throughput
 from optics.eye.polarization import check_rays, microvilli_of
+from optics.eye.receptor_density import density_of
+from optics.eye.receptor_lattice import ReceptorLattice, even_lattice, receptor_lattice
 from optics.numerics.arguments import flag, in_range, of_kind, positive, shape_2d
-from optics.numerics.autodiff import Scalar, number
+from optics.numerics.autodiff import Scalar, is_differentiable, number
 from optics.ommatidia.waveguide import Waveguide
 from optics.spectra.bands import SpectralBands
 from optics.spectra.photon_budget import PhotonBudget
@@ -61,6 +64,7 @@ class EyeSpec:
     vertical_fov_deg: float | None = None
     most_seconds: float = 3.0
     dynamics: ReceptorDynamics | None = None
+    density: Any = None
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -86,10 +90,29 @@ class EyeSpec:
         if self.dynamics is not None:
             of_kind("dynamics", self.dynamics, ReceptorDynamics, "ReceptorDynamics(time_constant_ms=20)")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
+        if not isinstance(self.density, ReceptorLattice):
+            object.__setattr__(self, "density", density_of(self.density))
+        self._check_density()
         auto = str(self.bands) == "auto"
         spectral = self.chosen_bands() if auto else SpectralBands.uniform(self.bands, self.receptors)
         object.__setattr__(self, "spectral_bands", spectral)
         object.__setattr__(self, "bands", len(spectral.wavelengths))
+
+    def _check_density(self) -> None:
+        if self.density is None:
+            return
+        if is_differentiable(self.fov_deg):
+            raise ValueError(
+                "density is given and fov_deg is a Dr.Jit array: must be None, or fov_deg a number, since receptors "
+                "move on the retina if the focal length changes"
+            )
+        if self.waveguide is not None:
+            raise ValueError(
+                "density and waveguide are given: one of them must be None, since the field of a waveguide depends on "
+                "its diameter, which varies with the density; sim.CompoundEye has an Ommatidium for each direction"
+            )
+        if (lattice := self.lattice) is not None and lattice.areas.shape != self.resolution:
+            raise ValueError(f"density is a lattice of {lattice.areas.shape} receptors: must be of {self.resolution}")
 
     @property
     def sensor_distance(self) -> Scalar:
@@ -111,13 +134,62 @@ class EyeSpec:
 
     @property
     def receptor_pitch(self) -> float:
-        """Distance [m] between the centres of horizontally neighbouring receptors."""
+        """Distance [m] between the centres of horizontally neighbouring receptors; the average, with a `density`."""
         return self.sensor_width / self.resolution[1]
 
     @property
     def receptor_size(self) -> tuple[float, float]:
-        """Height and width [m] of a receptor. They are equal unless `vertical_fov_deg` is given."""
+        """Height and width [m] of a receptor, or their averages over the eye if receptors have a `density`.
+
+        They are equal unless `vertical_fov_deg` is given.
+        """
         return receptor_size(self.resolution, self.sensor_width, self.fov_deg, self.vertical_fov_deg)
+
+    @property
+    def lattice(self) -> ReceptorLattice | None:
+        """Rectangles of receptors with a `density`, in units of `receptor_size`. None: all receptors are alike."""
+        if self.density is None or isinstance(self.density, ReceptorLattice):
+            return self.density
+        (width, height), middle = self._on_tangent_plane
+        halves = self.resolution[0] * height / 2, self.resolution[1] * width / 2
+        return receptor_lattice(self.density, self.resolution, halves, middle)
+
+    @property
+    def receptor_angles_deg(self) -> np.ndarray:
+        """Angles [degrees] that each receptor subtends vertically and horizontally, (2, h, w).
+
+        `optics.sampling_acuity(angle, "square")` is the finest grating [cycles/degree] that such receptors resolve.
+        """
+        return self._every_receptor.angles_deg(*self._on_tangent_plane)
+
+    @property
+    def receptor_directions_deg(self) -> np.ndarray:
+        """Angles (right, up) [degrees] of each receptor's middle from the eye's axis, (2, h, w)."""
+        return self._every_receptor.directions_deg(*self._on_tangent_plane)
+
+    @property
+    def _every_receptor(self) -> ReceptorLattice:
+        return even_lattice(self.resolution) if self.lattice is None else self.lattice
+
+    @property
+    def _on_tangent_plane(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Width and height of an average receptor at distance 1, and tangents (right, down) of the field's middle."""
+        (height, width), distance = self.receptor_size, number(self.sensor_distance)
+        return (width / distance, height / distance), tangents(self.eccentricity_deg)
+
+    @property
+    def smallest_receptor(self) -> tuple[float, float]:
+        """Smallest height and smallest width [m] of a receptor."""
+        height, width = self.receptor_size
+        if self.lattice is None:
+            return height, width
+        low, narrow = self.lattice.smallest
+        return height * low, width * narrow
+
+    @property
+    def smallest_share(self) -> float:
+        """Smallest side of a receptor, relative to the average height or width."""
+        return 1.0 if self.lattice is None else min(self.lattice.smallest)
 
     @property
     def fovy_deg(self) -> float:
@@ -144,6 +216,13 @@ class EyeSpec:
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
     @property
+    def parallax(self) -> float:
+        """Shift [average receptors m] of the image across the pupil's diameter, per difference of inverse distance."""
+        if self.pupil is None:
+            return 0.0
+        return 2 * number(self.pupil.aperture_radius) * number(self.sensor_distance) / min(self.receptor_size)
+
+    @property
     def channels(self) -> int:
         """Number of signals at each position of the retina: one per receptor type, or one in a mosaic."""
         return self.receptors.channels
@@ -155,11 +234,33 @@ class EyeSpec:
 
     @property
     def photons(self) -> np.ndarray | None:
-        """Absorbed photons for a signal of 1, per receptor type (type,); None without a photon budget."""
+        """Absorbed photons for a signal of 1, per receptor type (type,); None without a photon budget.
+
+        They are those of a receptor of average area if receptors have a `density`.
+        """
         if self.photon_budget is None:
             return None
         light = etendue(self.widest_pupil, math.prod(self.receptor_size), number(self.sensor_distance))
         return self.photon_budget.photons(self.spectral_bands, light)
+
+    @property
+    def receptor_photons(self) -> np.ndarray | None:
+        """Absorbed photons for a signal of 1 of each receptor; None without a photon budget.
+
+        (channel, h, w), or (channel, 1, 1) if all receptors are alike. Large receptors absorb more photons.
+        """
+        if self.photons is None:
+            return None
+        each = self.photons[:, None, None] if self.mosaic is None else self.photons[self.mosaic][None]
+        return each if self.lattice is None else each * self.lattice.areas
+
+    def in_bands(self, radiance: Any) -> np.ndarray:
+        """Convert a spectral radiance to values for this eye's bands (band,), for `see`.
+
+        Every receptor type then has the correct quantum catch, if there are at least as many bands as types. The value
+        of a band may be negative; see `SpectralBands.band_values`.
+        """
+        return self.spectral_bands.band_values(radiance, self.receptors)
 
     def chosen_bands(self) -> SpectralBands:
         """Return the spectral bands for `bands="auto"`. The choice needs kernels, so only `Eye` implements it."""

@@ -80,7 +80,7 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
     Raises:
         ValueError: the waveguide has no guided mode at one of the wavelengths, or an argument carries a derivative.
-        AccuracyError: E needs too many samples.
+        AccuracyError: the field E needs too many samples.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     spot = spot_of(beams, retina)

@@ -91,7 +91,7 @@ def prepare(
     counts: tuple[int | str, int | str],
     tolerance: float,
     *,
-    averaged: bool = True,
+    mean: int | None = None,
     white: Callable[[], float] = lambda: 1.0,
 ) -> KernelBank:
     """Choose the number of kernels and compute them.
@@ -100,7 +100,8 @@ def prepare(
         the retina.
     counts: number of depth layers, and of zones across the longer side of the retina; or "auto", or "distinct" for one
         layer at each distance.
-    averaged: True if a receptor's signal is the mean over its cells.
+    mean: number of cells along the side of the square over which errors are averaged, as in a receptor's signal (None:
+        samples_per_receptor).
     white: function that returns the fraction of the signal of a white surface that the kernels transmit.
     """
     s, depths = samples_per_receptor, DepthRange.from_distances(z)
@@ -109,7 +110,7 @@ def prepare(
         None if isinstance(count, str) and count in ("auto", *known) else whole(name, count, 1, MOST_NODES)
         for name, count, known in zip(("depth_layers", "field_zones"), counts, ((DISTINCT,), ()), strict=True)
     )
-    mean = s if averaged else 1
+    mean = s if mean is None else mean
     by_depth = [(n,) for n in DEPTH_COUNTS]
     along = NodeChoice("depth", lambda at: kernel_at(depths.distance(at[0]), 0.0, 0.0), by_depth, mean, white)
     by_place = [_grid(n, resolution) for n in FIELD_COUNTS]
@@ -128,7 +129,7 @@ def prepare(
     kernels = {(i, j, k): kernel_at(distances[i], right[k], down[j]) for i, j, k in places}
     half_sides = resolution[0] * s / 2, resolution[1] * s / 2
     inverse = tuple(1 / number(distance) for distance in distances)
-    return KernelBank(inverse, half_sides, kernels, choices, averaged)
+    return KernelBank(inverse, half_sides, kernels, choices)
 
 
 def _choices(

@@ -58,7 +58,8 @@ def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random
     """Return a signal with Poisson noise, whose standard deviation is √(signal/photons).
 
     signal: (channel, y, x).
-    photons: absorbed photons for a signal of 1: a number, one per channel, or one per receptor (channel, y, x).
+    photons: absorbed photons for a signal of 1: a number, one per channel, or one per receptor (channel, y, x), or
+        (channel, 1, 1).
     """
     signal, budget = reals("signal", signal), np.atleast_1d(reals("photons", photons))
     positive("photons", float(budget.min()), "1")
@@ -71,15 +72,10 @@ def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random
     return rng.poisson(expected) / budget
 
 
-def noise_on(
-    clean: np.ndarray, photons: np.ndarray | None, mosaic: np.ndarray | None, sigma: float, rng: np.random.Generator
-) -> np.ndarray:
+def noise_on(clean: np.ndarray, photons: np.ndarray | None, sigma: float, rng: np.random.Generator) -> np.ndarray:
     """Return the sum of Poisson and Gaussian noise for signals (channel, y, x).
 
-    photons: absorbed photons for a signal of 1, per type; None for no Poisson noise.
-    mosaic: see `own_type`.
+    photons: absorbed photons for a signal of 1, see `photon_noise`; None for no Poisson noise.
     """
-    if photons is not None and mosaic is not None:
-        photons = photons[mosaic][None]
     caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
     return gaussian_noise(caught, sigma, rng) - clean

@@ -86,7 +86,7 @@ def taken_by(
     polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
 
     Raises:
-        ValueError: invalid polarization, a degree outside [0, 1], or receptors without microvilli.
+        ValueError: polarization is invalid, a degree is outside [0, 1], or the receptors have no microvilli.
     """
     if polarization is None:
         return [(radiance, 1.0)]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,19 +15,21 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes
 from optics.eye.cell_integrals import Tiles, cell_integrals, samples_per_cycle
-from optics.eye.retina import Retina, more_time
+from optics.eye.retina import CellsError, Retina, more_time
 from optics.methods.problem import Problem
+from optics.methods.smooth_spectrum import may_be_steep
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import padded_for_packets, precision
-from optics.point_spread.pictures import pictures
+from optics.point_spread.pictures import PSFPicture, pictures
 from optics.point_spread.psf_result import PSFResult, spread
 from optics.point_spread.request import Request
 
 __all__ = ["perfect_psf", "retinal_psf", "visual_kernel"]
 
+Result = TypeVar("Result")
 # Choice: light at more than 50° from a receptor's direction counts as blocked by the rim of the eye.
 WIDEST_TANGENT = math.tan(math.radians(50))
 BESIDE = 4  # choice: samples beyond either end of the light, because a spline is least accurate at its ends
@@ -56,12 +60,14 @@ class Spot:
     half: half the side [m] of the square around it that contains the light.
     pitch: sampling pitch [m] that resolves the PSF.
     needs: window and sampling that each wavelength requires.
+    on_retina: True if the square is limited to the light that may land on the retina, see `spot_of`.
     """
 
     centre: tuple[float, float]
     half: float
     pitch: float
     needs: tuple[_WindowNeeds, ...]
+    on_retina: bool = False
 
     @property
     def half_of_rays(self) -> float:
@@ -93,16 +99,18 @@ def visual_kernel(
     if is_differentiable(retina.distance) and direction != (0.0, 0.0):
         raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, as it also turns the light")
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
-    spot = spot_of(beams, retina)
-    # Each wavelength has its own samples, since longer wavelengths need fewer.
-    requests = [
-        _request(beam, spot, need, spot.window(_pitch_for_cells(need.pitch, retina), BESIDE), retina)
-        for beam, need in zip(beams, spot.needs, strict=True)
-    ]
+
+    def computed(spot: Spot) -> tuple[Spot, list[Request], list[PSFPicture]]:
+        # Each wavelength has its own samples, since longer wavelengths need fewer.
+        requests = [
+            _request(beam, spot, need, spot.window(_pitch_for_cells(need.pitch, retina), BESIDE), retina)
+            for beam, need in zip(beams, spot.needs, strict=True)
+        ]
+        return spot, requests, pictures(requests, alike=True)
+
+    spot, requests, found = _on_spot(computed, beams, retina)
     rows, columns = (Tiles(spot.cells(side) + 2 * from_cell, side, from_cell) for side in retina.cell)
     types, kernels = precision(retina.dtype), []
-    with more_time():
-        found = pictures(requests, alike=True)
     for request, picture in zip(requests, found, strict=True):
         window = request.problem.window
         # Samples and cells both run backwards. A symmetric pupil thus has the same sums, in the same order, as a turned
@@ -127,7 +135,24 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
         AccuracyError: no method reaches the tolerance within the limits on memory and time.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
-    return _spread(beams, spot_of(beams, retina), retina)
+    return _on_spot(lambda spot: _spread(beams, spot, retina), beams, retina)
+
+
+def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
+    """Return the result of a function of the area that the light reaches.
+
+    If it is refused for a steep relief, the area is limited to the longer or else to the shorter side of the retina.
+    """
+    errors: list[AccuracyError] = []
+    for most in (math.inf, max(retina.size), min(retina.size)):
+        try:
+            with more_time():
+                return compute(spot_of(beams, retina, most))
+        except AccuracyError as error:
+            errors.append(error)
+            if (isinstance(error, CellsError) and retina.samples > 1) or not all(map(may_be_steep, beams)):
+                break
+    raise errors[0]
 
 
 def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, float]) -> list[Beam]:
@@ -135,20 +160,26 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
     return [Beam(pupil, source, float(wavelength), retina.distance) for wavelength in retina.wavelengths]
 
 
-def spot_of(beams: list[Beam], retina: Retina) -> Spot:
+def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
+    """Return the area that the light reaches.
+
+    most: largest half side [m]. With the longer side of the retina, the area contains the light that arrives at any
+        receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
+    """
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)
     needs = tuple(_needs(beam, retina, (centre_x, centre_y)) for beam in beams)
     half, pitch = max(need.half_window for need in needs), min(need.pitch for need in needs)
+    half = min(half, most)
     narrow = min(retina.cell)
     if _cells_within(half, narrow) > MOST_CELLS:
-        raise AccuracyError(
+        raise CellsError(
             f"the light spreads over {2 * half:.3g} m, {2 * half / narrow:.0f} cells of {narrow:.3g} m: "
             f"at most {MOST_CELLS}; increase the field of view or the cells"
             + (", or flatten the relief" if beams[0].pupil.height is not None else "")
         )
     half = max(side * (_cells_within(half, side) + 1) / 2 for side in retina.cell)
-    return Spot((centre_x, centre_y), half, pitch, needs)
+    return Spot((centre_x, centre_y), half, pitch, needs, math.isfinite(most))
 
 
 def _image(beam: Beam, distance: float) -> tuple[float, float]:
@@ -169,16 +200,15 @@ def _pitch_for_cells(pitch: float, retina: Retina) -> float:
 
 def _spread(beams: list[Beam], spot: Spot, retina: Retina) -> PSFResult:
     window = spot.window(spot.pitch)
-    with more_time():
-        return spread(
-            [_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)]
-        )
+    return spread([_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)])
 
 
 def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: Retina) -> Request:
     reach = spot.half + math.hypot(*spot.centre)
     problem = Problem.from_beam(beam, window, retina.tolerance, retina.dtype)
-    return Request(beam, replace(problem, widest_band=need.band, reach=reach), most_seconds=retina.most_seconds)
+    band = math.inf if spot.on_retina else need.band
+    problem = replace(problem, widest_band=band, reach=reach, steep=spot.on_retina)
+    return Request(beam, problem, most_seconds=retina.most_seconds)
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:

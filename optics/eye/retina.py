@@ -12,7 +12,7 @@ import numpy as np
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.autodiff import Scalar
 
-__all__ = ["Retina", "more_time"]
+__all__ = ["CellsError", "Retina", "more_time"]
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,8 @@ class Retina:
     """Properties of the retina that define the PSF: distance [m], wavelengths [m], cells, tolerance, dtype.
 
     cell: height and width of a cell [m].
+    size: height and width [m] of the retina.
+    samples: number of cells along a receptor's side.
     pupil_turned: True if the pupil is rotated by 180° about the axis.
     most_seconds: largest predicted time [s] of the PSF of a band.
     """
@@ -28,6 +30,8 @@ class Retina:
     wavelengths: np.ndarray
     cell: tuple[float, float]
     tolerance: float
+    size: tuple[float, float]
+    samples: int
     dtype: str = "float32"
     pupil_turned: bool = False
     most_seconds: float = 3.0  # choice
@@ -41,6 +45,10 @@ class Retina:
         """
         right, down = direction
         return (-right, -down) if self.pupil_turned else (right, down)
+
+
+class CellsError(AccuracyError):
+    """The light covers too many cells. If receptors consist of several cells, coarser cells may be sufficient."""
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from optics.eye.receptor_lattice import ReceptorLattice, overlaps
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2, fast_length
@@ -13,7 +14,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision, padded_for_packets
 
-__all__ = ["at_receptors", "blur", "centred", "receptor_average", "with_centre"]
+__all__ = ["at_receptors", "blur", "centred", "mean_over", "receptor_average", "with_centre"]
 
 
 def blur(
@@ -111,6 +112,31 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 def receptor_average(image: Array, samples_per_receptor: int, types: Precision) -> Array:
     """Return the mean over each receptor's square aperture, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
     return _of_receptors(image, np.full(samples_per_receptor, 1 / samples_per_receptor), types)
+
+
+def mean_over(lattice: ReceptorLattice, image: Array, types: Precision) -> Array:
+    """Return the mean over each receptor's rectangle, Dr.Jit tensors: (band, Y, X) -> (band, h, w).
+
+    The image is constant within its cells, whose sides divide the retina evenly.
+    """
+    import drjit as dr
+
+    (height, width), (bands, down, across) = lattice.areas.shape, image.shape
+    shares = overlaps((lattice.rows + height / 2) * down / height, down)
+    rows = matmul(types.Tensor(shares / shares.sum(axis=1, keepdims=True)), image)
+    edges = (lattice.columns + width / 2) * across / width
+    first = np.clip(np.floor(edges[:, :-1]).astype(int), 0, across - 1)
+    # All receptors have the same number of cells, some of which do not overlap them.
+    cells = first[..., None] + np.arange(int(np.ceil(edges[:, 1:] - first).max()))
+    left, right = edges[:, :-1, None], edges[:, 1:, None]
+    weights = np.clip(right - cells, 0, 1) - np.clip(left - cells, 0, 1)
+    weights /= weights.sum(axis=-1, keepdims=True)
+    starts = (np.arange(bands)[:, None] * height + np.arange(height))[..., None, None] * across
+    index = (starts + np.minimum(cells, across - 1)).ravel().astype(np.uint32)
+    seen = types.Tensor(
+        dr.gather(types.Float, rows.array, types.Index(padded_for_packets(index))), (bands, *cells.shape)
+    )
+    return dr.sum(seen * types.Tensor(weights[None]), axis=3)
 
 
 def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> Array:

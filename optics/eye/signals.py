@@ -12,7 +12,7 @@ from optics.eye.eye_spec import EyeSpec
 from optics.eye.kernel_bank import KernelBank
 from optics.eye.layered_image import retinal_image
 from optics.eye.photoreceptor import noise_on, own_type, quantum_catch
-from optics.eye.retinal_image import at_receptors, receptor_average
+from optics.eye.retinal_image import at_receptors, mean_over, receptor_average
 from optics.numerics.autodiff import Array, plain
 from optics.numerics.precision import Precision, precision
 
@@ -39,11 +39,14 @@ def signals(eye: EyeSpec, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelB
 
 
 def _quantum_catch(eye: EyeSpec, image: Array, s: int, types: Precision) -> Array:
-    irradiance = (receptor_average if eye.waveguide is None else at_receptors)(image, s, types)
+    if eye.lattice is not None:
+        irradiance = mean_over(eye.lattice, image, types)
+    else:
+        irradiance = (receptor_average if eye.waveguide is None else at_receptors)(image, s, types)
     return quantum_catch(irradiance, eye.spectral_bands.weights, eye.aperture_throughput, types)
 
 
 def with_noise(eye: EyeSpec, signal: Array, rng: np.random.Generator) -> Array:
     """Return a signal with Gaussian noise and, given a photon budget, shot noise. Noise carries no derivative."""
-    noise = noise_on(plain(signal), eye.photons, eye.mosaic, eye.noise_sigma, rng)
+    noise = noise_on(plain(signal), eye.receptor_photons, eye.noise_sigma, rng)
     return signal + precision(eye.dtype).Tensor(noise)

@@ -49,6 +49,8 @@ class Description:
     acceptance_angle_deg: full width at half maximum of a receptor's angular sensitivity, horizontally.
     interommatidial_angle_deg: angle Δφ between horizontally neighbouring receptors.
     interommatidial_vertical_deg: the same between vertically neighbouring receptors.
+    interommatidial_range_deg: smallest and largest angle between receptors over the whole eye, horizontally and
+        vertically, ((smallest, largest), (smallest, largest)). None: receptors are alike on the retina.
     plan: plan of the PSF of the least accurate band.
     white_signal: signal of a receptor that sees white: the throughput, reduced by the losses of waveguides.
     unknown: one line, with the reason, for each measure that cannot be computed accurately enough from the PSF. The
@@ -72,6 +74,7 @@ class Description:
     plan: Plan
     unknown: tuple[str, ...] = ()
     white_signal: float = math.nan
+    interommatidial_range_deg: tuple[tuple[float, float], tuple[float, float]] | None = None
 
     @property
     def _limits(self) -> dict[str, float]:
@@ -110,6 +113,7 @@ class Description:
             **self._vertical_rows(bound),
             "acceptance": f"{self.acceptance_angle_deg:.3g}°, {self._overlap:.3g} of the angle between receptors",
             "receptors": f"{self.interommatidial_angle_deg:.3g}° apart",
+            **self._range_rows(),
             "PSF": f"{self.plan.method}, {self.plan.samples[0]} x {self.plan.samples[1]} samples, "
             f"{self.plan.dtype}, predicted error {self.plan.predicted_error:.1e}",
             **{f"not known ({number})": line for number, line in enumerate(self.unknown, start=1)},
@@ -122,6 +126,16 @@ class Description:
             return {}
         apart = f"rows of receptors {self.interommatidial_vertical_deg:.3g}° apart"
         return {"acuity, vertical": f"{bound}{_cycles(self._vertical_limit)}, {apart}"}
+
+    def _range_rows(self) -> dict[str, str]:
+        """Rows on receptors in other directions, unless all are alike."""
+        if self.interommatidial_range_deg is None:
+            return {}
+        names = "spacing, horizontal", "spacing, vertical"
+        return {
+            name: f"{fine:.3g}° to {coarse:.3g}° over the eye, {_cycles(1 / (2 * fine))} at the finest"
+            for name, (fine, coarse) in zip(names, self.interommatidial_range_deg, strict=True)
+        }
 
     def _mark(self, name: str) -> str:
         return "  <- binding" if name == self.binding else ""

@@ -14,10 +14,14 @@ spectrum_sampling    planes of the angular spectrum, and the sums between them
 row_blocks           blocks of rows of a large pupil, whose spectra are summed
 derivative_cells     nodes between the knots of maps, for derivatives with respect to their samples
 pixelated_spectrum   the angular spectrum of pupils made of pixels
+smooth_pupil         the light behind a steep pupil, convolved with a Gaussian
+smooth_spectrum      the angular spectrum of steep pupils, from samples of this light
 hankel               the angular spectrum of rotationally symmetric pupils, along one radius
 low_rank             one matrix product, with a Fourier kernel times a slow factor
 slow_factor          this factor, and the points of the window that interpolate it
 window_sampling      the same method at coarse tolerances: few samples, from the light in the window
+window_rank          rank of the slow factor for these samples
+window_stack         several sources and wavelengths through one pupil, from the same samples
 window_check         error of such a PSF, by a sum over other samples in a few rows and columns
 window_sums          their sums, and the adjoint of these sums
 far_field            one Fourier transform onto directions for each of a few nodes of the window

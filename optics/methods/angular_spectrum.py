@@ -30,6 +30,7 @@ __all__ = [
     "arrived",
     "split_period",
     "split_spectrum",
+    "transfer",
     "whole_period",
     "whole_spectrum",
 ]
@@ -113,7 +114,8 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
     from the axis.
     """
     beam = outermost + taper.blur + problem.distance * taper.tangent
-    if problem.reach is not None:  # light beyond `reach` is negligible, so it may wrap around to the rim of the window
+    # Light beyond `reach` is negligible, except behind steep pupils, so it may wrap around to the rim of the window.
+    if problem.reach is not None and not problem.steep:
         beam = min(beam, problem.reach + outermost)
     pitch = problem.window.dx
     samples = fast_length(max(problem.window.half_width + beam, 2 * outermost) / pitch)
@@ -181,13 +183,13 @@ def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling
 
     A phase that does not affect the intensity is omitted.
     """
-    spectrum = spectrum * _transfer(beam, problem, how, precision(problem.dtype))
+    spectrum = spectrum * transfer(beam, problem, how, precision(problem.dtype))
     if how.is_whole:
         return how.sum(spectrum, how.spectrum, how.output_period, problem.window, +1)
     return _paraxial_rest(spectrum, beam, problem, how)
 
 
-def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
+def transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
     """Return exp(ikz (cos θ - 1)) under the spectral taper. The split method omits the paraxial part -ikz sin²θ/2.
 
     See Goodman, eq. 3-74. With q = 1 - cos θ, the exponent is -ikz q, and without the paraxial part -ikz q²/2.

@@ -38,6 +38,7 @@ DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the to
 # can be a small difference to which the detail contributes most, as for the focal length of a lens in focus.
 FINER_DETAIL = 10.0
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
+FADE_RIPPLE_PER_TOLERANCE = 3.0  # choice: the same for light that fades out where a steep pupil sends little of it
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,17 @@ class Problem:
     even: True if it is even in x and in y.
     widest_band: frequency [1/m] beyond which light may be omitted (infinite: all light that reaches the window counts).
     reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
-        beyond it may be wrong, and edge-diffracted light may be less accurate (None: the whole window must be
-        accurate).
+        beyond it may be wrong, and edge-diffracted light less accurate (None: the whole window must be accurate).
     medium_n: refractive index behind the pupil.
-    masked: True if a mask scatters light to places that rays do not predict, so that approximations cannot predict
-        their error.
+    masked: True if a mask scatters light where no rays arrive. Approximations then cannot predict their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: whether the PSF carries derivatives.
+    moves: whether derivatives with respect to the distance are requested.
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
+    steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Light beyond `reach` is lost.
     """
 
     light: Beam
@@ -82,33 +83,46 @@ class Problem:
     spread: float = ROUND
     even: bool = False
     differentiated: bool = False
+    moves: bool = False
     knots: DerivativeKnots | None = None
     mask_detail: float = 0.0
     detail_part: float = DETAIL_PART
     all_light: bool = False
+    steep: bool = False
 
     @classmethod
     def from_beam(
-        cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32", derivatives: bool = True
+        cls,
+        beam: Beam,
+        window: Grid,
+        tolerance: float,
+        dtype: str = "float32",
+        derivatives: bool = True,
+        fixed: Beam | None = None,
     ) -> Problem:
         """Return the problem for a beam that passes a pupil and arrives at a window.
 
         derivatives: whether the samples must also be suitable for the derivatives that the beam carries.
+        fixed: the same light without derivatives. It is necessary if the beam carries tensors of PyTorch.
 
         Raises:
             ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], the dtype is invalid, or a
-                tensor of PyTorch requires a gradient.
+                tensor of PyTorch requires a gradient without `fixed`.
         """
         distance = positive("sensor_distance", beam.distance, carried=True)
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
         precision(dtype)
-        plain = Beam(beam.pupil, beam.source.plain, beam.wavelength, distance)
-        if not (derivatives and carries_derivatives(beam)):
-            return _problem(plain, window, tolerance, dtype)
-        refuse_torch(beam)
+        plain = fixed or Beam(beam.pupil, beam.source.plain, beam.wavelength, distance)
+        if fixed is None:
+            if not (derivatives and carries_derivatives(beam)):
+                return _problem(plain, window, tolerance, dtype)
+            refuse_torch(beam)
         found = _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
         # A small change of the angle breaks the symmetry of light along the axis.
-        return replace(found, symmetric=False, even=False) if any(map(carries_derivative, beam.source.angle)) else found
+        still = not any(map(carries_derivative, beam.source.angle))
+        symmetric = found.symmetric and still and beam.pupil.rotationally_symmetric(beam.wavelength)
+        even = found.even and still and beam.pupil.mirror_symmetric(beam.wavelength)
+        return replace(found, moves=carries_derivative(beam.distance), symmetric=symmetric, even=even)
 
     @cached_property
     def slopes(self) -> Slopes:
@@ -144,10 +158,7 @@ class Problem:
 
     @cached_property
     def turning(self) -> float:
-        """Highest frequency [1/m] in the combined phase of the pupil and of the path to any point of the window.
-
-        For a lens in focus, it is far below the sum of the two separate frequencies.
-        """
+        """Highest frequency [1/m] in the combined phase of pupil and path. For a lens in focus, both nearly cancel."""
         return self._turning[0]
 
     @cached_property
@@ -169,9 +180,7 @@ class Problem:
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
-        """Return the aperture with nodes in the cells between knots that are suitable for derivatives.
-
-        The result is None if there would be too many cells.
+        """Return the aperture with nodes in the cells between knots, for derivatives; None for too many cells.
 
         band: highest frequency [1/m] in the pupil's plane of the light that must be resolved. None: the light that
             arrives at any point of the window, as in `turning`.
@@ -216,6 +225,8 @@ class Problem:
     @property
     def fade_ripple(self) -> float:
         """Allowed amplitude error of light beyond the band."""
+        if self.steep:
+            return min(FADE_RIPPLE_PER_TOLERANCE * self.tolerance, 0.1)
         return self.ripple if self.reach is None else 0.1  # choice: there is hardly any light beyond it
 
     @property
@@ -228,10 +239,7 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Largest phase, in waves, before whole waves are subtracted.
-
-        It is the longest path plus the steepest slope times the radius, both in waves.
-        """
+        """Longest path plus the steepest slope times the radius, in waves. It bounds phases before they are reduced."""
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
         return path + self.radius * self.phase_band_inside
@@ -256,7 +264,8 @@ class Problem:
 
     def band(self, margin: float = 0.0) -> float:
         """Return the highest frequency [1/m] of light from the disk that can land within `margin` [m] of the window."""
-        reach = (1 + EDGE_REACH) * self.radius + self.outermost + margin
+        edge = 0.0 if self.steep else EDGE_REACH
+        reach = (1 + edge) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)
 
 

@@ -123,7 +123,7 @@ def nodes(problem: Problem) -> list[NodeSampling]:
 
 
 def node_rule(problem: Problem) -> tuple[float, float]:
-    """Return the cycles per radius and the digits that a quadrature rule must provide."""
+    """Return the cycles per radius that a quadrature rule must resolve, and the digits that it must provide."""
     digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
     cycles = turns(problem, digits)
     # Rounding up limits the number of different rules. For pixels, there are few different rules anyway.

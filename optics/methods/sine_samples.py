@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.methods.pupil_edge import PupilEdge
 from optics.methods.pupil_sampling import MOST_ACROSS
+from optics.numerics.array_library import turned
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import PUPIL_SAMPLE
 from optics.numerics.field import Field
@@ -79,22 +79,23 @@ class SineSamples:
     @property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
         """Points ξ (x, y) [m] of all samples, (y, x)."""
-        x, y, _ = _layout(self)
+        x, y, _ = self.layout
         return x, y
 
-    def light(self, beam: Beam, dtype: Any) -> np.ndarray:
+    @property
+    def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points x and y [m], and their areas [m²] times the transmittance of the aperture, (y, x)."""
+        return _layout(self)
+
+    def light(self, beam: Beam, dtype: str) -> np.ndarray:
         """Return the result of `field` as a complex NumPy array (y, x), without derivatives.
 
-        dtype: type of the real and imaginary parts, in which the phase is rounded.
+        dtype: type of the real and imaginary parts, in which the phase is rounded, "float32" or "float64".
         """
-        x, y, weight = _layout(self)
+        x, y, weight = self.layout
         if beam.pupil.mask is not None:
             weight = weight * beam.pupil.amplitude(x / self.edge.radius, y / self.edge.radius)
-        waves = beam.waves(x, y)
-        waves = ((waves - np.rint(waves)) * (2 * np.pi)).astype(dtype)
-        found = np.empty(waves.shape, np.result_type(dtype, np.complex64))
-        np.multiply(np.cos(waves), weight, out=found.real)
-        np.multiply(np.sin(waves), weight, out=found.imag)
+        found: np.ndarray = turned(weight, beam.waves(x, y), dtype)
         return found
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -140,7 +141,7 @@ class SineSamples:
 
 @lru_cache(maxsize=64)
 def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return x and y [m] of the samples, and their areas [m²] times the transmittance of the aperture, (y, x)."""
+    """Return `SineSamples.layout`. Many PSFs have the same samples, so it is cached."""
     types, radius = precision("float64"), samples.edge.radius
     sx, sy = np.meshgrid(samples.at + samples._middle[0], samples.at + samples._middle[1])
     x, y = samples.points_at(sx - samples._middle[0], sy - samples._middle[1])

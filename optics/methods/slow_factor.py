@@ -13,10 +13,11 @@ import numpy as np
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples
 from optics.methods.sine_samples import SineSamples
+from optics.numerics.array_library import turned
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
-__all__ = ["RANKS", "Path", "fourier_kernel", "slow_factor", "uniform_rank"]
+__all__ = ["RANKS", "Path", "axis_factor", "fourier_kernel", "remaining_factor", "slow_factor", "uniform_rank"]
 
 # Choice: ranks to try, in ascending order.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
@@ -83,10 +84,13 @@ def slow_factor(
     pupil: tuple[np.ndarray, np.ndarray],
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
+    dtype: str = "float64",
 ) -> np.ndarray:
     """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
 
     s is the direction of ξ in the Fourier kernel e^{-ik s·u}.
+
+    dtype: type in which the phase is rounded, "float32" or "float64".
     """
     (xi, eta), (u, v), (s, t) = pupil, window, directions
     x, y = u + path.window.centre[0], v + path.window.centre[1]
@@ -95,7 +99,35 @@ def slow_factor(
     excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
     distance = np.sqrt(rho2 + excess)
     waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / path.wavelength
-    return z * z / distance**2 * np.exp(2j * np.pi * waves)
+    found: np.ndarray = turned(z * z / distance**2, waves, dtype)
+    return found
+
+
+def axis_factor(path: Path, samples: SineSamples, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the slow factor along x (0) or y (1), relative to its value at the middle of the window, complex.
+
+    It depends on one sine and one position, as the Fourier kernel along its axis does, which can therefore include it.
+
+    sines: sines along the axis, minus those of the pupil's centre. The other sines are those of the pupil's centre.
+    places: positions [m] along the axis, relative to the middle of the window. They broadcast with the sines.
+    """
+    none = np.zeros(1)
+    directions, window = ((sines, none), (places, none)) if axis == 0 else ((none, sines), (none, places))
+    points = samples.points_at(*directions)
+    return slow_factor(path, points, directions, window) / slow_factor(path, points, directions, (none, none))
+
+
+def remaining_factor(
+    path: Path,
+    samples: SineSamples,
+    directions: tuple[np.ndarray, np.ndarray],
+    window: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Return the slow factor divided by both axis factors. It varies even more slowly over the window."""
+    whole = slow_factor(path, samples.points_at(*directions), directions, window)
+    for axis in (0, 1):
+        whole = whole / axis_factor(path, samples, axis, directions[axis], window[axis])
+    return whole
 
 
 def fourier_kernel(

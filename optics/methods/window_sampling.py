@@ -25,16 +25,17 @@ from optics.methods.carrier import on_window
 from optics.methods.problem import Problem
 from optics.methods.pupil_edge import PupilEdge
 from optics.methods.sine_samples import SineSamples, evenly_in_sines
-from optics.methods.slow_factor import RANKS, Path, fourier_kernel, slow_factor, uniform_rank
-from optics.methods.window_check import window_error
+from optics.methods.slow_factor import Path, axis_factor, fourier_kernel, slow_factor
+from optics.methods.window_check import window_errors
+from optics.methods.window_rank import window_rank
 from optics.methods.window_sums import WindowSums, intensity_of, recorded_field
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.grid import sample_positions
-from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.interpolation import chebyshev_points
 from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["DERIVATIVE_ERROR", "TIGHTEST", "WindowSampling", "window_sampling"]
+__all__ = ["TIGHTEST", "WindowSampling", "window_sampling"]
 
 TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
 # Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check, and width of
@@ -44,16 +45,11 @@ RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
 # light; cycles for the edge; the same, relative to the cycles of the rays at the edge; exponent of the tolerance.
 NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 3.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
-CELL_CYCLES = 0.5  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
-DERIVATIVE_PART = 0.1  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
-DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
+CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
+DERIVATIVE_PART = 0.2  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
 # Choices: sampling densities and sharpnesses of the edge per octave; equal ones share arrays and tables.
 STEPS, EDGES = 4, 8
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
-RANK_SHARE = 0.3  # choice: part of the tolerance that the rank may take
-RAYS = 40  # choice: number of rays from which the rank is determined
-BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
-MOST_RANK = 12  # choice: largest rank
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
 PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 8e-4, 4e-8, 3e-8, 2.5e-10
 MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of the slow factor
@@ -94,14 +90,17 @@ class WindowSampling:
         return on_window(replace(u, grid=problem.window), beam, problem)
 
     def _field(self, beam: Beam, problem: Problem) -> np.ndarray:
-        return self._sums(problem).field(self.pupil.light(beam, problem.dtype))
+        sums = self.sums(Path.from_problem(problem), problem.dtype)
+        return sums.field(self.pupil.light(beam, problem.dtype))
 
     def _recorded(self, beam: Beam, problem: Problem) -> Field:
         light = self.pupil.field(beam, precision(problem.dtype))
-        return recorded_field(light, beam.distance, self._sums(problem), problem.window)
+        sums = self.sums(Path.from_problem(problem), problem.dtype)
+        return recorded_field(light, beam.distance, sums, problem.window)
 
-    def _sums(self, problem: Problem) -> WindowSums:
-        return _window_sums(self.pupil, self.rank, self.half_width, Path.from_problem(problem), problem.dtype)
+    def sums(self, path: Path, dtype: str) -> WindowSums:
+        """Return the arrays of the sums. The wavelength may be longer than that for which the samples are made."""
+        return _window_sums(self.pupil, self.rank, self.half_width, path, dtype)
 
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the plane over which rounding errors spread light."""
@@ -112,11 +111,13 @@ class WindowSampling:
         return self.pupil.grid.shape
 
     def error(self, beam: Beam, problem: Problem, image: np.ndarray) -> float | None:
-        """Return the relative L2 error of the intensity over the window, see `window_error`.
+        """Return the relative L2 error of the intensity over the window, see `window_errors`; None without light.
 
         image: |U|² over the window, divided by the area of the pupil, flat.
         """
-        return window_error(self.finer, beam, problem, image)
+        light, seen = self.finer.light(beam, problem.dtype), image.reshape(1, *problem.window.shape)
+        error = window_errors(self.finer, Path.from_problem(problem), light[None], seen * beam.pupil.area)
+        return float(error[0]) if error[0] >= 0 else None
 
 
 def window_sampling(problem: Problem) -> WindowSampling | None:
@@ -132,7 +133,7 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
     )
     if pupil is None or finer is None:
         return None
-    rank = _rank(problem, pupil, half)
+    rank = window_rank(problem, pupil, half)
     across, (height, width) = len(pupil.at), problem.window.shape
     if rank is None or (rank * across) ** 2 > MOST_ENTRIES or len(finer.at) ** 2 > MOST_ENTRIES:
         return None
@@ -175,35 +176,6 @@ def _samples(problem: Problem, half: float, density: float, ripple: float, shift
     return evenly_in_sines(problem, edge, density / problem.radius, shift)
 
 
-def _rank(problem: Problem, pupil: SineSamples, half: float) -> int | None:
-    """Return the necessary rank.
-
-    It is sufficient for the end points of rays, near which the light arrives. Derivatives may change this light, so the
-    rank is then sufficient for all points. The Fourier kernel does not change with the distance of the window, so that
-    a derivative with respect to the distance needs at least linear interpolation.
-    """
-    if problem.differentiated:
-        rank = uniform_rank(problem, pupil, half, 1.0, MOST_RANK)
-        return rank and max(rank, 3)
-    path = Path.from_problem(problem)
-    xi, eta, u, v = problem.sampled_slopes.end_points(problem.distance, problem.window.centre, problem.medium_n, RAYS)
-    blur = BLUR * problem.wavelength * problem.distance / (2 * problem.radius)
-    u = np.clip(u + blur * np.sign(u), -half, half)
-    v = np.clip(v + blur * np.sign(v), -half, half)
-    s, t = pupil.directions(xi, eta)
-    exact = slow_factor(path, (xi, eta), (s, t), (u, v))
-    for rank in RANKS:
-        if rank > MOST_RANK:
-            return None
-        nodes = half * chebyshev_points(rank)
-        at = np.meshgrid(nodes, nodes)
-        known = slow_factor(path, (xi, eta), (s, t), (at[0][..., None], at[1][..., None]))
-        between = (lagrange_basis(v, nodes)[:, None] * lagrange_basis(u, nodes) * known).sum((0, 1))
-        if 2 * math.sqrt(float(np.mean(np.square(np.abs(exact - between))))) < RANK_SHARE * problem.tolerance:
-            return rank
-    return None
-
-
 @lru_cache(maxsize=64)
 def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: str) -> WindowSums:
     complex_dtype, nodes = precision(dtype).complex_dtype, half * chebyshev_points(rank)
@@ -214,6 +186,7 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
     distance = np.sqrt((x - xi) ** 2 + (y - eta) ** 2 + z * z)
     near = path.wavelength / (2 * np.pi * distance) - 1j
     kernel = slow_factor(path, (xi, eta), (column, row), (u, v)) * near / (path.wavelength * z)
+    kernel = kernel / (axis_factor(path, pupil, 0, column, u) * axis_factor(path, pupil, 1, row, v))
 
     def by_distance() -> np.ndarray:
         """Return the derivative of z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to z."""
@@ -221,8 +194,9 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
         near_by = -(near.real * z / distance**2) / near
         return np.asarray(kernel * (1 / z - 2 * z / distance**2 + turns + near_by), complex_dtype)
 
-    down, across = (
-        fourier_kernel(sample_positions(count, path.window.dx), pupil.at, nodes, path.wavelength, dtype)
-        for count in path.window.shape
-    )
-    return WindowSums(kernel.astype(complex_dtype), down, across, by_distance)
+    def along(axis: int) -> np.ndarray:
+        place = sample_positions(path.window.shape[1 - axis], path.window.dx)
+        factor = axis_factor(path, pupil, axis, pupil.at, place[:, None]).astype(complex_dtype)
+        return fourier_kernel(place, pupil.at, nodes, path.wavelength, dtype) * np.tile(factor, rank)
+
+    return WindowSums(kernel.astype(complex_dtype), along(1), along(0), by_distance)

@@ -59,10 +59,10 @@ def _weighted(pupil: Any, kernel: Any) -> Any:
     return product.reshape((*product.shape[:-4], rows * height, columns * width))
 
 
-def intensity_of(field: np.ndarray) -> np.ndarray:
-    """Return |U|²."""
-    found: np.ndarray = np.square(field.real) + np.square(field.imag)
-    return found
+def intensity_of(field: Any) -> Any:
+    """Return |U|², an array of the same library."""
+    re, im = field.real, field.imag
+    return re * re + im * im
 
 
 @dataclass(frozen=True, eq=False)

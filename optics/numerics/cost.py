@@ -42,6 +42,7 @@ __all__ = [
     "RAY_BYTES",
     "SEPARABLE_ENTRY",
     "SERIES_TERM",
+    "SMOOTH_SAMPLE",
     "SOFT_EDGE_SAMPLE",
     "SOFT_SIDE_SAMPLE",
     "SPECTRUM_SAMPLE",
@@ -85,6 +86,7 @@ FFT_COPY = 8e-9  # copying a sample between Dr.Jit and SciPy
 PUPIL_SAMPLE = 1e-8  # optical path and phase, without the soft edge
 SOFT_EDGE_SAMPLE = 1e-8  # soft edge from a table along one edge
 SOFT_SIDE_SAMPLE = 2.5e-8  # soft edge of one straight side; an arc takes three times as long
+SMOOTH_SAMPLE = 2e-7  # light of a steep pupil, convolved with a Gaussian
 SPECTRUM_SAMPLE = 1e-8  # transfer function
 KERNEL_ENTRY = 2e-8  # entry of the slow factor between pupil and window
 FOURIER_ENTRY = 1e-8  # entry of the Fourier kernel between pupil and window, in NumPy

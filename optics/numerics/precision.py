@@ -38,7 +38,7 @@ def precision(dtype: str = "float32") -> Precision:
     """Return the types for "float32" or "float64".
 
     Raises:
-        ValueError: any other dtype.
+        ValueError: the dtype is not supported.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     if not isinstance(dtype, str) or dtype not in ("float32", "float64"):

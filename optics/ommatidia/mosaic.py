@@ -11,14 +11,15 @@ import numpy as np
 
 from optics.numerics.arguments import finite, in_range, of_kind, positive, reals, shown, vacuum_wavelength, whole
 from optics.numerics.read_only import read_only
+from optics.ommatidia.acceptance import acceptance_function
 from optics.ommatidia.ommatidium import Ommatidium
 
 __all__ = ["AppositionEye", "hexagonal_directions"]
 
 MOST_RINGS = 60
-PER_CYCLE = 4  # choice: number of directions per λ/D, the width of the finest detail in a facet's sensitivity
-WIDTHS = 3.0  # choice: half width of an ommatidium's field, in acceptance angles
-FINEST = 0.5  # sine of the widest direction
+EVERY = 2  # choice: every second sample of the acceptance function is used, which are four per λ/D
+LOST = 0.01  # choice: fraction of the accepted light that a field may lose, because tails reach far
+MOST = 2**22  # choice: largest number of directions at which a radiance is evaluated at once
 
 
 def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
@@ -65,20 +66,22 @@ class AppositionEye:
         return read_only(hexagonal_directions(self.rings, self.interommatidial_deg))
 
     def field(self, wavelength: float = 500e-9) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return directions x, y [rad] relative to the ommatidium's axis, flat, and their weights, which sum to 1."""
-        eye, at = self.ommatidium, vacuum_wavelength(wavelength)
-        half = WIDTHS * max(eye.acceptance_angle(at), eye.acceptance_angle(at, 90.0))
-        half = min(half, math.asin(FINEST) / 1.5)
-        pitch = at / (2 * eye.pupil.radius * eye.pupil.index_before(at) * PER_CYCLE)
-        steps = pitch * np.arange(-math.ceil(half / pitch), math.ceil(half / pitch) + 1)
-        x, y = (axis.ravel() for axis in np.meshgrid(steps, steps))
-        weights = eye.sensitivity(x, y, at)
-        return x, y, weights / weights.sum()
+        """Return directions x, y [rad] relative to the ommatidium's axis, flat, and their weights, which sum to 1.
+
+        They are every second sample of `acceptance_function`, and contain at least 99 % of the accepted light.
+        """
+        accepted = acceptance_function(self.ommatidium, np.array([vacuum_wavelength(wavelength)]), LOST)
+        samples = slice(len(accepted.sines) // 2 % EVERY, None, EVERY)  # contains the axis
+        powers = (accepted.values[0] * accepted.solid_angles)[samples, samples].ravel()
+        x, y = (axis.ravel()[powers > 0] for axis in np.meshgrid(accepted.sines[samples], accepted.sines[samples]))
+        cosine = np.sqrt(1 - x * x - y * y)
+        return np.arctan(x / cosine), np.arctan(y / cosine), powers[powers > 0] / powers.sum()
 
     def see(self, radiance: Callable[[np.ndarray, np.ndarray], np.ndarray], wavelength: float = 500e-9) -> np.ndarray:
         """Return the signals (ommatidium,) for a scene. A uniform radiance of 1 gives signals of 1.
 
-        radiance: function that returns the radiance for arrays of angles x, y [rad].
+        radiance: function that returns the radiance for arrays of angles x, y [rad], (n, direction). It is called once
+            for each group of n ommatidia.
 
         Raises:
             ValueError: the radiance is not finite, or its shape differs from that of the angles.
@@ -86,12 +89,13 @@ class AppositionEye:
         if not callable(radiance):
             raise ValueError(f"radiance = {shown(radiance)}: must be a function of angles x and y [rad]")
         x, y, weights = self.field(wavelength)
-        own = self.directions
-        scene = reals("radiance", radiance(own[:, :1] + x, own[:, 1:] + y))
-        if scene.shape != (len(own), len(x)) or not np.isfinite(scene).all():
-            raise ValueError(f"radiance gives shape {scene.shape}: must be finite, of its angles' shape")
-        found: np.ndarray = scene @ weights
-        return found
+        found = []
+        for own in np.array_split(self.directions, -(-len(self.directions) * len(x) // MOST)):
+            scene = reals("radiance", radiance(own[:, :1] + x, own[:, 1:] + y))
+            if scene.shape != (len(own), len(x)) or not np.isfinite(scene).all():
+                raise ValueError(f"radiance gives shape {scene.shape}: must be finite, of its angles' shape")
+            found.append(scene @ weights)
+        return np.concatenate(found)
 
     def contrast(self, cycles_per_degree: float, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
         """Return the contrast of a sine grating in an ommatidium's signal: the transform of the angular sensitivity.

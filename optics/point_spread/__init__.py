@@ -4,6 +4,7 @@ psf            psf, plan
 psf_result     PSFResult: a PSF that can be recomputed over other windows
 request        Request: the parameters of one PSF
 light_batch    light through several pupils, for several distances
+coarse_stack   PSFs of several depths and wavelengths from one plan, at coarse tolerances
 planner        the cheapest method within the tolerance
 pictures       computation of requested PSFs, which is repeated if a check fails
 window_cost    time and memory of a window, and their limits

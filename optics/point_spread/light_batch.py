@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +11,10 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
+from optics.methods.window_stack import WindowStack
 from optics.numerics.arguments import is_sized, items, pair
 from optics.numerics.autodiff import Array, Scalar, number
+from optics.numerics.grid import Grid
 from optics.point_spread.psf import psf
 from optics.point_spread.request import sensor_place
 
@@ -58,27 +60,49 @@ class LightBatch:
             PointSource(source, angle)
         return cls(several, tuple(zip(sensors, sources, strict=True)), angle)
 
-    def images(self, wavelengths: np.ndarray, view: Mapping[str, Any]) -> Array:
-        """Return `optics.psf` as a Dr.Jit tensor (pupil, distance, wavelength, y, x) with derivatives.
+    @property
+    def members(self) -> list[tuple[Pupil, Scalar | None, Scalar]]:
+        """Pupil, sensor's and source's distance [m] of all PSFs, by pupil and then by distance."""
+        return [(pupil, sensor, source) for pupil in self.pupils for sensor, source in self.distances]
 
+    def images(self, places: Sequence[int], wavelengths: np.ndarray, view: Mapping[str, Any]) -> Array:
+        """Return `optics.psf` of some members as a Dr.Jit tensor (member, wavelength, y, x) with derivatives.
+
+        places: indices of the members.
         view: arguments of `optics.psf` for the window, the tolerance and the method.
         """
         import drjit as dr
 
-        found = [
-            psf(pupil, wavelengths, sensor, source, self.angle, **view).tensor
-            for pupil in self.pupils
-            for sensor, source in self.distances
-        ]
+        found = []
+        for pupil, sensor, source in map(self.members.__getitem__, places):
+            found.append(psf(pupil, wavelengths, sensor, source, self.angle, **view).tensor)
         flat: Array = dr.concat([tensor.array for tensor in found])
-        return type(found[0])(flat, (len(self.pupils), len(self.distances), *found[0].shape))
+        return type(found[0])(flat, (len(found), *found[0].shape))
+
+    def stacks(
+        self, wavelengths: np.ndarray, window: Grid, dtype: str, convert: Callable[[np.ndarray], Array]
+    ) -> list[tuple[list[int], WindowStack]]:
+        """Return stacks of members with the same pupil and sensor's distance, each with the indices of its members.
+
+        convert: see `WindowStack`.
+        """
+        groups: dict[tuple[int, float], list[int]] = {}
+        for place, (pupil, sensor, source) in enumerate(self.members):
+            own = place // len(self.distances), number(sensor_place(pupil, sensor, source))
+            groups.setdefault(own, []).append(place)
+        found, waves = [], tuple(map(float, wavelengths))
+        for places in groups.values():
+            pupil, sensor, source = self.members[places[0]]
+            at = sensor_place(pupil, sensor, source)
+            sources = tuple(PointSource(self.members[place][2], self.angle) for place in places)
+            found.append((places, WindowStack(pupil, sources, waves, at, window, dtype, convert)))
+        return found
 
     def cutoff(self, wavelengths: np.ndarray) -> float:
         """Return the highest frequency [1/m] of all intensities; see `PSFResult.cutoff`."""
         slopes = [
             1 / math.hypot(1, number(sensor_place(pupil, sensor, source)) / pupil.radius)
-            for pupil in self.pupils
-            for sensor, source in self.distances
+            for pupil, sensor, source in self.members
         ]
         waves = [pupil.index_behind(float(at)) / float(at) for pupil in self.pupils for at in wavelengths]
         return 2 * max(slopes) * max(waves)

@@ -129,7 +129,7 @@ class _Attempt:
             wanted = tolerance if whole and self.for_window else smaller
             # The problem is derived again, because a smaller tolerance includes finer detail of the relief.
             problem = Problem.from_beam(request.beam, problem.window, wanted, problem.dtype)
-            problem = replace(problem, all_light=whole)
+            problem = replace(problem, all_light=whole, steep=request.problem.steep)
             request = replace(request, problem=problem)
         return _Attempt.at(request, request.planned())
 

@@ -12,7 +12,7 @@ angular spectrum. They differ in where they place samples:
     the kernel's slow factor is interpolated. The method is best for small pupils and wide windows. It computes the
     intensity but not the complex field.
 - "angular_spectrum": two transforms, from the pupil to its spectrum and from there to the sensor's plane, on grids with
-    the same period. It is best at short distances.
+    the same period. It is best at short distances, and the only method for eyes with steep reliefs.
 - "split_angular_spectrum": the same with a transfer function exp(ikz cos θ) that is split into two factors. The Fourier
     transform of the paraxial factor is known, and the other factor moves light only a short way to the side. Period and
     number of samples then do not grow with the distance.
@@ -45,21 +45,14 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
-from optics.methods.window_sampling import DERIVATIVE_ERROR, WindowSampling, window_sampling
-from optics.numerics.accuracy import (
-    FLOAT_NOISE,
-    MOST_BYTES,
-    MOST_SECONDS,
-    AccuracyError,
-    Option,
-    Plan,
-    size_of,
-)
+from optics.methods.smooth_spectrum import smooth_spectrum
+from optics.methods.window_rank import DERIVATIVE_ERROR
+from optics.methods.window_sampling import WindowSampling, window_sampling
+from optics.numerics.accuracy import FLOAT_NOISE, MOST_BYTES, MOST_SECONDS, AccuracyError, Option, Plan, size_of
 from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
 from optics.point_spread.window_cost import check_seconds, check_window, window_bytes, window_seconds
 
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
-
 
 # Each function returns the samplings with which its method meets a problem's tolerance. There may be none or several.
 EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
@@ -91,6 +84,8 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "split_angular_spectrum": split_pixel_spectrum,
     "rayleigh_sommerfeld": nodes,
 }
+# Methods that need only samples of the light that arrives in the window, however steep the pupil is.
+FOR_STEEP: dict[str, Callable[[Problem], Sequence[Sampling]]] = {"angular_spectrum": smooth_spectrum}
 
 
 @dataclass(frozen=True)
@@ -125,7 +120,7 @@ WEIGHING = {
     "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
     "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
-OTHERS = 4e-3  # choice: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances
+OTHERS, OTHERS_WITH_CELLS = 4e-3, 15e-3  # choices: time [s] of planning other methods after "low_rank", see `choose`
 
 
 @lru_cache(maxsize=256)
@@ -137,7 +132,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         error of an approximation may exceed it.
 
     Raises:
-        ValueError: unknown method.
+        ValueError: the method is unknown.
         AccuracyError: no sampling within the limits on memory and time meets the tolerance.
     """
     # Approximations predict the error of the intensity, and not that of its derivatives.
@@ -148,14 +143,15 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     _check_dtype(problem)
     check_window(problem.window, problem.dtype)
     allowed, outputs = _model_tolerance(problem) if method == "auto" else math.inf, math.prod(problem.window.shape)
-    known = FOR_PIXELS if problem.divided else METHODS
+    known = FOR_STEEP if problem.steep else FOR_PIXELS if problem.divided else METHODS
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
     coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None
-    first = "" if coarse is None else "low_rank"
-    names = sorted({*asked} & {*known}, key=lambda name: (name != first, list(WEIGHING).index(name)))
+    others = 0.0 if coarse is None else OTHERS if problem.knots is None else OTHERS_WITH_CELLS
+    names = sorted({*asked} & {*known}, key=list(WEIGHING).index)
+    names.sort(key=lambda name: name != "low_rank" or coarse is None)
     for name in names:
-        if best is not None and not WEIGHING[name].pays(best.seconds - (OTHERS if first else 0.0), outputs):
+        if best is not None and not WEIGHING[name].pays(best.seconds - others, outputs):
             continue
         if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
             continue  # Fraunhofer's integral is less accurate than Fresnel's
@@ -238,9 +234,8 @@ def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
         return "; an approximation predicts no error of derivatives"
     if problem.knots is None:
         return "; derivatives exclude approximations"
-    if isinstance(best, WindowSampling):
-        return f"; derivatives with respect to samples of maps need more samples ({problem.knots.maps})"
-    return f"; derivatives with respect to samples of maps need nodes in each cell between knots ({problem.knots.maps})"
+    needed = "more samples" if isinstance(best, WindowSampling) else "nodes in each cell between knots"
+    return f"; derivatives with respect to samples of maps need {needed} ({problem.knots.maps})"
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:

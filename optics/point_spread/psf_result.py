@@ -231,9 +231,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         if not self.can_recompute or (max(window.shape) > MOST_AGAIN and window != self.window):
             raise AccuracyError(needs, f"set dx={window.dx:.3g}, shape=({height}, {width})")
         try:
-            if self.shares is not None:
-                return spread([_through(request, window) for request in self.requests]).mean(self.shares)
-            return spread([_through(request, window) for request in self.requests])
+            found = spread([_through(request, window) for request in self.requests])
+            return found if self.shares is None else found.mean(self.shares)
         except AccuracyError as error:
             raise AccuracyError(f"{needs}, which fails: {error}") from None
 
@@ -272,6 +271,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 def _through(request: Request, window: Grid) -> Request:
     asked = request.problem
     problem = replace(Problem.from_beam(request.beam, window, asked.tolerance, asked.dtype), all_light=True)
+    if asked.steep:
+        problem = replace(problem, steep=True, reach=asked.reach)
     method = request.method if request.method in APPROXIMATE else "auto"
     return replace(request, problem=problem, method=method, most_seconds=MOST_SECONDS, keeps_field=False)
 
@@ -279,8 +280,7 @@ def _through(request: Request, window: Grid) -> Request:
 def spread(requests: Sequence[Request]) -> PSFResult:
     """Return PSFs of one pupil at several wavelengths over one window.
 
-    If there are at least MANY wavelengths, the plan of the first one is used for all, provided that it is accurate
-    enough.
+    For at least MANY wavelengths, the plan of the first one is used for all if it is accurate enough.
 
     Raises:
         AccuracyError: no method meets the tolerance, or a window is so dark that rounding errors exceed it.

@@ -34,7 +34,7 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 
     Raises:
         ValueError: the task does not behave as described. The message states the method, the array, the world, and the
-        correct behaviour.
+            correct behaviour.
         RuntimeError: a method of the task fails.
     """
     if not isinstance(task, BatchTask):

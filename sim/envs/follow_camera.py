@@ -46,7 +46,7 @@ class FollowCamera:
         number of rays per pixel at eight wavelengths. They take twenty to fifty times as long.
 
     Raises:
-        ValueError: samples below 1.
+        ValueError: samples is below 1.
     """
 
     def __init__(self, world: World, eyes: Eyes | None = None, samples: int | None = None) -> None:

@@ -23,13 +23,17 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
     White in full daylight is shown as white, for any size of the pupil. Receptor types are shown as colours in the
     order of their peak wavelengths: the type with the longest wavelength as red, the type with the shortest as blue,
     and other types as colours in between. A single type is shown as grey. In a mosaic, every receptor has the colour of
-    its type.
+    its type. Receptors with a `density` are drawn with their places and sizes on the retina.
     """
     linear = np.einsum("ecyx,cyxk->eyxk", signals / eye.white_signal, _palette(eye))
     pixels = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
     n, height, width = pixels.shape[:3]
     scale = max(1, min(SIZE[0] // height, (SIZE[1] - GAP * (n - 1)) // (n * width)))
-    large = pixels.repeat(scale, axis=1).repeat(scale, axis=2)
+    if eye.lattice is None:
+        large = pixels.repeat(scale, axis=1).repeat(scale, axis=2)
+    else:
+        seen = eye.lattice.receptors_at((height * scale, width * scale))
+        large = pixels.reshape(n, height * width, 3)[:, seen]
     gap = np.full((height * scale, GAP, 3), BETWEEN, np.uint8)
     return np.concatenate([part for image in large for part in (gap, image)][1:], axis=1)
 

@@ -96,7 +96,7 @@ class EyesVecEnv(OneEnvironment):
         """Start all episodes; return their first observations.
 
         Raises:
-            RuntimeError: after `close`, or between `step_async` and `step_wait`.
+            RuntimeError: the environment is closed, or an action is pending after `step_async`.
         """
         self._calls.start_reset()
         if self._seeds[0] is not None:
@@ -157,7 +157,7 @@ class EyesVecEnv(OneEnvironment):
         """Take the actions of `step_async`.
 
         Raises:
-            RuntimeError: without `step_async`, or after `close`.
+            RuntimeError: no action is pending after `step_async`, or the environment is closed.
         """
         advanced = self._advance()
         step = advanced.step

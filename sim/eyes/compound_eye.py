@@ -173,6 +173,11 @@ class CompoundEye:
         found: np.ndarray = per_etendue[:, None] * area * self.white
         return found if self.types is None else np.take_along_axis(found, self.types.T, axis=0)
 
+    @property
+    def receptor_photons(self) -> np.ndarray | None:
+        """`photons` in the shape of signals, (channel, 1, ommatidium)."""
+        return None if self.photons is None else self.photons[:, None]
+
     def as_frames(self, signals: np.ndarray) -> np.ndarray:
         """Return a renderer's signals (..., eye, channel, 1, ommatidium) as (..., ommatidia of all eyes, channel)."""
         frames = np.swapaxes(signals[..., 0, :], -1, -2)

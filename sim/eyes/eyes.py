@@ -55,6 +55,8 @@ class Eyes:
         receptors. None: receptors are square.
     dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: receptors
         without memory
+    density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: all receptors are
+        alike
 
     Raises:
         ValueError: a value is outside its range, or the receptors are unknown; the message suggests the nearest name.
@@ -74,6 +76,7 @@ class Eyes:
     pupil_turned: bool = False
     vertical_fov_deg: float | None = None
     dynamics: ReceptorDynamics | None = None
+    density: Any = None
 
     def __post_init__(self) -> None:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
@@ -111,6 +114,7 @@ class Eyes:
             )
         if not isinstance(self.dynamics, ReceptorDynamics | None):
             raise ValueError(f"Eyes: dynamics = {shown(self.dynamics)}: must be an optics.ReceptorDynamics or None")
+        self._check_density()
         check("pupil_turned", lambda turned: isinstance(turned, bool | np.bool_), "True or False")
         if self.pupil_turned and self.optics is None:
             raise ValueError(
@@ -136,6 +140,7 @@ class Eyes:
             pupil_turned=self.pupil_turned,
             vertical_fov_deg=self.vertical_fov_deg,
             dynamics=self.dynamics,
+            density=self.density,
         )
 
     def _check_waveguide(self) -> None:
@@ -148,6 +153,16 @@ class Eyes:
                 self.optics,
                 receptor_size(self.resolution, self.sensor_width, self.fov_deg, self.vertical_fov_deg),
             )
+        except ValueError as error:
+            raise ValueError(f"Eyes: {error}") from None
+
+    def _check_density(self) -> None:
+        if self.density is None:
+            return
+        from optics.eye.receptor_density import density_of
+
+        try:
+            object.__setattr__(self, "density", density_of(self.density))
         except ValueError as error:
             raise ValueError(f"Eyes: {error}") from None
 

@@ -19,6 +19,9 @@ MIN_CELLS = 32
 # Chosen: smallest number of cells across a waveguide's diameter, and largest number of cells along a receptor's side.
 # If the two limits conflict, the second applies.
 CELLS_ACROSS, MOST_CELLS = 4, 64
+# Chosen: smallest number of cells along the smallest side of receptors with a `density`, within MOST_CELLS. Fields of
+# these receptors are evaluated at the rays themselves, so twice as many cells hardly reduce the error.
+CELLS_OF_SMALLEST = 2
 
 
 class NoRaysError(ValueError):
@@ -65,9 +68,7 @@ class ReceptiveFields:
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
         """
-        # The signal of the receptor at r is the convolution Σ_v K(r - v) L(v). The weights of the light L as a function
-        # of v are therefore the kernel K, rotated by 180° and centred on the receptor.
-        kernels = _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
+        kernels = kernels_of(eye, cells, depth)
         field = _averaged(kernels, cells) if eye.waveguide is None else kernels.astype(np.float64)
         everyone = np.arange(np.prod(eye.resolution))
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
@@ -126,6 +127,15 @@ class ReceptiveFields:
         Raises:
             NoRaysError: a receptor has no ray in its field.
         """
+        weights = self.values(draw, receptors) / self.density[draw.rows, draw.columns]
+        total = weights.sum(axis=2, keepdims=True)
+        if not (total > 0).all():
+            raise NoRaysError(f"rays_per_receptor: {len(draw)} rays leave a receptor without any; use more")
+        weights *= self.power[:, None, None] / total
+        return weights
+
+    def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
+        """Return the value of some receptors' fields in the cells of rays, (plane, receptor, ray)."""
         row, column = np.divmod(receptors, self.resolution[1])
         y = draw.rows[None] - row[:, None] * self.cells
         x = draw.columns[None] - column[:, None] * self.cells
@@ -133,12 +143,8 @@ class ReceptiveFields:
         # Rays outside the field get the index after the last cell, where the padded table is 0.
         index = np.where(inside, y * self.field.shape[2] + x, self.field[0].size)
         table = np.pad(self.field.reshape(len(self.field), -1), ((0, 0), (0, 1)))
-        weights = table[:, index] / self.density[draw.rows, draw.columns]
-        total = weights.sum(axis=2, keepdims=True)
-        if not (total > 0).all():
-            raise NoRaysError(f"rays_per_receptor: {len(draw)} rays leave a receptor without any; use more")
-        weights *= self.power[:, None, None] / total
-        return weights
+        found: np.ndarray = table[:, index]
+        return found
 
 
 def cells_per_receptor(resolution: tuple[int, int]) -> int:
@@ -146,16 +152,34 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
+def kernels_of(eye: optics.Eye, cells: int, depth: DepthLayers) -> np.ndarray:
+    """Return the kernel of each depth layer, rotated by 180°, (plane, y, x).
+
+    The signal of the receptor at r is the convolution Σ_v K(r - v) L(v). The weights of the light L as a function of v
+    are therefore the kernel K, rotated by 180° and centred on the receptor.
+    """
+    return _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
+
+
 def cells_for(eye: optics.Eye) -> int:
-    """Return the number of cells along a receptor's side; a narrow waveguide requires a larger number."""
+    """Return the number of cells along an average receptor's side.
+
+    A narrow waveguide, or receptors much smaller than the average, require a larger number.
+    """
     fewest = cells_per_receptor(eye.resolution)
+    if eye.lattice is not None:
+        return min(max(fewest, math.ceil(CELLS_OF_SMALLEST / eye.smallest_share)), MOST_CELLS)
     if eye.waveguide is None:
         return fewest
     return min(max(fewest, math.ceil(CELLS_ACROSS * max(eye.receptor_size) / eye.waveguide.diameter)), MOST_CELLS)
 
 
-def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
+def receptive_fields_of(
+    eye: optics.Eye, depth: DepthLayers = ONE_PSF, kind: type[ReceptiveFields] = ReceptiveFields
+) -> ReceptiveFields:
     """Return the receptive fields of an eye, tabulated on the finest cells on which its PSF can be computed.
+
+    kind: class of the table; `sim.eyes.varied_fields` for receptors with a `density`
 
     Raises:
         optics.AccuracyError: the pupil spreads light too far even for the coarsest cells.
@@ -163,7 +187,7 @@ def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> Recept
     cells = cells_for(eye)
     while True:
         try:
-            return ReceptiveFields.from_eye(eye, cells, depth)
+            return kind.from_eye(eye, cells, depth)
         except optics.AccuracyError:
             # A PSF that extends over too many cells is smooth, so coarser cells are enough.
             if cells == 1:

@@ -28,7 +28,8 @@ from sim.eyes.receptive_fields import (
 )
 from sim.eyes.receptor_sums import within_stretches
 from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor, Sensor
-from sim.eyes.tangent_plane import aspect_of, directions_of, extent_of, on_tangent_plane, parts_of
+from sim.eyes.tangent_plane import aspect_of, directions_of, extent_of, from_receptors, on_tangent_plane, parts_of
+from sim.eyes.varied_fields import VariedFields
 
 # Chosen: small weights are omitted if this changes no signal by more than this fraction of the receptors' noise. The
 # noise and this error together are then at most √(1 + 0.1²) = 1.005 times the noise alone.
@@ -113,7 +114,7 @@ class BoxSampling:
         row, column = np.nonzero(beyond_rim_of(self.eye.resolution))
         corners = np.stack([column - columns / 2, row - rows / 2], axis=-1)[:, None]
         shifts = np.random.default_rng(2).random((len(corners), 1, 2))
-        return directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
+        return self._through((low_discrepancy(rays) + shifts) % 1.0 + corners)
 
     def _means(self, receptors: int, samples: int) -> np.ndarray:
         """Return weights that average this number of samples for each receptor, (band, receptor, sample)."""
@@ -125,8 +126,12 @@ class BoxSampling:
         height, width = self.eye.resolution
         shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
         corners = self._corners()[receptors]
-        directions = directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
+        directions = self._through((low_discrepancy(rays) + shifts) % 1.0 + corners)
         return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
+
+    def _through(self, points: np.ndarray) -> np.ndarray:
+        """Return the directions of rays through points (receptor, ray, 2) of squares of size 1, one per receptor."""
+        return directions_of(self.eye, from_receptors(self.eye, points.reshape(-1, 2)))
 
     def _corners(self) -> np.ndarray:
         """Return the upper left corner of every receptor's square, (receptor, 1, 2)."""
@@ -264,7 +269,10 @@ def eye_sampling(eye: WorldEye, depth: DepthLayers = ONE_PSF) -> WorldSampling:
     """
     if isinstance(eye, CompoundEye):
         return OmmatidialSampling(eye, depth)
-    return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, receptive_fields_of(eye, depth), depth)
+    if eye.pupil is None:
+        return BoxSampling(eye)
+    kind = ReceptiveFields if eye.lattice is None else VariedFields
+    return FieldSampling(eye, receptive_fields_of(eye, depth, kind), depth)
 
 
 def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:

@@ -9,10 +9,24 @@ import numpy as np
 import optics
 
 
+def from_receptors(eye: optics.Eye, counted: np.ndarray) -> np.ndarray:
+    """Return points of the tangent plane (x right, y down) [average receptor widths and heights], (n, 2).
+
+    counted: the same points in coordinates in which every receptor has the size 1. They differ if the eye's receptors
+        have a `density`.
+    """
+    return counted if eye.lattice is None else eye.lattice.places(counted)
+
+
+def to_receptors(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
+    """Return the inverse of `from_receptors`, (..., 2)."""
+    return plane if eye.lattice is None else eye.lattice.counted(plane)
+
+
 def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
     """Return unit vectors (ray, 3) in the eye's frame towards points of the tangent plane.
 
-    plane: points (x right, y down) [receptor widths and heights], (ray, 2)
+    plane: points (x right, y down) [average receptor widths and heights], (ray, 2)
     """
     v = on_tangent_plane(eye, plane)
     return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
@@ -21,14 +35,14 @@ def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
 def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
     """Return points of the tangent plane as points in the eye's frame at distance 1 along its axis, (ray, 3).
 
-    plane: points (x right, y down) [receptor widths and heights], (ray, 2)
+    plane: points (x right, y down) [average receptor widths and heights], (ray, 2)
     """
     height, width = tangent_size(eye)
     return np.stack([plane[:, 0] * width, -plane[:, 1] * height, np.ones(len(plane))], axis=-1)
 
 
 def tangent_size(eye: optics.Eye) -> tuple[float, float]:
-    """Return the height and width of a receptor on the plane at distance 1 along the axis."""
+    """Return the average height and width of a receptor on the plane at distance 1 along the axis."""
     height, width = eye.receptor_size
     return height / eye.sensor_distance, width / eye.sensor_distance
 

@@ -83,7 +83,7 @@ class QuickCamera:
         return self.render(data, camera, width, height).picture
 
     def render(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> QuickImage:
-        """Return the same image as `picture`, with inverse distances."""
+        """Return the same image as `picture`, as a `QuickImage`, which can also compute inverse distances."""
         check_size(width, height, 1)
         self.mirror.sync(data)
         view, size = self.mirror.viewpoint(camera), (height, width)

@@ -5,7 +5,7 @@ whether the square is uniform (Whitted 1980 compares a pixel's corners). If the 
 traced. An edge may also pass between the four rays and cut off a corner, at most a quarter of the square. The surface
 beyond such an edge usually fills a neighbouring square. All rays are therefore also traced for receptors that differ
 strongly from a neighbour. For this comparison, four rays are also traced through each square just beyond the rim of the
-field. An object is missed if it is smaller than the gaps between the four rays and fills no neighbouring square.
+field. A receptor misses a surface that lies between its four rays, unless the surface fills a neighbouring square.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ class EyeRenderer:
     with spectral lines for which the eye has too few bands.
 
     Raises:
-        ValueError: n_envs below 1, more rays than fit into memory, or a fidelity that the scene does not support.
+        ValueError: n_envs is below 1, the rays do not fit into memory, or the scene does not support the fidelity.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:

@@ -118,7 +118,7 @@ def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity |
     """Return the fidelity with this number of rays in direct light, or None for "auto", which is chosen later.
 
     Raises:
-        ValueError: neither a positive number nor "auto".
+        ValueError: the value is neither a positive number nor "auto".
     """
     if not isinstance(rays_per_receptor, str):
         return Fidelity(rays_per_receptor, eyes.bands)

@@ -77,7 +77,7 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
     distances = trials.distances()
     near, far = float(np.quantile(distances, NEAREST, method="higher")), float(distances[-1])
     aside = 4 / (3 * math.pi) * eye.sensor_distance * eye.pupil.radius / near
-    shift = sum(aside / side for side in eye.receptor_size)
+    shift = sum(aside / side for side in eye.smallest_receptor)
     bound = eye.throughput * shift
     if bound <= allowed:
         why = f"blur of {shift:.1e} of a receptor at {near:.2g} m, the nearest visible distance"

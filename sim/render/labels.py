@@ -10,7 +10,7 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.eyes.compound_eye import CompoundEye
 from sim.eyes.depth_layers import ONE_PSF
-from sim.eyes.tangent_plane import directions_of
+from sim.eyes.tangent_plane import directions_of, from_receptors
 from sim.render.eye_rays import FreeEyes
 from sim.render.optic_flow import flow_between, receptor_centres
 from sim.render.pending_frame import FrameSlot
@@ -40,7 +40,7 @@ class Labels:
             tracer, eyes = ModelTracer(scene.scene), FreeEyes(scene.places, n_envs)
             kernel = RayKernel(tracer, eyes, n_envs, len(scene.mounts), ONE_PSF)
             self._moving = Moving(eyes, tracer.buffers(n_envs))
-            self._inputs = kernel.inputs(directions_of(self.eye, receptor_centres(self.eye)))
+            self._inputs = kernel.inputs(directions_of(self.eye, from_receptors(self.eye, receptor_centres(self.eye))))
             self._scenes = tracer.scene
 
         def distances(scenes: Scenes, frame: Frame, inputs: KernelInputs) -> Array:

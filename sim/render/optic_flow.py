@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 import optics
-from sim.eyes.tangent_plane import on_tangent_plane, tangent_size
+from sim.eyes.tangent_plane import from_receptors, on_tangent_plane, tangent_size, to_receptors
 from sim.scene.poses import Poses
 
 Frames = tuple[np.ndarray, np.ndarray]  # pupils [m] (world, eye, 3), eyes' frames (world, eye, 3, 3)
 
 
 def receptor_centres(eye: optics.Eye) -> np.ndarray:
-    """Return the receptors' centres on the tangent plane, x to the right and y down [receptors], (receptor, 2)."""
+    """Return the receptors' centres, x to the right and y down, in receptors from the middle, (receptor, 2)."""
     height, width = eye.resolution
     row, column = (index.ravel() for index in np.indices((height, width)))
     return np.stack([column + 0.5 - width / 2, row + 0.5 - height / 2], axis=-1)
@@ -38,14 +38,14 @@ def flow_between(
     seen = geoms >= 0
     centres = receptor_centres(eye)
     (pupils, axes), (later_pupils, later_axes) = frames
-    local = on_tangent_plane(eye, centres) * np.where(seen[..., None], far, 1.0)
+    local = on_tangent_plane(eye, from_receptors(eye, centres)) * np.where(seen[..., None], far, 1.0)
     points = pupils[:, :, None] + np.einsum("wepq,werq->werp", axes, local)
     carried = _carried(points, np.where(seen, geoms, 0), moments)
     ahead = np.einsum("weqp,werq->werp", later_axes, carried - later_pupils[:, :, None])
     before = seen & (ahead[..., 2] > 0)
     height, width = tangent_size(eye)
     places = ahead[..., :2] / np.where(before, ahead[..., 2], 1.0)[..., None] / [width, -height]
-    found = np.where(before[..., None], places - centres, np.nan)
+    found = np.where(before[..., None], to_receptors(eye, places) - centres, np.nan)
     return np.moveaxis(found, -1, 2).reshape(worlds, eyes, 2, *eye.resolution).astype(np.float32)
 
 

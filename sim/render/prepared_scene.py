@@ -109,7 +109,7 @@ class PreparedScene:
         """The closed form of the scene.
 
         Raises:
-            NoClosedForm: a scene without a closed form.
+            NoClosedForm: the scene has no closed form.
         """
         if isinstance(self.tracers.upright, UprightScene):
             return self.tracers.upright

@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.eyes.compound_eye import CompoundEye, WorldEye
+from sim.eyes.compound_eye import WorldEye
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.scene.device_arrays import SharedBuffer
 from sim.scene.frozen_kernels import garbage_kept
@@ -127,14 +127,10 @@ class NoiseModel:
     @classmethod
     def from_eye(cls, eye: WorldEye) -> NoiseModel | None:
         """Return the noise of an eye; None if it has no noise."""
-        photons = eye.photons
+        photons = eye.receptor_photons
         if photons is None:
             return cls(eye.noise_sigma) if eye.noise_sigma > 0 else None
-        if isinstance(eye, CompoundEye):
-            return cls(eye.noise_sigma, photons[:, None].astype(np.float32))
-        mosaic = eye.mosaic
-        spread = photons[:, None, None] if mosaic is None else photons[mosaic][None]
-        return cls(eye.noise_sigma, spread.astype(np.float32))
+        return cls(eye.noise_sigma, photons.astype(np.float32))
 
     def in_frames(self, share: float) -> tuple[NoiseModel | None, NoiseModel | None]:
         """Return the shot noise of a frame that lasts this share of the integration time, and the remaining noise.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from optics.numerics.arguments import of_kind, shown
 from sim.eyes.compound_eye import CompoundEye, WorldEye, world_eye
 from sim.render.edge_rays import FIRST
-from sim.render.fidelity import EDGES, RAYS, Fidelity
+from sim.render.fidelity import AREAS, EDGES, RAYS, Fidelity
 from sim.tracing import lighting
 
 
@@ -14,7 +14,8 @@ def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
 
     Raises:
         ValueError: the eye has an eccentricity, its number of bands differs from the fidelity's, adaptive edge sampling
-            is not possible, or the fidelity has areas or depth layers, which compound eyes do not support.
+            is not possible, the fidelity has areas and receptors have a density, or it has areas or depth layers, which
+            compound eyes do not support.
     """
     world_eye("eye", eye)
     if not isinstance(eye, CompoundEye) and any(eye.eccentricity_deg):
@@ -28,6 +29,11 @@ def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
     if isinstance(eye, CompoundEye):
         _check_ommatidia(fidelity)
         return
+    if fidelity.samples == AREAS and eye.lattice is not None:
+        raise ValueError(
+            "fidelity: samples = 'areas': divides the field into equal rectangles, but the eye's receptors have a "
+            "density and different sizes: must be 'rays', which follow the density"
+        )
     if fidelity.samples != EDGES:
         return
     if fidelity.light == lighting.BOUNCE:

@@ -37,15 +37,15 @@ def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, 
     errors = cache(trials.errors(sampling, light.level))
     perfect = isinstance(sampling, BoxSampling)
     numbers: tuple[float, ...] = PERFECT_LENS_RAYS if perfect else PUPIL_RAYS
+    if sampling.eye.lattice is not None:  # receptors of different sizes are rendered with rays only
+        return Samples(RAYS, light, *_fewest(errors, numbers, _left(light, allowed), RAYS))
     shared = tuple(number for number in SHARED_AREAS if trials.may_share(sampling, number))
     of_pupil = PUPIL_AREA_IN_ALL_LIGHT if light.level == BOUNCE else PUPIL_AREA
 
     def cost(areas: float) -> float:
         return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_of_field(sampling, areas)
 
-    left_out = light.predicted_error or 0
-    # The part of the allowed error that the omitted light leaves. If nothing is left, no number of rays is enough.
-    left = math.sqrt(max(allowed.without_light**2 - left_out**2, (1e-6 * allowed.without_light) ** 2))
+    left_out, left = light.predicted_error or 0, _left(light, allowed)
 
     def rays(most: float = math.inf) -> Samples:
         tried = tuple(number for number in numbers if number <= most)
@@ -65,6 +65,13 @@ def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, 
         return many
     accurate = [found for found in (areas, many) if found.error <= HARDLY_MORE * min(areas.error, many.error)]
     return min(accurate, key=lambda found: cost(found.number) if found is areas else found.number)
+
+
+def _left(light: Level, allowed: Allowed) -> float:
+    """Return the part of the allowed error that omitted light leaves. If nothing is left, no number of rays is
+    enough."""
+    left_out = light.predicted_error or 0
+    return math.sqrt(max(allowed.without_light**2 - left_out**2, (1e-6 * allowed.without_light) ** 2))
 
 
 def _areas(

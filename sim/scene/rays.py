@@ -192,7 +192,7 @@ def described(integrator: str | Mapping[str, Any]) -> Description:
     """Return the description of an integrator.
 
     Raises:
-        ValueError: neither a name nor a description.
+        ValueError: the argument is neither a name nor a description.
     """
     if not isinstance(integrator, str) and not (isinstance(integrator, Mapping) and "type" in integrator):
         raise ValueError(f"integrator = {integrator!r}: must be a name, or a description such as {{'type': 'path'}}")

@@ -148,6 +148,7 @@ def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
 def is_mirrored(model: mujoco.MjModel, geom: int, texture: int) -> bool:
     """Return whether a texture is visible on a geom.
 
-    A cube texture on a plane is not, since directions within the plane select no image.
+    Cube textures are not visible on planes: a point of a cube texture is selected by a direction, and directions within
+    a plane select no image.
     """
     return not (faces_of(model, texture) and geom_type(model, geom) == mujoco.mjtGeom.mjGEOM_PLANE)

@@ -179,8 +179,8 @@ def _check_names(name: str, given: Any) -> None:
 def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
     """Return the transmission (band,) of a filter that changes the colour temperature of daylight to `kelvins`.
 
-    It is the ratio of the spectra of black bodies of this temperature and of DAYLIGHT (Planck's law), scaled to
-    preserve the illuminance.
+    It is the ratio of two Planck spectra, scaled to preserve the illuminance: that of a black body at `kelvins`, and
+    that of a black body at the temperature `DAYLIGHT`.
     """
     seen = daylight(_VISIBLE) * cie_1931(_VISIBLE)[:, 1]
     scale = seen.sum() / (seen * _ratio(kelvins, _VISIBLE)).sum()

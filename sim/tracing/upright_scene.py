@@ -67,7 +67,7 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     """Return the closed form of a model.
 
     Raises:
-        NoClosedForm: a model of another form.
+        NoClosedForm: the model has another form.
     """
     _refuse_what_shines(scene)
     model = scene.model

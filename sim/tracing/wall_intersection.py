@@ -60,10 +60,10 @@ class Footprints(Protocol):
 
 
 def footprints_of(walls: Walls) -> Footprints:
-    """Return the cheaper method for these walls.
+    """Return the cheaper of the two intersection methods for these walls.
 
     Raises:
-        NoClosedForm: many walls that do not fit a grid.
+        NoClosedForm: there are many walls, and they do not fit a grid.
     """
     return EachWall(walls) if len(walls) <= FEW else Cells(walls)
 
@@ -206,7 +206,7 @@ def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
     (row, column), -1 for none.
 
     Raises:
-        NoClosedForm: walls that lie on no grid, or overlap.
+        NoClosedForm: the walls do not lie on a grid, or they overlap.
     """
     side, origin, shape = _grid(walls)
     cells = np.full(shape, -1)

@@ -131,8 +131,9 @@ def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndar
 
 
 def _affine(points: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Return the map (2, 4) from (x, y, z, 1) to uv on the plane of points (n, 3); it is constant along the plane's
-    normal.
+    """Return the map (2, 4) from (x, y, z, 1) to uv on the plane of points (n, 3).
+
+    It is constant along the plane's normal.
     """
     along = points[1:] - points[0]
     linear = np.linalg.lstsq(along, uv[1:] - uv[0], rcond=None)[0].T

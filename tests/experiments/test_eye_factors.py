@@ -107,3 +107,10 @@ def test_a_page_can_be_made_of_the_first_runs(tmp_path):
     assert (
         "Too few training runs" in eye_factors.page(some, Origin(1.0, "m", {"commit": "a", "python": "3"}), "").markdown
     )
+
+
+def test_difficult_layouts_do_not_blur_comparisons():
+    """Returns differ by up to 140 between layouts, and by 10 ± 1 between animals in the same layouts."""
+    some = [replace(row, held_out=row.held_out + 20 * row.seed) for row in rows()]
+    found = eye_factors.advantage(some, NAVIGATION, controls()[0])
+    assert 7 < found.low < found.high < 13, "an interval of unpaired runs is a hundred wide"

@@ -102,6 +102,8 @@ SENSOR = {
 }
 CAMERA = {"lens": LENS, "sensor": optics.Sensor(**SENSOR), "sensor_distance": 240e-6, "tolerance": 0.1}
 EYES = {
+    "Fovea": {"e2_deg": 1.0, "center_deg": (0.0, 0.0)},
+    "VisualStreak": {"e2_deg": 5.0, "elevation_deg": 0.0},
     "Sensor": SENSOR,
     "camera_eye": CAMERA,
     "camera_image": {

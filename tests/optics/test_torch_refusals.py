@@ -11,6 +11,7 @@ import optics
 import optics.torch
 from optics import AccuracyError, BSplineRelief, HeightMap, Pupil
 from optics.numerics import device
+from optics.torch_graph import common_device
 from tests.optics.test_torch import SQUARE, VIEW, R, asking, former, lens
 
 NAN = np.full((5, 5), np.nan)
@@ -80,7 +81,7 @@ def test_tensors_on_two_devices_are_refused():
     """Single numbers on the processor fit any device, as in torch."""
     cpu, gpu = (SimpleNamespace(device=torch.device(place), ndim=2) for place in ("cpu", "cuda"))
     single = SimpleNamespace(device=torch.device("cpu"), ndim=0)
-    common = optics.torch._common_device
+    common = common_device
     assert common({"n": single, "height": gpu}) == torch.device("cuda")
     assert common({"n": single}) == common({}) == torch.device("cpu")
     with pytest.raises(ValueError, match=r"^mask is on cpu and height on cuda: must be on one device, or pass device="):

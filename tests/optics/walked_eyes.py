@@ -82,6 +82,7 @@ OF_EYES = {
             "microvilli": optics.Microvilli(),
             "pupil_turned": With(True, {"pupil": Pupil(**LENS, wavefront=Zernike({(3, 1): 0.2}))}),
             "vertical_fov_deg": 30.0,
+            "density": optics.Fovea(5.0),
             "dynamics": NoEffect("it needs time, which environments have: tests/sim/envs/test_receptors_in_time.py"),
         },
     ),
@@ -105,7 +106,7 @@ OF_EYES = {
         {
             "sensor": With(optics.Sensor((2, 4), 5e-6), {"sensor": optics.Sensor((2, 4), 4e-6)}),
             "depth": With(0.02, {"sensor": optics.Sensor((2, 4), 4e-6)}),
-            "field_zones": With(3, {"sensor": optics.Sensor((2, 4), 4e-4, full_well=1e9, bits=None)}),
+            "field_zones": With(3, {"sensor": optics.Sensor((2, 4), 1e-4, full_well=1e9, bits=None)}),
             "samples_per_pixel": With(2, {"sensor": optics.Sensor((2, 4), 4e-6)}),
             "rng": With(np.random.default_rng(0), {"sensor": optics.Sensor((2, 4), 4e-6)}),
             "sensor_distance": With(2.1e-3, {"sensor": optics.Sensor((2, 4), 4e-6)}),
@@ -127,11 +128,19 @@ OF_EYES = {
             "frames": NoEffect("environments render them: tests/sim/envs/test_receptors_in_time.py"),
         },
     ),
+    "Fovea": Walk(
+        lambda **given: optics.Fovea(**given)(np.array([1.0, 9.0]), np.array([2.0, -5.0])),
+        {"e2_deg": 3.0, "center_deg": (1.0, 0.0)},
+    ),
+    "VisualStreak": Walk(
+        lambda **given: optics.VisualStreak(**given)(np.array([1.0, 9.0]), np.array([2.0, -5.0])),
+        {"e2_deg": 3.0, "elevation_deg": 1.0},
+    ),
     "TurbidMedium": Walk(
         lambda **given: repr(optics.immersed(EYE, optics.TurbidMedium(TINT, TINT, **given)).pupil),
         {"refractive_index": optics.medium("water")},
     ),
-    "Eye.describe": Walk(lambda **asked: str(EYE.describe(**asked)), {"z": 1e-3}),
+    "Eye.describe": Walk(lambda **asked: str(EYE.describe(**asked)), {"z": 1e-3, "direction_deg": (10.0, 5.0)}),
     "Eye.kernel": Walk(lambda **asked: EYE.kernel(2, **asked), {"z": 1e-3, "direction_deg": (10.0, 0.0)}),
     "Eye.psf": Walk(lambda **asked: EYE.psf(**asked).psf, {"z": 1e-3}),
     "Eye.see": Walk(

@@ -107,6 +107,7 @@ IN_WORLDS = {
             ),
             "vertical_fov_deg": 30.0,
             "dynamics": optics.ReceptorDynamics(200.0),
+            "density": optics.Fovea(10.0),
         },
     ),
     "build_world": Walk(

@@ -12,8 +12,8 @@ waveguide modes. All rhabdoms have the refractive index 1.363 in a medium of 1.3
 Acuity is that of a hexagonal lattice.
 
 **Sources.** The last column states which part of the source was read: the article, a table, an appendix, the caption of
-a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible, and that the
-value comes from a later article or was proposed for this page. "Closed form" means that the value comes from a formula.
+a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible: the value comes
+from a later article, or from the proposal for this page. "Closed form" means that it comes from a formula.
 
 - Honeybees: Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1. The published Δρ is d/f, which ignores
   diffraction. The computed angles are therefore larger, by 20 to 65 %. Angles measured by electrophysiology agree
@@ -21,11 +21,12 @@ value comes from a later article or was proposed for this page. "Closed form" me
   light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017). A closed pupil removes the higher modes
   (Stavenga 2004), so the light-adapted angle is computed from the first mode. *Apis cerana* has V = 2.55 at 540 nm,
   just above the cut-off of the second mode at 2.405. Its angle is therefore sensitive to the refractive indices. For
-  *Apis dorsata*, S and the other columns of the table (D, f, Δρ and l) agree only to within 9 %.
+  *Apis dorsata*, the table's S differs by 9 % from the value that follows from its other columns (D, f, Δρ and l).
 - *Drosophila*: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1.
 - Blowfly: Stavenga, J. Exp. Biol. 207, 1703, 2004, caption of fig. 4. Dark-adapted angles approach d/f, and
-  light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves could not be
-  read. They apply to tapered rhabdomeres, whereas the model has straight ones.
+  light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves between
+  these limits could not be read, so the column "published" contains the limits. The curves are for tapered rhabdomeres,
+  whereas the model has straight ones.
 - *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The inputs are quoted.
 - *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. According to geometrical optics, the
   acceptance angle of the receptor is 45°. The row shows by how much the PSF of the lens increases this angle.
@@ -35,18 +36,19 @@ value comes from a later article or was proposed for this page. "Closed form" me
 - Eye parameter: Snyder, J. Comp. Physiol. 116, 161, 1977, abstract.
 - Photons: Geisler, J. Opt. Soc. Am. A 1, 775, 1984, quoted: 347.8 photons per second, mm² of pupil, square minute and
   cd/m² at 555 nm.
-- Fish: Fernald & Wright, Vision Research 25, 155, 1985, abstract: 1.9 % of the focal length in *Haplochromis burtoni*.
-  The abstract does not state the wavelengths. The computed value is for a lens with f = 2.5 R and the dispersion of
-  serum albumin, between 486 and 656 nm (the lines F and C). The two values therefore agree only roughly.
+- Fish: Fernald & Wright, Vision Research 25, 155, 1985, abstract: the chromatic aberration of the lens of *Haplochromis
+  burtoni* is 1.9 % of f. The abstract does not state the wavelengths. The computed value is for a lens with f = 2.5 R
+  and the dispersion of serum albumin, between 486 and 656 nm (the lines F and C). The two values therefore agree only
+  roughly.
 - Luneburg's and Maxwell's lenses: closed forms.
 
 **Ideal observer.** The second table lists the contrast sensitivity of an ideal observer. The conditions follow Banks,
-Geisler & Bennett (Vision Research 27, 1915, 1987): a pupil of 2 mm, 100 ms, 7.5 cycles in a cosine window, and 70.7 %
-correct choices. Only the abstract was read. It states that the ideal observer is about 20 times better than humans, and
-that both curves have the same shape from 5 to 40 cycles/degree. The human data are in a figure that was not accessible.
-The column "over 20" is the sensitivity divided by 20, which is a prediction of human sensitivity, not a comparison. The
-sensitivity at 5 cycles/degree must lie between 1,000 and 10,000. The optics are `optics.mean_human_mtf`; the article
-uses another MTF. Duration, window and criterion are quoted.
+Geisler & Bennett (Vision Research 27, 1915, 1987): a pupil of 2 mm, gratings of 7.5 cycles in a cosine window that are
+shown for 100 ms, and 70.7 % correct choices. Only the abstract was read. It states that the ideal observer is about 20
+times better than humans, and that both curves have the same shape from 5 to 40 cycles/degree. The human data are in a
+figure that was not accessible. The column "over 20" is the sensitivity divided by 20, which is a prediction of human
+sensitivity, not a comparison. The sensitivity at 5 cycles/degree must lie between 1,000 and 10,000. The optics are
+`optics.mean_human_mtf`; the article uses another MTF. Duration, window and criterion are quoted.
 
 **Not computed.** The table omits these published values:
 

@@ -59,7 +59,8 @@ def validate(arguments: Namespace) -> int:
     known = [_Proof(f"validation.{path.replace('/', '.')}", old) for path, old in paths.items()]
     proofs = [_found(name, {proof.name: proof for proof in known}) for name in arguments.proofs] or known
     if arguments.list:
-        say("\n".join(f"{proof.name:<26}{proof.question}" for proof in proofs))
+        width = max(len(proof.name) for proof in proofs) + 2
+        say("\n".join(f"{proof.name:<{width}}{proof.question}" for proof in proofs))
         return 0
     backend.require()
     return _run(proofs)

@@ -48,7 +48,7 @@ class AreaTracer:
     basis: (component, band): contribution of each component to each band
 
     Raises:
-        NoClosedForm: walls of several heights or on no grid, or a texture that changes along two axes.
+        NoClosedForm: the walls have several heights or lie on no grid, or a texture changes along two axes.
     """
 
     name = "areas"

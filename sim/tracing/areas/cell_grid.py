@@ -31,7 +31,7 @@ class CellGrid:
         """Return the coarsest grid in which each wall fills whole cells.
 
         Raises:
-            NoClosedForm: walls that lie on no grid, or overlap.
+            NoClosedForm: the walls do not lie on a grid, or they overlap.
         """
         side, origin, cells = cells_of(walls)
         return cls(side, origin, cells < 0)

@@ -41,7 +41,7 @@ class LightTable(NodeLight):
     tables: for the kernel
 
     Raises:
-        NoClosedForm: no walls, or too many cells for the tables.
+        NoClosedForm: there are no walls, or too many cells for the tables.
     """
 
     def __init__(self, tracer: ClosedForm, radii: np.ndarray, heights: np.ndarray) -> None:

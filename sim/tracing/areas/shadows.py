@@ -63,7 +63,7 @@ class WallShadows:
     around: for each cell, which cells around it are walls, for the kernel; None without walls
 
     Raises:
-        NoClosedForm: walls on no grid, or shadows that are longer than a cell.
+        NoClosedForm: the walls lie on no grid, or shadows are longer than a cell.
     """
 
     def __init__(self, walls: Walls, directions: list[list[float]]) -> None:

@@ -61,7 +61,7 @@ def test_validate_lists_names_first_and_runs_nothing(call, ran):
     code, out, err = call("validate", "--list")
     assert (code, err, ran.modules) == (0, "", [])
     assert [line.split()[0] for line in out.splitlines()] == NAMES
-    assert "psf_error_prediction      Does the predicted error hold?" in out
+    assert "psf_error_prediction         Does the predicted error hold?" in out
     assert all(len(line.split()) > 3 for line in out.splitlines())
 
 

@@ -2,7 +2,7 @@
 
 genes: test_genotype.py, test_rhabdoms.py, test_vertical_fov.py
 genotype: test_genotype.py
-phenotype: test_genotype.py, test_anatomy.py
+phenotype: test_genotype.py, test_anatomy.py, test_rough_reliefs.py
 anatomy: test_anatomy.py
 eye_config: test_anatomy.py, config/test_odd_arguments.py
 relief_genes: config/test_relief_starts.py

@@ -169,7 +169,7 @@ def test_reliefs_of_more_genes_and_receptors_of_genes_are_reported(tmp_path):
     assert genes["doe_40 … doe_44"].split() == ["0.500"] * 5
     assert genes["lambda_max_3_nm"] == "–", "three types have no fourth peak"
     text = Page(genes_section(run).markup).texts["all"]
-    assert "doe_00 … doe_44: the relief" in text
+    assert "doe_00 … doe_44: the genes of the relief" in text
     assert "lambda_max_0_nm:" in text
 
 

@@ -11,6 +11,7 @@ human_eye: test_human_eye.py
 phase_pupil: test_phase_pupil.py
 pixel_relief: test_pixel_relief.py
 pupil_slopes: test_pupil.py
+pupil_path: test_pupil.py, test_torch_stacks.py
 zernike_modes: test_wavefront.py
 pupil: test_pupil.py
 pupil_rim: test_exit_pupil.py, test_exit_pupil_off_axis.py

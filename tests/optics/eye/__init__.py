@@ -18,9 +18,12 @@ signals: test_eye.py, test_polarization.py
 receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py, test_eye_robustness.py
 guided_field: test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
-retina: test_kept_kernels.py, test_receptive_field.py
+retina: test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
 retinal_image: test_retinal_image.py
 sensor_pixels: test_torch.py
 camera: test_camera.py
+receptor_density: test_receptor_density.py
+receptor_lattice: test_receptor_density.py
+patch: test_receptor_density.py
 summary: test_summary.py
 """

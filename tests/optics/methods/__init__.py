@@ -11,7 +11,9 @@ hankel: test_textbook.py, test_oracles_circular.py
 pupil_edge: test_sine_samples.py
 slow_factor: test_low_rank.py
 window_check: test_window_sampling.py
+window_rank: test_window_sampling.py, test_torch_stacks.py
 window_sampling: test_window_sampling.py
+window_stack: test_torch_stacks.py
 window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py
 pixelated_spectrum: elements/test_pixel_relief.py
@@ -24,6 +26,8 @@ rays: test_geometric.py
 method_sampling: point_spread/test_planner.py
 scalar_theory: test_scalar_theory.py
 sine_samples: test_sine_samples.py
+smooth_pupil: test_smooth_spectrum.py
+smooth_spectrum: test_smooth_spectrum.py, eye/test_steep_reliefs.py
 smythe: point_spread/test_vector_focus.py
 spectral_taper: test_angular_spectrum.py, test_textbook.py
 textbook: test_textbook.py

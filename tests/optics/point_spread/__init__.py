@@ -8,6 +8,7 @@ concentration: test_measures.py, test_measure_errors.py, test_measure_bounds.py
 strehl: test_measures.py, test_measure_errors.py, test_measure_bounds.py
 window_loss: test_measure_bounds.py
 light_batch: test_torch.py
+coarse_stack: test_torch_stacks.py
 microvilli: test_microvilli.py
 converging: test_vector_focus.py, test_microvilli.py
 disk_sum: test_microvilli.py

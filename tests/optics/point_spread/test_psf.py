@@ -177,7 +177,7 @@ class TestWindow:
             LENS, [550e-9], source_angle=(angle, 0.0), dx=1e-6, shape=(65, 65), centre=(place, 0.0), tolerance=1e-3
         )
         assert result.power[0] > 0.8
-        assert math.prod(result.plan.samples) < 2000
+        assert math.prod(result.plan.samples) < 0.1 * 371**2, "samples of the angular spectrum"
 
     def test_must_be_a_point(self):
         with pytest.raises(ValueError, match="centre = 3"):
@@ -263,8 +263,9 @@ class TestRefusals:
     def test_a_dark_window_is_less_accurate_and_says_so(self):
         """The focus of a tilted wave lies far outside: the remaining edge light is closer to float32's rounding."""
         window = {"wavelengths": [550e-9], "dx": 1e-6, "shape": (17, 17)}
-        bright = optics.psf(LENS, **window)
-        dark = optics.psf(LENS, **window, source_angle=(0.6, 0.0))
+        bright, dark = (
+            optics.psf(LENS, **window, source_angle=(angle, 0.0), method="rayleigh_sommerfeld") for angle in (0.0, 0.6)
+        )
         exact = optics.psf(LENS, **window, source_angle=(0.6, 0.0), tolerance=1e-7, dtype="float64")
         assert dark.psf.max() < 1e-5 * bright.psf.max()
         assert dark.plan.predicted_error > bright.plan.predicted_error

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sim
-from optics import MaskMap, PhotonBudget, Pupil, ReceptorDynamics, Receptors, Waveguide, Zernike
+from optics import Fovea, MaskMap, PhotonBudget, Pupil, ReceptorDynamics, Receptors, Waveguide, Zernike
 from sim.eyes.eyes import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
 
 
@@ -92,6 +92,7 @@ CHANGES = {
     "waveguide": (Waveguide(10e-6, 1.35), (2, 3, 4, 5)),
     "pupil_turned": (True, (2, 3, 4, 5)),
     "vertical_fov_deg": (60.0, (2, 3, 4, 5)),
+    "density": (Fovea(5.0), (2, 3, 4, 5)),
     "dynamics": (ReceptorDynamics(adaptation="naka_rushton"), (2, 3, 4, 5)),
 }
 

@@ -1,0 +1,46 @@
+"""Parts of a pupil's optical path that do not depend on the wavelength.
+
+Their sum, weighted by refractive indices, is the path: see `Pupil.path`. Light of several wavelengths and sources can
+therefore share them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from optics.numerics.array_library import library, like
+from optics.numerics.autodiff import Array
+
+if TYPE_CHECKING:
+    from optics.elements.pupil import Pupil
+
+__all__ = ["lens_path", "relief_height", "wavefront_ahead"]
+
+
+def lens_path(pupil: Pupil, x: Array, y: Array) -> Array | None:
+    """Return the path [m] by which the ideal lens is shorter at points (x, y) [m]; None without a lens.
+
+    It is the path in vacuum, √(r² + f²) - f, arrays as in `Relief.height`.
+    """
+    if pupil.thin_lens_focal_length is None:
+        return None
+    f, own = like(x, pupil.thin_lens_focal_length), library(x)
+    r2 = x * x + y * y
+    return r2 / (own.sqrt(r2 + f * f) + own.abs(f)) * own.sign(f)
+
+
+def relief_height(pupil: Pupil, x: Array, y: Array) -> Array | None:
+    """Return the height [m] of the relief at points (x, y) [m]; None without a relief."""
+    if pupil.height is None:
+        return None
+    scale = 1 / like(x, pupil.aperture_radius)
+    return pupil.height.height(x * scale, y * scale)
+
+
+def wavefront_ahead(pupil: Pupil, x: Array, y: Array) -> Array | None:
+    """Return the length [m] by which the wavefront is ahead at points (x, y) [m]; None without an aberration."""
+    if pupil.wavefront is None:
+        return None
+    own = pupil.aperture_radius if pupil.wavefront.radius is None else pupil.wavefront.radius
+    scale = 1 / like(x, own)
+    return pupil.wavefront.ahead(x * scale, y * scale)

@@ -1,0 +1,164 @@
+"""Receptors of different sizes on a retina: rectangles in rows, each of which holds the same share of a density.
+
+Coordinates are x to the right and y down in the visual field, from the middle of the retina. Their units are the width
+and the height of an average receptor: the retina of h x w receptors is [-w/2, w/2] x [-h/2, h/2]. Each row extends over
+the whole width, and has w receptors of its own widths. The heights of rows follow from the density's mean over the
+columns, and the widths in a row from its mean over that row (the conditional distribution, Rosenblatt, Ann. Math. Stat.
+23, 470, 1952). The rectangles leave no gaps, and an array of signals remains an image (row, column).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from optics.eye.receptor_density import Density, DensityMap, density_on
+from optics.numerics.read_only import ReadOnlyArrays
+
+__all__ = ["ReceptorLattice", "even_lattice", "overlaps", "receptor_lattice"]
+
+NARROWEST = 0.01  # choice: smallest side of a receptor, relative to the average
+
+
+@dataclass(frozen=True, eq=False)
+class ReceptorLattice(ReadOnlyArrays):
+    """Rectangles of receptors.
+
+    rows: edges of the rows, from the top, (h + 1,).
+    columns: edges of the receptors in each row, from the left, (h, w + 1).
+    """
+
+    rows: np.ndarray
+    columns: np.ndarray
+
+    @property
+    def sides(self) -> np.ndarray:
+        """Height and width of each receptor, (2, h, w)."""
+        widths = np.diff(self.columns, axis=1)
+        return np.stack([np.broadcast_to(np.diff(self.rows)[:, None], widths.shape), widths])
+
+    @property
+    def areas(self) -> np.ndarray:
+        """Area of each receptor relative to the average, (h, w)."""
+        found: np.ndarray = self.sides.prod(axis=0)
+        return found
+
+    @property
+    def smallest(self) -> tuple[float, float]:
+        """Smallest height and smallest width of a receptor."""
+        height, width = self.sides.min(axis=(1, 2))
+        return float(height), float(width)
+
+    @property
+    def middles(self) -> np.ndarray:
+        """Middles (x, y) of the receptors, (h, w, 2)."""
+        x, y = ((edges[..., 1:] + edges[..., :-1]) / 2 for edges in (self.columns, self.rows))
+        return np.stack(np.broadcast_arrays(x, y[:, None]), axis=-1)
+
+    def directions_deg(self, size: tuple[float, float], middle: tuple[float, float]) -> np.ndarray:
+        """Return the angles (right, up) [degrees] of the receptors' middles from the axis, (2, h, w).
+
+        size: width and height of an average receptor on the plane at distance 1.
+        middle: tangents (right, down) of the direction of the field's middle.
+        """
+        right, down = np.moveaxis(self.middles * size + middle, -1, 0)
+        return np.degrees(np.arctan(np.stack([right, -down])))
+
+    def angles_deg(self, size: tuple[float, float], middle: tuple[float, float]) -> np.ndarray:
+        """Return the angles [degrees] that the receptors subtend vertically and horizontally, (2, h, w).
+
+        Arguments as in `directions_deg`.
+        """
+        at, half = self.middles * size + middle, self.sides * np.reshape(size[::-1], (2, 1, 1)) / 2
+        found = []
+        for axis, side in zip((1, 0), half, strict=True):
+            ahead = np.concatenate([at, np.ones_like(at[..., :1])], axis=-1)
+            ends = [ahead + sign * side[..., None] * np.eye(3)[axis] for sign in (-1, 1)]
+            sine, cosine = np.linalg.norm(np.cross(*ends), axis=-1), np.sum(ends[0] * ends[1], axis=-1)
+            found.append(np.degrees(np.arctan2(sine, cosine)))
+        return np.stack(found)
+
+    def places(self, counted: np.ndarray) -> np.ndarray:
+        """Return places (x, y), (n, 2), for coordinates that count receptors from the middle of the retina.
+
+        The receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2] of the counting coordinates. Beyond
+        the rim, receptors continue with the size of the outermost ones.
+        """
+        height, width = self.columns.shape[0], self.columns.shape[1] - 1
+        column, row = (counted + np.array([width, height]) / 2).T
+        i, j = (np.clip(np.floor(at), 0, n - 1).astype(int) for at, n in ((row, height), (column, width)))
+        x = self.columns[i, j] + (column - j) * (self.columns[i, j + 1] - self.columns[i, j])
+        y = self.rows[i] + (row - i) * (self.rows[i + 1] - self.rows[i])
+        return np.stack([x, y], axis=-1)
+
+    def counted(self, places: np.ndarray) -> np.ndarray:
+        """Return the coordinates (..., 2) that count receptors, for places (x, y): the inverse of `places`."""
+        height, width = self.columns.shape[0], self.columns.shape[1] - 1
+        x, y = np.moveaxis(places, -1, 0)
+        i = np.clip(np.searchsorted(self.rows, y, side="right") - 1, 0, height - 1)
+        # One search in all rows: each row is moved to an interval of its own.
+        apart = 2.0 * width * np.arange(height)
+        inside = np.clip(x, -width / 2, width / 2) + apart[i]
+        j = np.searchsorted((self.columns[:, :-1] + apart[:, None]).ravel(), inside, side="right") - 1 - i * width
+        j = np.clip(j, 0, width - 1)
+        row = i + (y - self.rows[i]) / (self.rows[i + 1] - self.rows[i])
+        column = j + (x - self.columns[i, j]) / (self.columns[i, j + 1] - self.columns[i, j])
+        return np.stack([column - width / 2, row - height / 2], axis=-1)
+
+    def receptors_at(self, shape: tuple[int, int]) -> np.ndarray:
+        """Return the number of the receptor, row by row, at the middle of each of `shape` equal cells of the retina."""
+        height, width = self.columns.shape[0], self.columns.shape[1] - 1
+        y, x = (n * ((2 * np.arange(m) + 1) / (2 * m) - 0.5) for n, m in zip((height, width), shape, strict=True))
+        column, row = np.moveaxis(self.counted(np.stack(np.meshgrid(x, y), axis=-1)), -1, 0)
+        i = np.clip(np.floor(row + height / 2), 0, height - 1).astype(int)
+        found: np.ndarray = i * width + np.clip(np.floor(column + width / 2), 0, width - 1).astype(int)
+        return found
+
+
+def even_lattice(resolution: tuple[int, int]) -> ReceptorLattice:
+    """Return receptors that are all alike."""
+    rows, columns = (np.arange(n + 1) - n / 2 for n in resolution)
+    return ReceptorLattice(rows, np.tile(columns, (resolution[0], 1)))
+
+
+@lru_cache(maxsize=32)
+def receptor_lattice(
+    density: Density | DensityMap, resolution: tuple[int, int], halves: tuple[float, float], middle: tuple[float, float]
+) -> ReceptorLattice | None:
+    """Return the receptors of a density, or None if the density is constant and all receptors are alike.
+
+    Arguments as in `density_on`.
+
+    Raises:
+        ValueError: see `density_on`, or a receptor that is far narrower than the average.
+    """
+    values = density_on(density, resolution, halves, middle)
+    if values.min() == values.max():
+        return None
+    (height, width), down = resolution, len(values)
+    rows = _edges(values.mean(axis=1)[None], height)[0]
+    mean_of_rows = overlaps(rows * down / height + down / 2, down) @ values
+    found = ReceptorLattice(rows, _edges(mean_of_rows, width))
+    if min(found.smallest) < NARROWEST:
+        raise ValueError(
+            f"density makes the narrowest receptor {min(found.smallest):.2g} times the average: must be at least "
+            f"{NARROWEST:g}, so the density must vary less, or increase over a larger part of the field"
+        )
+    return found
+
+
+def overlaps(edges: np.ndarray, cells: int) -> np.ndarray:
+    """Return the part of each cell between successive edges, (interval, cell). Cell k is the interval [k, k + 1]."""
+    return np.diff(np.clip(edges[:, None] - np.arange(cells), 0, 1), axis=0)
+
+
+def _edges(densities: np.ndarray, count: int) -> np.ndarray:
+    """Return edges (row, count + 1) from -count/2 to count/2, between which each density (row, cell) has equal sums."""
+    cells = densities.shape[1]
+    sums = np.concatenate([np.zeros((len(densities), 1)), np.cumsum(densities, axis=1)], axis=1)
+    at, shares = np.arange(cells + 1) / cells - 0.5, np.arange(1, count) / count
+    inner = np.stack([np.interp(shares * row[-1], row, at) for row in sums])
+    ends = np.full((len(densities), 1), 0.5)
+    return count * np.concatenate([-ends, inner, ends], axis=1)

@@ -1,0 +1,229 @@
+"""The angular spectrum of a steep pupil, from samples of its light convolved with a Gaussian (`smooth_pupil`).
+
+Samples of all light of a rough relief would need the pitch of its steepest slopes, even if nearly all of this light
+misses the window or is evanescent. The convolved light needs the pitch of the light that arrives in the window. Its
+spectrum is divided by that of the Gaussian, and propagated as in `angular_spectrum`. Light beyond the `reach` of the
+problem is removed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optics.elements.beam import Beam
+from optics.elements.derivative_knots import carries_derivatives
+from optics.elements.wavefront_slopes import derivative
+from optics.methods.angular_spectrum import transfer, whole_period
+from optics.methods.problem import Problem
+from optics.methods.smooth_pupil import REACH, SmoothPupil, sides_of
+from optics.methods.spectral_taper import Taper, tapers
+from optics.methods.spectrum_sampling import SpectrumSampling
+from optics.methods.window_sums import intensity_of
+from optics.numerics.array_sum_cost import lines_seconds
+from optics.numerics.autodiff import Array
+from optics.numerics.cost import CALL, SMOOTH_SAMPLE, TRANSFER_SAMPLE
+from optics.numerics.fourier import fast_length
+from optics.numerics.grid import Grid
+from optics.numerics.precision import padded_for_packets, precision
+
+__all__ = ["SmoothSpectrum", "may_be_steep", "smooth_spectrum"]
+
+# Choices. Largest error of the amplitude due to the third derivative of the phase, relative to the tolerance; largest
+# exponent by which the Gaussian attenuates light in the window, at a tolerance of 0.01; and light that the samples
+# alias, relative to the tolerance. See test_smooth_spectrum.py.
+CUBIC, ATTENUATED, ALIASED = 0.5, 2.5, 0.02
+AT_ONCE = 2**19  # choice: samples of columns that are transformed at once
+SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
+
+
+@dataclass(frozen=True)
+class SmoothSpectrum(SpectrumSampling):
+    """Spectrum of a pupil whose light is convolved with a Gaussian. pupil_period: number of its samples per period.
+
+    blur: width [m] of a further Gaussian, with which the light is convolved numerically before it is sampled for the
+        spectrum. The Gaussian of the closed form may be too narrow for the longest possible pitch. 0: none.
+    """
+
+    smooth: SmoothPupil
+    blur: float
+    taper: Taper
+    period: float
+    pupil_period: int
+    output_period: int
+    even: bool = False
+    seconds: float = 0.0
+    bytes: float = 0.0
+    tolerance: float = 0.01
+    method: str = "angular_spectrum"
+    model_error: float = 0.0
+
+    @cached_property
+    def pupil(self) -> Grid:
+        """Samples from which the spectrum is computed."""
+        return _samples(self.smooth.outermost + REACH * self.blur, self.period / self.pupil_period)
+
+    @cached_property
+    def closed_form(self) -> Grid:
+        """Samples of the closed form."""
+        if self.blur == 0:
+            return self.pupil
+        return _samples(self.smooth.outermost, _pitch(self.taper.end, self.smooth.width, self.tolerance))
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.closed_form.shape
+
+    @property
+    def padding(self) -> float:
+        return self.pupil_period / self.pupil.shape[0]
+
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        assert problem.reach is not None
+        types, window = precision(problem.dtype), problem.window
+        found = intensity_of(self._propagated(self._light(beam, types.dtype), self._transfer(beam, problem), window))
+        found[np.add.outer(np.square(window.y), np.square(window.x)) > problem.reach**2] = 0
+        return types.Float(padded_for_packets(found / float(self.pupil_period) ** 4))
+
+    def _light(self, beam: Beam, dtype: Any) -> np.ndarray:
+        """Return the convolved light at the samples from which the spectrum is computed, complex (y, x)."""
+        grid = self.closed_form
+        light = self.smooth.light(beam, grid.x, grid.y, dtype)
+        if self.blur == 0:
+            return light
+        bell = np.exp(-(np.subtract.outer(self.pupil.x, grid.x) ** 2) / (2 * self.blur**2))
+        weight = (bell * (grid.dx / (math.sqrt(2 * math.pi) * self.blur))).astype(light.dtype)
+        found: np.ndarray = weight @ light @ weight.T
+        return found
+
+    def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
+        """Return the transfer function to the window, divided by the spectrum e^{-2π²δ²f²} of the Gaussian.
+
+        It is even, so the result is the quarter with frequencies of at least 0.
+        """
+        found = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
+        exponent = 2 * math.pi**2 * (self.smooth.width**2 + self.blur**2)
+        gain = np.exp(exponent * (np.arange(len(found)) / self.period) ** 2).astype(found.real.dtype)
+        found *= gain[:, None] * gain
+        return found
+
+    def _propagated(self, light: np.ndarray, transfer: np.ndarray, window: Grid) -> np.ndarray:
+        """Return the field over the window (y, x), times the squared number of samples per period.
+
+        The sums along y, to the spectrum and back, are computed for some columns at a time, which fit into the cache.
+        The first sample is the origin of all transforms, and phases that are linear in the frequency move it.
+        """
+        from scipy import fft
+
+        top, length, period = len(transfer) - 1, self.pupil_period, self.output_period
+        frequency = np.arange(-top, top + 1) / self.period
+        first = float(self.pupil.x[0])
+        along, up = (
+            np.exp(2j * np.pi * frequency * (at[0] - first)).astype(light.dtype) for at in (window.x, window.y)
+        )
+        columns = np.ascontiguousarray((_centred(fft.fft(light, length, axis=1), top) * along).T)
+        rows = np.empty((len(columns), window.shape[0]), light.dtype)
+        for place in np.array_split(np.arange(len(columns)), -(-len(columns) * length // AT_ONCE)):
+            spectrum = _centred(fft.fft(columns[place], length, axis=1), top) * up
+            own = transfer[np.abs(place - top)]
+            spectrum[:, top:] *= own
+            spectrum[:, :top] *= own[:, :0:-1]
+            rows[place] = _back(spectrum, top, period)[:, : window.shape[0]]
+        return _back(np.ascontiguousarray(rows.T), top, period)[:, : window.shape[1]]
+
+
+def _centred(spectrum: np.ndarray, top: int) -> np.ndarray:
+    """Return the frequencies from -top to top of lines in FFT order."""
+    return np.concatenate([spectrum[:, len(spectrum[0]) - top :], spectrum[:, : top + 1]], axis=1)
+
+
+def _back(spectrum: np.ndarray, top: int, period: int) -> np.ndarray:
+    """Return Σ_k U[k] exp(2πi j k / period) over k from -top to top, for j from 0 to period - 1, along axis 1."""
+    from scipy import fft
+
+    before = -top % period  # frequencies that the samples do not distinguish are added
+    wrapped = np.zeros((len(spectrum), -(-(before + 2 * top + 1) // period) * period), spectrum.dtype)
+    wrapped[:, before : before + 2 * top + 1] = spectrum
+    if wrapped.shape[1] > period:
+        wrapped = wrapped.reshape(len(spectrum), -1, period).sum(axis=1)
+    found: np.ndarray = fft.ifft(wrapped, axis=1, norm="forward", overwrite_x=True)
+    return found
+
+
+def may_be_steep(beam: Beam) -> bool:
+    """Return whether these methods apply to the pupil: it has a smooth relief or wavefront, and no mask.
+
+    The aperture must be a circle, a ring, a slit or a convex polygon, and no number may carry a derivative.
+    """
+    pupil = beam.pupil
+    bends = pupil.bends(beam.wavelength) or pupil.wavefront is not None
+    smooth = bends and not pupil.pixels and pupil.mask is None and not carries_derivatives(beam)
+    return smooth and sides_of(pupil.aperture) is not None
+
+
+def smooth_spectrum(problem: Problem) -> list[SmoothSpectrum]:
+    """Return samplings with which the spectrum meets the problem's tolerance, for tapers with increasing blur."""
+    third = _third_derivative(problem)
+    return [_sampling(problem, taper, third) for taper in tapers(problem)]
+
+
+def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
+    sides, tolerance = sides_of(problem.aperture), problem.tolerance
+    assert sides is not None
+    # The error of the amplitude is at most about the third derivative of the phase, in waves, times δ³.
+    widest = math.sqrt(ATTENUATED * min(1.0, tolerance / 0.01) / 2) / (math.pi * taper.end)
+    smooth = SmoothPupil(sides, problem.radius, min(widest, (CUBIC * tolerance / third) ** (1 / 3)))
+    blur = math.sqrt(widest**2 - smooth.width**2)
+    blur = blur if blur > _pitch(taper.end, smooth.width, tolerance) else 0.0  # the samples must resolve it
+    period, output_period = whole_period(problem, taper, smooth.outermost + REACH * blur)
+    pupil_period = fast_length(period / _pitch(taper.end, math.hypot(smooth.width, blur), tolerance))
+    sampling = SmoothSpectrum(smooth, blur, taper, period, pupil_period, output_period, tolerance=tolerance)
+    return _timed(sampling, problem)
+
+
+def _pitch(band: float, width: float, tolerance: float) -> float:
+    """Return the pitch [m] of light that is convolved with a Gaussian of this width [m], for a band [1/m].
+
+    The Gaussian attenuates light that is aliased onto the band more than light in the band.
+    """
+    exponent = math.log(1 / (ALIASED * tolerance))
+    return 1 / (band + math.sqrt(band**2 + exponent / (2 * (math.pi * width) ** 2)))
+
+
+def _samples(outermost: float, pitch: float) -> Grid:
+    return Grid.square(2 * math.ceil(outermost / pitch) + 1, pitch)
+
+
+def _third_derivative(problem: Problem) -> float:
+    """Return the largest third derivative of the waves behind the pupil [1/m³], at least one per cubed radius."""
+    slopes = problem.slopes
+    along = slopes.along_x / problem.light.wavelength, slopes.along_y / problem.light.wavelength
+    xx, yy = _gradient(along[0], slopes.grid.dx)[0], _gradient(along[1], slopes.grid.dx)[1]
+    thirds = (*_gradient(xx, slopes.grid.dx), *_gradient(yy, slopes.grid.dx))
+    square = thirds[0] ** 2 + 3 * thirds[1] ** 2 + 3 * thirds[2] ** 2 + thirds[3] ** 2
+    inside = slopes.distance_from_axis <= problem.radius
+    return max(math.sqrt(float(square[inside].max())), problem.radius**-3)
+
+
+def _gradient(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    return derivative(values.T, step).T, derivative(values, step)
+
+
+def _timed(sampling: SmoothSpectrum, problem: Problem) -> SmoothSpectrum:
+    across, columns, rows = sampling.pupil.shape[0], sampling.spectrum.shape[0], problem.window.shape[0]
+    closed = sampling.samples[0]
+    to_spectrum = lines_seconds(across + columns, sampling.pupil_period, problem.dtype)
+    to_window = lines_seconds(columns + rows, sampling.output_period, problem.dtype)
+    points = closed**2 * SMOOTH_SAMPLE + columns**2 * TRANSFER_SAMPLE / 4
+    item = np.dtype(precision(problem.dtype).complex_dtype).itemsize
+    lines = across * sampling.pupil_period + columns * (columns / 4 + across + 2 * rows)
+    return replace(
+        sampling,
+        seconds=CALL["angular_spectrum"] + points + to_spectrum + to_window,
+        bytes=closed**2 * SAMPLE_BYTES + item * lines,
+    )

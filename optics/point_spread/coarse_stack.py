@@ -1,0 +1,72 @@
+"""PSFs of several depths and wavelengths from one plan, at coarse tolerances.
+
+The PSFs that need the most samples are those at the shortest wavelength, for the nearest and the farthest source. Their
+plans decide for all. The error of each PSF is checked as that of a single one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from optics.elements.beam import Beam
+from optics.elements.torch_numbers import torch_numbers
+from optics.methods.problem import Problem
+from optics.methods.sine_samples import SineSamples
+from optics.methods.window_sampling import TIGHTEST, WindowSampling
+from optics.methods.window_stack import WindowStack
+from optics.numerics.accuracy import AccuracyError
+from optics.numerics.autodiff import Array, carries_derivative, plain
+from optics.point_spread.request import Setup
+
+__all__ = ["coarse_stack"]
+
+
+def coarse_stack(
+    stack: WindowStack, without: WindowStack, tolerance: float, method: str
+) -> tuple[Array, np.ndarray] | None:
+    """Return PSFs (source, wavelength, y, x), and which of them meet the tolerance, (source, wavelength).
+
+    The result is None if other methods are faster, or must be used.
+
+    stack: the light, whose numbers may carry derivatives of PyTorch.
+    without: the same light without derivatives.
+    tolerance, method: see `optics.psf`.
+    """
+    # The edge of the aperture is a function of Dr.Jit, so that PyTorch cannot compute derivatives by the radius.
+    if tolerance < TIGHTEST or carries_derivative(stack.pupil.aperture_radius):
+        return None
+    sampling = _sampling(stack, without, tolerance, method)
+    if sampling is None:
+        return None
+    images = stack.intensity(sampling)
+    met: np.ndarray = without.errors(sampling, plain(images)) <= tolerance
+    return images, met  # a dark window has no error, and is left to other methods
+
+
+def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method: str) -> WindowSampling | None:
+    """Return samples that are sufficient for the whole stack; None if another method is chosen for a part of it."""
+    wavelength, found = min(without.wavelengths), list[WindowSampling]()
+    distances = [source.distance for source in without.sources]
+    for place in {int(np.argmin(distances)), int(np.argmax(distances))}:
+        setup = Setup(without.distance, without.sources[place], without.window, tolerance, method, without.dtype)
+        request = setup.request(without.pupil, wavelength)
+        if torch_numbers((stack.pupil, stack.sources, stack.distance)):
+            beam = Beam(stack.pupil, stack.sources[place], wavelength, stack.distance)
+            problem = Problem.from_beam(beam, without.window, tolerance, without.dtype, fixed=request.beam)
+            request = replace(request, problem=problem)
+        try:
+            sampling = request.planned()[1]
+        except AccuracyError:
+            return None
+        if not isinstance(sampling, WindowSampling):
+            return None
+        found.append(sampling)
+    pupil = max((each.pupil for each in found), key=_across)
+    finer = max((each.finer for each in found), key=_across)
+    return replace(found[0], pupil=pupil, finer=finer, rank=max(each.rank for each in found))
+
+
+def _across(samples: SineSamples) -> int:
+    return len(samples.at)

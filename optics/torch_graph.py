@@ -1,0 +1,106 @@
+"""Functions of Dr.Jit arrays as operations of PyTorch, and tensors that are differentiated once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import torch
+
+from optics.numerics.autodiff import Array
+from optics.numerics.backend import BackendError
+from optics.numerics.device import VARIABLE, make_ready
+from optics.numerics.precision import padded_for_packets, precision
+
+__all__ = ["DrJitOperation", "Once", "common_device", "torch_place"]
+
+
+class Once(torch.autograd.Function):
+    """The identity, whose derivative refuses to be differentiated."""
+
+    @staticmethod
+    def forward(ctx: Any, tensor: Any) -> Any:
+        return tensor.view_as(tensor)
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Any) -> Any:
+        return FirstDerivative.apply(gradient.requires_grad_())[0] if torch.is_grad_enabled() else gradient
+
+
+class DrJitOperation(torch.autograd.Function):
+    """A function of Dr.Jit arrays as an operation of PyTorch. Its graph serves any number of backward passes."""
+
+    @staticmethod
+    def forward(ctx: Any, function: Callable[[list[Array]], Array], *numbers: Any) -> Any:
+        import drjit as dr
+
+        place, types = torch_place(), precision("float64")
+        own = [_on_drjit(tensor.double(), types.Tensor64, place) for tensor in numbers]
+        dr.enable_grad(own)
+        found = function(own)
+        dr.eval(found)
+        ctx.own, ctx.found, ctx.kinds = own, found, [(t.shape, t.dtype, t.device) for t in numbers]
+        return _on_torch(dr.detach(found), place)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Any) -> Any:
+        import drjit as dr
+
+        place = torch_place()
+        dr.set_grad(ctx.found, _on_drjit(gradients[0], type(ctx.found), place))
+        dr.backward_from(ctx.found, flags=dr.ADFlag.ClearVertices)  # keeps the edges for further passes
+        slopes = dr.grad(ctx.own)
+        dr.eval(slopes)
+        found = [
+            _on_torch(slope, place).reshape(shape).to(place_of, dtype)
+            for slope, (shape, dtype, place_of) in zip(slopes, ctx.kinds, strict=True)
+        ]
+        dr.clear_grad(ctx.own)
+        if torch.is_grad_enabled():
+            found = FirstDerivative.apply(*(slope.requires_grad_() for slope in found))
+        return None, *found
+
+
+class FirstDerivative(torch.autograd.Function):
+    """First derivatives, which refuse to be differentiated."""
+
+    @staticmethod
+    def forward(ctx: Any, *slopes: Any) -> Any:
+        return tuple(slope.clone() for slope in slopes)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Any) -> Any:
+        raise RuntimeError("optics.torch.psf has no second derivatives: must be differentiated once")
+
+
+def _on_drjit(tensor: torch.Tensor, kind: Any, place: str) -> Array:
+    tensor = tensor.detach().resolve_neg().to(place).reshape(tensor.shape or (1,)).contiguous()
+    return kind(padded_for_packets(tensor.numpy()), tuple(tensor.shape)) if place == "cpu" else kind(tensor)
+
+
+def _on_torch(tensor: Array, place: str) -> torch.Tensor:
+    return torch.from_numpy(np.array(tensor.numpy())) if place == "cpu" else tensor.torch().clone()
+
+
+def torch_place() -> str:
+    """Return the torch name of the device on which optics computes.
+
+    Raises:
+        BackendError: Dr.Jit or this build of torch cannot compute on this device.
+    """
+    place = make_ready()
+    if place == "cuda" and not torch.cuda.is_available():
+        raise BackendError(f"{VARIABLE} requires a GPU, but this torch has none: must be cpu, or torch built for CUDA")
+    return place
+
+
+def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
+    """Return the device of all tensors; single numbers on the processor fit any device, as in torch."""
+    places = {name: t.device for name, t in numbers.items() if t.ndim or t.device.type != "cpu"}
+    for first, known in places.items():
+        for name, place in places.items():
+            if place != known:
+                raise ValueError(f"{name} is on {place} and {first} on {known}: must be on one device, or pass device=")
+        return known
+    return torch.device("cpu")

@@ -1,0 +1,128 @@
+"""Receptive fields of receptors of different sizes behind a pupil: the PSF, integrated over each receptor's rectangle.
+
+All receptors share the PSF. Its integral over a rectangle is a difference of its cumulative sums at the edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import optics
+from optics.eye.receptor_lattice import ReceptorLattice, overlaps
+from sim.eyes.depth_layers import ONE_PSF, DepthLayers
+from sim.eyes.receptive_fields import Draw, ReceptiveFields, kernels_of
+
+NEAR = (
+    0.25,
+    0.5,
+    0.25,
+)  # weights of a cell and its two neighbours; fields at rays are then at most four times as large
+
+
+@dataclass(frozen=True)
+class VariedFields(ReceptiveFields):
+    """Tabulated receptive fields of receptors with a `density`.
+
+    field: power per cell of the PSF, rotated by 180°, (plane, y, x)
+    density: see `ReceptiveFields`. It follows the density of receptors, because every receptor has the same share
+    resolution: receptors (height, width)
+    cells: cells along the side of an average receptor
+    lattice: rectangles of the receptors
+    """
+
+    lattice: ReceptorLattice
+
+    @classmethod
+    def from_eye(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> VariedFields:
+        """Tabulate the receptive fields of an eye.
+
+        Raises:
+            optics.AccuracyError: see `optics.Eye.kernel`.
+        """
+        assert eye.lattice is not None
+        field = kernels_of(eye, cells, depth).astype(np.float64)
+        everyone = np.arange(np.prod(eye.resolution))
+        density = _mixture(field, eye.lattice, cells, everyone)
+        return cls(field, density, eye.resolution, cells, eye.lattice)
+
+    def drawn_for(self, receptors: np.ndarray) -> VariedFields:
+        """Return the same fields with the mixture of only these receptors' fields."""
+        return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
+
+    def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
+        """Return the value of some receptors' fields at rays, (plane, receptor, ray)."""
+        rows, columns = np.divmod(receptors, self.resolution[1])
+        found = np.zeros((len(self.field), len(receptors), len(draw)))
+        for row in np.unique(rows):
+            mine = np.flatnonzero(rows == row)
+            found[:, mine] = self._values_in_row(draw, row, columns[mine])
+        return found
+
+    def _values_in_row(self, draw: Draw, row: int, columns: np.ndarray) -> np.ndarray:
+        """Return the values for some receptors of a row."""
+        planes, height, width = self.field.shape
+        upper, lower = _edges(self.lattice.rows, self.resolution[0], self.cells)[row : row + 2]
+        edges = _edges(self.lattice.columns[row], self.resolution[1], self.cells)
+        found = np.zeros((planes, len(columns), len(draw)))
+        # In cells from the corner of the mixture. A ray at y gets the PSF from y + 1/2 - lower to y + 1/2 - upper.
+        x, y = (draw.points * self.cells + np.array(self.density.shape[::-1]) / 2 + 0.5).T
+        near = np.flatnonzero((y > upper) & (y < lower + height))
+        if not near.size:
+            return found
+        before = np.concatenate([np.zeros((planes, 1, width)), np.cumsum(self.field, axis=1)], axis=1)
+        in_row = _at(before, y[near] - upper) - _at(before, y[near] - lower)
+        before = np.concatenate([np.zeros((planes, len(near), 1)), np.cumsum(in_row, axis=2)], axis=2)
+        area = (lower - upper) * np.diff(edges)[columns]
+        left, right = (edges[columns + side][:, None] for side in (0, 1))
+        values = _across(before, x[near] - left) - _across(before, x[near] - right)
+        found[:, :, near] = np.maximum(values / area[:, None], 0)
+        return found
+
+
+def _edges(edges: np.ndarray, receptors: int, cells: int) -> np.ndarray:
+    """Return edges in cells from the top or the left of the retina."""
+    found: np.ndarray = (edges + receptors / 2) * cells
+    return found
+
+
+def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Interpolate a table (plane, n + 1, x) linearly along its second axis, (plane, place, x)."""
+    at = np.clip(places, 0, table.shape[1] - 1)
+    k = np.minimum(at.astype(int), table.shape[1] - 2)
+    share = (at - k)[:, None]
+    return (1 - share) * table[:, k] + share * table[:, k + 1]
+
+
+def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Interpolate a table (plane, ray, n + 1) linearly at places (receptor, ray), (plane, receptor, ray)."""
+    at = np.clip(places, 0, table.shape[2] - 1)
+    k = np.minimum(at.astype(int), table.shape[2] - 2)
+    share, rays = at - k, np.arange(table.shape[1])
+    return (1 - share) * table[:, rays, k] + share * table[:, rays, k + 1]
+
+
+def _mixture(field: np.ndarray, lattice: ReceptorLattice, cells: int, receptors: np.ndarray) -> np.ndarray:
+    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
+
+    A ray may be up to half a cell from the middle of its cell, at which the mixture is computed. The mixture is
+    therefore averaged over neighbouring cells. Otherwise a ray just beyond the rim, where the mixture is almost 0,
+    could get a huge weight.
+    """
+    from scipy.ndimage import convolve1d
+    from scipy.signal import fftconvolve
+
+    height, width = lattice.areas.shape
+    rows, columns = np.divmod(receptors, width)
+    down = overlaps(_edges(lattice.rows, height, cells), height * cells)
+    light = np.zeros((height * cells, width * cells))
+    for row in np.unique(rows):
+        across = overlaps(_edges(lattice.columns[row], width, cells), width * cells)[columns[rows == row]]
+        light += np.outer(down[row] / down[row].sum(), (across / across.sum(axis=1, keepdims=True)).sum(axis=0))
+    one = (field / field.sum(axis=(1, 2), keepdims=True)).mean(axis=0)
+    total = np.maximum(fftconvolve(light, one), 0)
+    for axis in (0, 1):
+        total = convolve1d(total, NEAR, axis, mode="constant")
+    found: np.ndarray = total / total.sum()
+    return found
