@@ -30,11 +30,11 @@ from optics.numerics.autodiff import Array, plain
 from optics.numerics.grid import Grid
 from optics.numerics.number_types import full_precision
 from optics.numerics.renamed import warn_once
+from optics.numerics.torch_graph import DrJitOperation, Once, common_device, torch_place
 from optics.point_spread.coarse_stack import coarse_stack
 from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
 from optics.point_spread.psf_result import OF_CELLS
-from optics.torch_graph import DrJitOperation, Once, common_device, torch_place
 
 __all__ = ["PointSpread", "camera_image", "psf"]
 

@@ -9,9 +9,10 @@ import math
 import multiprocessing
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import cycle, islice
 from pathlib import Path
@@ -22,6 +23,7 @@ from evolve.genome.phenotype import Phenotype
 from evolve.learning.schedule import mean_passes, schedule
 from evolve.runs.begin import check_task
 from evolve.search.job import ExecutorError
+from evolve.search.local_executor import interrupts_held
 from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
@@ -81,24 +83,44 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
             the reason.
         ExecutorError: a worker process died.
     """
-    context = multiprocessing.get_context("spawn")
     tried = list(islice(cycle(animals), max(workers, len(animals))))
     paces: dict[str, list[Pace]] = {name: [] for name in animals}
     try:
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
+        with TemporaryDirectory() as folder, _pool(workers) as pool:
             if config.choice.named_code is not None:
-                for warning in pool.submit(check_task, config).result():
+                with interrupts_held():
+                    check = pool.submit(check_task, config)
+                for warning in check.result():
                     warnings.warn(warning, stacklevel=2)
-            lives = [pool.submit(_short_life, config, animals[name], seed) for seed, name in enumerate(tried)]
+            with interrupts_held():
+                lives = [
+                    pool.submit(_short_life, config, animals[name], seed, Path(folder) / str(seed))
+                    for seed, name in enumerate(tried)
+                ]
             for name, life in zip(tried, lives, strict=True):
                 try:
                     paces[name].append(life.result())
                 except ValueError as error:
-                    pool.shutdown(cancel_futures=True)
                     raise ConfigError(f"an animal like the {name} one cannot be evaluated here: {error}") from error
     except BrokenProcessPool as error:
         raise ExecutorError(DIED) from error
     return {name: _slowest(found) for name, found in paces.items()}
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of processes. If an exception leaves the context, they are terminated instead of awaited.
+
+    Jobs must be submitted while interrupts are held, so that only the parent receives Ctrl-C.
+    """
+    context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
+        try:
+            yield pool
+        except BaseException:
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
+            raise
 
 
 def _slowest(paces: list[Pace]) -> Pace:
@@ -111,8 +133,10 @@ def _slowest(paces: list[Pace]) -> Pace:
     )
 
 
-def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
+def _short_life(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
+
+    policy: path for the trained policy. Its folder belongs to the parent, which removes it after Ctrl-C, too.
 
     The first update has the full number of passes over the samples, and the second may have only half of it. The time
     of a pass follows from the difference between the times of the two updates.
@@ -124,17 +148,15 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
     # The training run is not divided into rungs, because they would be shorter than a rollout.
     once = replace(config, learning=short, search=replace(config.search, rungs=1))
     marks: list[float] = []
-    with TemporaryDirectory() as folder:
-        policy = Path(folder) / "policy"
-        began = time.perf_counter()
-        outcome = evaluate_candidate(
-            *(animal, once, seed, policy),
-            progress=lambda steps, planned: marks.append(time.perf_counter()),
-        )
-        ended = time.perf_counter()
-        if outcome.failure is not None:
-            raise ValueError(outcome.failure)
-        size = policy.stat().st_size
+    began = time.perf_counter()
+    outcome = evaluate_candidate(
+        *(animal, once, seed, policy),
+        progress=lambda steps, planned: marks.append(time.perf_counter()),
+    )
+    ended = time.perf_counter()
+    if outcome.failure is not None:
+        raise ValueError(outcome.failure)
+    size = policy.stat().st_size
     first, second, third = marks
     all_passes, few, last = (schedule(short, number * rollout)[0] for number in (1, 2, 3))
     step_s, late_step_s = (second - first) / rollout, (third - second) / rollout

@@ -19,7 +19,7 @@ from evolve.search.job import ATTEMPTS, ExecutorError, Job, Progress
 from evolve.search.worker import Message, work
 from evolve.store.evaluation import Evaluation
 
-__all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores"]
+__all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores", "interrupts_held"]
 
 # Several processes share the cores, so each process uses one thread. Numerical libraries read these variables when they
 # are imported.
@@ -128,7 +128,7 @@ class LocalExecutor:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=work, args=(theirs, self.evaluate, self.prepare), daemon=True)
-        with _environment(ONE_THREAD), _without_main(), _interrupts_held():
+        with _environment(ONE_THREAD), _without_main(), interrupts_held():
             process.start()
         theirs.close()
         self._workers.append(_Worker(process, ours))
@@ -197,7 +197,7 @@ def _without_main() -> Iterator[None]:
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
+def interrupts_held() -> Iterator[None]:
     """Block Ctrl-C within the context. A child process inherits the block, so that only the parent receives Ctrl-C."""
     # With the first child, multiprocessing also starts its resource tracker, and unblocks interrupts after that. The
     # tracker is therefore started before the interrupts are blocked.

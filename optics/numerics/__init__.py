@@ -23,4 +23,5 @@ radial_profile  rotationally symmetric images, computed along one radius
 read_only       read-only arrays of results
 renamed         deprecated names that warn once
 scattered_sum   Fourier sums over scattered points
+torch_graph     functions of Dr.Jit arrays as operations of PyTorch
 """

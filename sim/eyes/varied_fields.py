@@ -14,11 +14,8 @@ from optics.eye.receptor_lattice import ReceptorLattice, overlaps
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.receptive_fields import Draw, ReceptiveFields, kernels_of
 
-NEAR = (
-    0.25,
-    0.5,
-    0.25,
-)  # weights of a cell and its two neighbours; fields at rays are then at most four times as large
+# Weights of a cell and its two neighbours. Fields at rays are then at most four times as large.
+NEAR = 0.25, 0.5, 0.25
 
 
 @dataclass(frozen=True)

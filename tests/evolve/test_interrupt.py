@@ -1,5 +1,6 @@
 """Ctrl-C at any moment from the first line on: one line, code 130, no traceback."""
 
+import os
 import random
 import signal
 import subprocess
@@ -26,11 +27,12 @@ def interrupted_after(seconds, arguments):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     assert child.stdout.readline() == "started\n"
     time.sleep(seconds)
-    child.send_signal(signal.SIGINT)
+    os.killpg(child.pid, signal.SIGINT)  # a terminal sends it to the workers, too
     _, told = child.communicate(timeout=60)
     return child.returncode, told
 

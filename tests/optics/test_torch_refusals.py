@@ -11,7 +11,7 @@ import optics
 import optics.torch
 from optics import AccuracyError, BSplineRelief, HeightMap, Pupil
 from optics.numerics import device
-from optics.torch_graph import common_device
+from optics.numerics.torch_graph import common_device
 from tests.optics.test_torch import SQUARE, VIEW, R, asking, former, lens
 
 NAN = np.full((5, 5), np.nan)

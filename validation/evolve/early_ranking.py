@@ -292,9 +292,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prepare_device()
         store(options.train, options.stored)
     rows = read_rows(options.stored)
-    return Page("early_ranking", __doc__ or "", table(rows), verdicts(rows)).publish(
-        options, lambda path: draw(rows, path)
-    )
+    page = Page("early_ranking", __doc__ or "", table(rows), verdicts(rows))
+    return page.publish(options, lambda path: draw(rows, path))
 
 
 if __name__ == "__main__":

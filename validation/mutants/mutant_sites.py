@@ -177,8 +177,9 @@ class _Finder:
         kind = "sign" if isinstance(node.op, ast.USub) else "logic"
         if not isinstance(node.op, ast.UAdd):
             start = self._start(node)
-            length = re.match(rb"not\s+|.", self.source[start:]).end()  # type: ignore[union-attr]
-            yield self._site(kind, start, start + length, "")
+            operator = re.match(rb"not\s+|.", self.source[start:])
+            assert operator is not None, "an operator precedes its operand"
+            yield self._site(kind, start, start + operator.end(), "")
 
     def _logic(self, node: ast.BoolOp) -> Iterator[Site]:
         words = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")

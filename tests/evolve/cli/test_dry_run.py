@@ -36,7 +36,7 @@ def test_only_the_measuring_processes_load_large_libraries():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_measured_rollouts_are_the_shortest_of_whole_batches(seed, monkeypatch):
+def test_the_measured_rollouts_are_the_shortest_of_whole_batches(seed, monkeypatch, tmp_path):
     draw, seen = random.Random(seed), []
 
     def evaluate(animal, config, seed, policy, progress):
@@ -50,7 +50,7 @@ def test_the_measured_rollouts_are_the_shortest_of_whole_batches(seed, monkeypat
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", evaluate)
     batch, n_envs, n_steps = draw.choice([64, 1024]), draw.choice([16, 48, 128]), 8 * draw.randint(1, 40)
     learning = LearningConfig(n_envs=n_envs, n_steps=n_steps, batch_size=batch, total_steps=10**6)
-    _short_life(replace(small_config(), learning=learning), PHENOTYPE, 0)
+    _short_life(replace(small_config(), learning=learning), PHENOTYPE, 0, tmp_path / "policy")
     rollout = seen[0].n_envs * seen[0].n_steps
     assert (seen[0].n_envs, seen[0].batch_size, seen[0].total_steps) == (n_envs, batch, ROLLOUTS * rollout)
     shorter = [n for n in range(2, n_steps) if n_envs * n % batch == 0]

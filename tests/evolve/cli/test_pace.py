@@ -30,11 +30,11 @@ def test_animal_that_cannot_be_evaluated_is_named():
         measure_pace(config, {"middle": blurred}, 1)
 
 
-def test_a_life_that_fails_says_why(monkeypatch):
+def test_a_life_that_fails_says_why(monkeypatch, tmp_path):
     """The message gives the reason instead of a missing temporary file."""
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", lambda *_, **__: Evaluation.failed("weights are NaN"))
     with pytest.raises(ValueError, match=r"^weights are NaN$"):
-        _short_life(small_config(), PHENOTYPE, 0)
+        _short_life(small_config(), PHENOTYPE, 0, tmp_path / "policy")
 
 
 @pytest.mark.slow
@@ -93,13 +93,13 @@ class Clock:
 
 
 @pytest.mark.parametrize(("n_epochs", "least_epochs"), [(10, 3), (10, 6), (5, 1)])
-def test_what_a_pass_takes_is_told_from_the_rest(monkeypatch, n_epochs, least_epochs):
+def test_what_a_pass_takes_is_told_from_the_rest(monkeypatch, n_epochs, least_epochs, tmp_path):
     clock = Clock()
     monkeypatch.setattr(evolve.cli.pace, "time", clock)
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", clock.evaluate)
     learning = LearningConfig(n_epochs=n_epochs, least_epochs=least_epochs, total_steps=20 * 4096)
     config = replace(small_config(), learning=learning)
-    pace = _short_life(config, PHENOTYPE, 0)
+    pace = _short_life(config, PHENOTYPE, 0, tmp_path / "policy")
     assert (pace.start_s, pace.play_s, pace.policy_bytes) == (pytest.approx(7), pytest.approx(3), 7)
     assert 1 / pace.steps_per_s == pytest.approx(0.001 + 0.0002 * n_epochs)
     slowing = replace(learning, decay_after=5 * 4096)
@@ -107,7 +107,7 @@ def test_what_a_pass_takes_is_told_from_the_rest(monkeypatch, n_epochs, least_ep
     assert pace.training_s(slowing, 0, 20 * 4096) == pytest.approx(4096 * (20 * 0.001 + passes * 0.0002))
 
 
-def test_a_pass_takes_no_more_than_the_whole(monkeypatch):
+def test_a_pass_takes_no_more_than_the_whole(monkeypatch, tmp_path):
     """The machine is busy with other work at first."""
 
     class Busy(Clock):
@@ -122,5 +122,5 @@ def test_a_pass_takes_no_more_than_the_whole(monkeypatch):
     monkeypatch.setattr(evolve.cli.pace, "time", clock)
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", clock.evaluate)
     config = replace(small_config(), learning=LearningConfig())
-    pace = _short_life(config, PHENOTYPE, 0)
+    pace = _short_life(config, PHENOTYPE, 0, tmp_path / "policy")
     assert 0 < pace.training_s(config.learning, 0, 1_000_000) < 1_000_000 / pace.steps_per_s

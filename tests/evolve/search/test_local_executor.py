@@ -196,10 +196,10 @@ def _alive(pid):
 
 CHILDREN = """
 import multiprocessing, time
-from evolve.search.local_executor import _interrupts_held
+from evolve.search.local_executor import interrupts_held
 children = []
 for _ in range(2):
-    with _interrupts_held():
+    with interrupts_held():
         children.append(multiprocessing.get_context("spawn").Process(target=time.sleep, args=(60,)))
         children[-1].start()
 for child in children:

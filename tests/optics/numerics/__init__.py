@@ -23,4 +23,5 @@ radial_profile: test_radial_profile.py
 read_only: optics/test_read_only.py, sim/envs/test_handed_out.py
 renamed: test_renamed.py
 scattered_sum: test_scattered_sum.py
+torch_graph: optics/test_torch.py, optics/test_torch_refusals.py
 """
