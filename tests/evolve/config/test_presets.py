@@ -130,6 +130,22 @@ def test_a_lens_in_focus_is_within_reach_of_the_lens_presets_genes(index, apertu
     assert span(aperture) <= 1 < span(aperture + 0.015)
 
 
+def test_quick_starts_out_of_focus_but_few_steps_of_the_search_away():
+    """The control points of the focusing paraboloid are closed forms; only their differences matter."""
+    config = assemble("detection", "quick")
+    eye = animal(config).eyes(config.eye).eye()
+    curvature = 1 / (eye.sensor_distance * (config.genome["refractive_index"].start - 1))
+    radius = config.genome["relative_aperture"].start * config.eye.sensor_width / 2
+    points = optics.BSplineRelief.paraboloid(0.0, curvature, radius).control_points / config.eye.relief_height
+    assert {name for name in open_in(config, 0) if name.startswith("doe_")} == {"doe_11"}
+    corner, side, middle = (config.genome[name] for name in ("doe_00", "doe_01", "doe_11"))
+    assert side.start - corner.start == pytest.approx(points[0, 1] - points[0, 0], abs=1e-3)
+    focus = side.start + points[1, 1] - points[0, 1]
+    step = config.search.sigma * (middle.high - middle.low)
+    assert middle.start + 2 * step < focus < middle.start + 3 * step
+    assert focus < middle.high
+
+
 def test_pupil_is_the_preset_lens_without_a_lens():
     pupil, lens = assemble(preset="pupil"), assemble(preset="lens")
     assert open_in(pupil, 0) == {"relative_aperture"}
