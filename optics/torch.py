@@ -2,6 +2,7 @@
 
 psf(pupil, wavelengths, sensor_distance, ...)     PSFs of one or several pupils, as a tensor
 camera_image(scene, pupil, sensor, ...)           electrons in the pixels of a camera
+see(eye, radiance, ...)                           signals of an eye's receptors
 PointSpread(radius, wavelengths, ...)             module with a learnable relief
 
 heights = torch.zeros(32, 32, dtype=torch.float64, requires_grad=True)    # [m]
@@ -24,6 +25,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief, HeightMap, Relief
 from optics.elements.torch_numbers import torch_numbers, with_numbers
 from optics.eye import camera
+from optics.eye.eye import Eye
 from optics.eye.sensor_pixels import SensorPixels
 from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths, wavelength_row
 from optics.numerics.autodiff import Array, plain
@@ -36,7 +38,7 @@ from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
 from optics.point_spread.psf_result import OF_CELLS
 
-__all__ = ["PointSpread", "camera_image", "psf"]
+__all__ = ["PointSpread", "camera_image", "psf", "see"]
 
 FORMER = "heights", "radius", "n", "pupil"  # arguments that `psf` had before it accepted pupils
 
@@ -181,16 +183,40 @@ def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any
         ValueError: an argument is invalid; the message names it with its value and valid range.
         AccuracyError: see `optics.psf`.
     """
-    numbers = torch_numbers(of_kind("pupil", pupil, Pupil, "optics.Pupil(1e-3)"))
+    of_kind("pupil", pupil, Pupil, "optics.Pupil(1e-3)")
+    return _operation(lambda own: camera.camera_image(scene, own, sensor, **view), pupil, device)
+
+
+def see(
+    eye: Eye, radiance: np.ndarray, samples_per_receptor: int, rng: Any = None, z: Any = math.inf, *, device: Any = None
+) -> torch.Tensor:
+    """Return the signals of `optics.Eye.see` as a tensor (channel, h, w) with gradients to the tensors in the eye.
+
+    eye: an eye. Numbers of its pupil and its field of view may be tensors, see `psf`.
+    radiance, samples_per_receptor, rng, z: see `optics.Eye.see`. Of these, only the distance z carries a gradient.
+    device: device of the result, see `psf`.
+
+    Raises:
+        ValueError: an argument is invalid; the message names it with its value and valid range.
+        AccuracyError: see `optics.psf`.
+    """
+    of_kind("eye", eye, Eye, "optics.Eye(optics.Pupil(30e-6))")
+    seen = radiance, samples_per_receptor, rng
+    return _operation(lambda own: own["eye"].see(*seen, own["z"]), {"eye": eye, "z": z}, device)
+
+
+def _operation(compute: Callable[[Any], Any], element: Any, device: Any) -> torch.Tensor:
+    """Return the result of a function of an element as a tensor with gradients to the tensors in the element."""
+    numbers = torch_numbers(element)
     place = torch.device(device) if device is not None else common_device(numbers)
     if not numbers or not torch.is_grad_enabled():
-        fixed = with_numbers(pupil, {name: plain(tensor)[()] for name, tensor in numbers.items()})
-        return torch.from_numpy(np.asarray(camera.camera_image(scene, fixed, sensor, **view))).to(place)
+        fixed = with_numbers(element, {name: plain(tensor)[()] for name, tensor in numbers.items()})
+        return torch.from_numpy(np.asarray(compute(fixed))).to(place)
 
-    def electrons(own: Sequence[Array]) -> Array:
-        return camera.camera_image(scene, with_numbers(pupil, dict(zip(numbers, own, strict=True))), sensor, **view)
+    def result(own: Sequence[Array]) -> Array:
+        return compute(with_numbers(element, dict(zip(numbers, own, strict=True))))
 
-    return DrJitOperation.apply(electrons, *numbers.values()).to(place)
+    return DrJitOperation.apply(result, *numbers.values()).to(place)
 
 
 def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
