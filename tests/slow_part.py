@@ -29,13 +29,18 @@ settings.register_profile(FAST)
 settings.register_profile(ALL)
 
 
+def number(count: int, fast: int) -> int:
+    """Return `count` with `--all`, else at most `fast`."""
+    return count if settings.get_current_profile_name() == ALL else min(count, fast)
+
+
 def sweep(count: int, fast: int = FAST_EXAMPLES) -> settings:
     """Return the settings of a test with random examples, which are the same in every run.
 
     The test has `count` examples with `--all`, and otherwise the first `fast` of them.
     """
     return settings(
-        max_examples=count if settings.get_current_profile_name() == ALL else min(count, fast),
+        max_examples=number(count, fast),
         deadline=None,
         derandomize=True,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large],

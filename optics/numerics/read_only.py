@@ -15,6 +15,8 @@ from optics.numerics.number_types import full_precision
 
 __all__ = ["ReadOnlyArrays", "read_only"]
 
+FULL_PRECISION = frozenset("?bhilqBHILQfdgFDG")  # NumPy's characters of logical, whole, real and complex numbers
+
 
 def read_only(array: np.ndarray) -> np.ndarray:
     """Return a view of an array that cannot be written into. The array itself remains as it is."""
@@ -30,7 +32,11 @@ class ReadOnlyArrays:
         for name in _names(self.__class__):
             value = getattr(self, name, None)
             if isinstance(value, np.ndarray):
-                object.__setattr__(self, name, read_only(full_precision(name, value)))
+                # A simulation makes such a dataclass in every step, so common types take a short path.
+                if type(value) is not np.ndarray or value.dtype.char not in FULL_PRECISION:
+                    value = full_precision(name, value)
+                if value.flags.writeable:
+                    object.__setattr__(self, name, read_only(value))
 
 
 @cache

@@ -30,7 +30,7 @@ class EyesOfKind:
     """
 
     def __init__(self, simulation: Simulation, renderer: EyeRenderer, keys: np.ndarray, memory: int) -> None:
-        self.renderer, self._simulation = renderer, simulation
+        self.renderer, self._simulation, self._everyone = renderer, simulation, np.arange(simulation.n)
         self._wavelengths = np.asarray(renderer.eye.spectral_bands.wavelengths)
         self.memory, self._noise = Memory(memory), NoiseModel.from_eye(renderer.eye)
         receptors = (len(renderer.mounts), renderer.eye.channels, *renderer.eye.resolution)
@@ -65,7 +65,7 @@ class EyesOfKind:
         light = self._simulation.light(self._wavelengths)
         if worlds is None:
             seen = self.renderer.launch(poses, light)
-            worlds = np.arange(self._simulation.n)
+            worlds = self._everyone
         else:
             seen = self.renderer.launch_some(poses, worlds, light)
         noise = self._noise
@@ -87,8 +87,8 @@ class EyesOfKind:
         If only some worlds are rendered, and they do not begin an episode, the new frame replaces the frame that was
         last rendered in these worlds.
         """
-        everyone, light = np.arange(self._simulation.n), self._simulation.light(self._wavelengths)
-        first, chosen = fresh or worlds is not None, everyone if worlds is None else worlds
+        light = self._simulation.light(self._wavelengths)
+        first, chosen = fresh or worlds is not None, self._everyone if worlds is None else worlds
         passed = [] if first else getattr(self._simulation.physics, "passed", [])
         for earlier in passed:
             receptors.step(self._with_shot_noise(self.renderer.signals(earlier, light), chosen), chosen)

@@ -162,7 +162,7 @@ class EyesVecEnv(OneEnvironment):
         advanced = self._advance()
         step = advanced.step
         infos, done = self._infos(step), step.done
-        ended = np.flatnonzero(done[: len(self._everyone)])  # an episode ends for all its agents at once
+        (ended,) = done[: len(self._everyone)].nonzero()  # an episode ends for all its agents at once
         last = [senses.other_entries(ended) for senses in self._learners] if len(ended) else []
         # The first frames of new episodes are rendered together with the last frames of all worlds, unless the task
         # moved bodies after the action. Some of the last frames must then be rendered again first.
@@ -248,7 +248,7 @@ class EyesVecEnv(OneEnvironment):
         if self.simulation.varied:
             for row, info in enumerate(infos):
                 info |= self.simulation.variation_info(row % n)
-        for row in np.flatnonzero(step.done).tolist():
+        for row in step.done.nonzero()[0].tolist():
             infos[row]["TimeLimit.truncated"] = bool(step.truncated[row])
             steps = self.simulation.steps[row % n]
             infos[row]["episode"] = {"r": float(self._returns[row]), "l": int(steps)}

@@ -97,7 +97,7 @@ class AgentPhysics:
         free &= (np.abs(agents.velocity) < UNSTABLE_SPEED).all(axis=-1)
         n = len(velocity)
         motion = Motion(agents.position[:, None] + path, speed, np.zeros(n, bool), np.zeros(n, bool))
-        near = np.flatnonzero(~free)
+        (near,) = (~free).nonzero()
         if len(near):
             motion.put(near, self._near(agents.take(near), velocity[near], met[near]))
         return motion
@@ -113,7 +113,7 @@ class AgentPhysics:
         few = self.local_contacts.few(met)
         motion = self._motion(agents.position, *self.local_contacts.step(few, *self._start_of(agents, velocity)))
         strayed = self.local_contacts.strayed(agents.position, motion.path - agents.position[:, None], few)
-        again = np.flatnonzero(strayed | motion.unstable)
+        (again,) = (strayed | motion.unstable).nonzero()
         if len(again):
             motion.put(again, self._simulate(agents.take(again), velocity[again]))
         return motion

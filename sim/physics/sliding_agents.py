@@ -135,14 +135,16 @@ class SlidingAgents:
         heading, velocity = _steered(before.heading, self._command)
         self.motion = motion = self.agents.step(Agents(before.position, heading, before.velocity), velocity)
         objects, courses = self._moved
-        after = replace(
-            before,
+        after = WorldState(
             position=motion.path[:, -1].copy(),
             heading=heading,
             velocity=motion.velocity,
             objects=objects,
             object_heading=courses,
+            start=before.start,
             steps=before.steps + 1,
+            goals_reached=before.goals_reached,
+            adversaries_reached=before.adversaries_reached,
         )
         broken: dict[int, str] = {}
         if motion.unstable.any() or not after.all_finite:

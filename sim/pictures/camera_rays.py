@@ -21,7 +21,7 @@ from optics.numerics.precision import aligned
 from sim.pictures.merged_mirror import MergedMirror
 from sim.scene.cameras import Viewpoint
 from sim.scene.device_arrays import floats, whole_numbers
-from sim.scene.frozen_kernels import garbage_kept
+from sim.scene.frozen_kernels import GarbageKept
 from sim.scene.lights import Emitter
 from sim.scene.variant import MitsubaObject, variant
 
@@ -112,7 +112,7 @@ class CameraRays:
         """
         traced = self._inside if self.mirror.surrounds(view.position) else self._outside
         suns = {k: self.mirror.towards(name, view) for k, name in self._suns.items()}
-        with variant(self.mirror.variant), garbage_kept():
+        with variant(self.mirror.variant), GarbageKept():
             pose = mi.Float(_pose(view, size, self.mirror.near, suns, len(self._lights)))
             lanes = aligned(len(codes), np.uint32)
             lanes[:] = codes

@@ -210,7 +210,7 @@ class FidelityTrials:
         layers = np.reshape(shared, (depth.count, -1, len(views), rays))
         planes = trial.weights.reshape(depth.count, -1, *trial.weights.shape[1:])
         weights = np.einsum("ckb,lbrp->clkrp", self._factors(light, trial), planes, optimize=True).astype(np.float32)
-        return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
+        return _summed(weights, layers)
 
     def _factors(self, light: str, trial: Trial) -> np.ndarray:
         """Return the contribution of a component k in band b to channel c: mixing[c, b] basis[k, b].
@@ -273,6 +273,20 @@ class FidelityTrials:
 def _in_fours(trial: Trial) -> np.ndarray:
     """Return four numbers per ray: its bounce sample, and a sample for a second reflection, (ray, 4)."""
     return np.concatenate([trial.bounce_samples, np.random.default_rng(SECOND).random(trial.bounce_samples.shape)], 1)
+
+
+def _summed(weights: np.ndarray, layers: np.ndarray) -> np.ndarray:
+    """Return sums over depth layers, components and rays, (view, channel, receptor).
+
+    The sums are one matrix product, since `np.einsum` takes up to twice as long.
+
+    weights: (channel, layer, component, receptor, ray)
+    layers: (layer, component, view, ray)
+    """
+    (channels, receptors), views = (weights.shape[0], weights.shape[3]), layers.shape[2]
+    of_receptors = np.moveaxis(weights, 3, 1).reshape(channels * receptors, -1)
+    seen = np.moveaxis(layers, 2, 0).reshape(views, -1)
+    return np.asarray((seen @ of_receptors.T).reshape(views, channels, receptors))
 
 
 def _rms(values: np.ndarray) -> float:

@@ -51,12 +51,16 @@ class RandomViews:
         directions: in an eye's frame, (r, 3)
         """
         azimuths = eyes.azimuths()
-        cos, sin = np.cos(self.heading), np.sin(self.heading)
-        zero, one = np.zeros_like(cos), np.ones_like(cos)
-        turn = np.array([[cos, -sin, zero], [sin, cos, zero], [zero, zero, one]])
         in_agent = np.einsum("eij,rj->eri", eye_rotations(azimuths), directions)[self.eye]
-        offsets = np.einsum("ijv,vj->vi", turn, eye_positions(azimuths)[self.eye])
-        return self.agents + offsets, np.einsum("ijv,vrj->vri", turn, in_agent)
+        return self.agents + self._turned(eye_positions(azimuths)[self.eye]), self._turned(in_agent)
+
+    def _turned(self, vectors: np.ndarray) -> np.ndarray:
+        """Return vectors (n, ..., 3) of the agents' frames in the world's frame, which is turned about z."""
+        heading = self.heading.reshape(-1, *[1] * (vectors.ndim - 2))
+        cos, sin, (x, y) = np.cos(heading), np.sin(heading), (vectors[..., 0], vectors[..., 1])
+        turned: np.ndarray = vectors.copy()
+        turned[..., 0], turned[..., 1] = cos * x - sin * y, sin * x + cos * y
+        return turned
 
 
 def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:

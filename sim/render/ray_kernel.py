@@ -18,7 +18,7 @@ from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.sensor import Facets
 from sim.render.eye_rays import Directions, EyeRays, Lane
 from sim.scene.device_arrays import counted, floats, whole_numbers
-from sim.scene.frozen_kernels import garbage_kept
+from sim.scene.frozen_kernels import GarbageKept
 from sim.scene.poses import Poses
 from sim.scene.variant import variant
 from sim.tracing import lighting
@@ -155,11 +155,11 @@ def launched(
     frozen: Any, scenes: Any, frame: Callable[[], Frame], inputs: KernelInputs, variant_name: str
 ) -> Callable[[], np.ndarray]:
     """Launch a frozen kernel, and return a function that waits for its output."""
-    with variant(variant_name), garbage_kept():
+    with variant(variant_name), GarbageKept():
         found = frozen(scenes, frame(), inputs)
     return lambda: _read(found)
 
 
 def _read(found: Array | tuple[Array, ...]) -> np.ndarray:
-    with garbage_kept():
+    with GarbageKept():
         return np.stack([one.numpy() for one in found]) if isinstance(found, tuple) else np.array(found.numpy())

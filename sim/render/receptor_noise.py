@@ -23,8 +23,8 @@ from optics.numerics.autodiff import Array
 from sim.eyes.compound_eye import WorldEye
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.scene.device_arrays import SharedBuffer
-from sim.scene.frozen_kernels import garbage_kept
-from sim.scene.variant import variant
+from sim.scene.frozen_kernels import GarbageKept
+from sim.scene.variant import default_variant, variant
 
 PER_DRAW = 4  # number of normal numbers that one evaluation of Philox4x32 gives
 FEW = 8  # number of worlds of a second, narrower kernel
@@ -62,7 +62,7 @@ class Normals:
         width = FEW if len(worlds) <= FEW < n else n
         if width not in self._kernels:
             self._kernels[width] = _Kernel(width, self._draws)
-        padded = np.resize(worlds, width)
+        padded = worlds if len(worlds) == width else np.resize(worlds, width)
         drawn = self._kernels[width].launch(
             self._keys[padded], self._frames[padded], lambda parts: self._frame(parts, len(worlds))
         )
@@ -82,8 +82,8 @@ class _Kernel:
     """A kernel that is recorded once per width, with its own buffers of keys and frame numbers."""
 
     def __init__(self, worlds: int, draws: int) -> None:
-        self._slot = FrameSlot()
-        with variant():
+        self._slot, self._variant = FrameSlot(), default_variant()
+        with variant(self._variant):
             index: Array = dr.uint32_array_t(dr.detached_t(mi.Float))
             self._keys, self._frames = SharedBuffer(worlds, dr.uint64_array_t(index)), SharedBuffer(worlds, index)
             self._lanes = dr.arange(index, worlds * draws)
@@ -110,7 +110,7 @@ class _Kernel:
 
         def launch() -> Callable[[], np.ndarray]:
             self._keys.values[:], self._frames.values[:] = keys, frames
-            with variant(), garbage_kept():
+            with variant(self._variant), GarbageKept():
                 parts = self._normals(self._keys.array, self._frames.array, self._lanes)
             return lambda: frame_of(parts)
 

@@ -45,7 +45,7 @@ def floats(values: np.ndarray) -> Array:
 def as_floats(values: np.ndarray) -> np.ndarray:
     """Return a flat, aligned float32 copy in NumPy."""
     found = aligned(np.size(values), np.float32)
-    found[:] = np.ravel(values)
+    found.reshape(np.shape(values))[...] = values  # without a copy in the former precision
     return found
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from functools import cache
 from typing import Any
@@ -71,16 +70,16 @@ def _with_arrays(inputs: Any, arrays: Iterator[Array]) -> Any:
     return None if inputs is None else next(arrays)
 
 
-@contextmanager
-def garbage_kept() -> Iterator[None]:
-    """Suspend Python's garbage collection inside the block.
+class GarbageKept:
+    """Context that suspends Python's garbage collection.
 
     If it freed another renderer's kernels or scene during the recording of a kernel, Dr.Jit would abort the process.
     """
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
+
+    def __enter__(self) -> None:
+        self._was_enabled = gc.isenabled()
+        gc.disable()
+
+    def __exit__(self, *_: object) -> None:
+        if self._was_enabled:
             gc.enable()

@@ -179,7 +179,7 @@ class AgentTask(BatchTask):
         state = worlds.state
         places = zip(*state.position.T.tolist(), state.heading.tolist(), strict=True)
         info: list[dict[str, Any]] = [{"position": (x, y), "heading": heading} for x, y, heading in places]
-        for world in np.flatnonzero(events.adversary_first):
+        for world in events.adversary_first.nonzero()[0]:
             info[world]["adversary_first"] = True
         return Outcome(
             terms=RewardTerms(TERMS, terms),

@@ -9,7 +9,9 @@ import pytest
 from evolve.learning.final_figures import final_episodes
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
+from evolve.search.worker import evaluated
 from experiments import crossing as crossing_module
+from experiments import designed
 from experiments.crossing import _interaction, crossing
 from experiments.designed import Design, Trained, crossed, train_all
 from experiments.eye_shapes import BRIGHT, CONTROLS, DIM, SEEDS, SHAPES, TASKS, designs, with_rows, with_squares
@@ -132,6 +134,29 @@ def test_p_is_uniform_where_nothing_matters():
 ASKED = crossed([ANIMAL, replace(ANIMAL, n_eyes=1)], ("navigation",), (0.01,), (0,))
 
 
+class InThisProcess:
+    """An executor without a process of its own, which would load all libraries again."""
+
+    def __init__(self, evaluate, *_):
+        self._evaluate = evaluate
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        """Do nothing."""
+
+    def run(self, jobs):
+        for job in jobs:
+            yield job, evaluated(self._evaluate, job.arguments, lambda *steps: None)
+
+
+@pytest.fixture
+def in_this_process(monkeypatch):
+    """Train in this process; the fixture `stored` trains in a worker."""
+    monkeypatch.setattr(designed, "LocalExecutor", InThisProcess)
+
+
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
     """Train the first of the requested animals; return its rows and the file that stores them."""
@@ -148,7 +173,7 @@ def trained(stored, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_has_been_trained_is_not_trained_again(trained, capsys):
+def test_what_has_been_trained_is_not_trained_again(trained, capsys, in_this_process):
     first, path = trained
     assert first == read_rows(Trained, path)
     assert not first[0].failed
@@ -162,7 +187,7 @@ def test_what_has_been_trained_is_not_trained_again(trained, capsys):
 
 
 @pytest.mark.slow
-def test_trained_animals_are_tested_in_layouts_that_no_selection_has_used(tmp_path):
+def test_trained_animals_are_tested_in_layouts_that_no_selection_has_used(tmp_path, in_this_process):
     """The row repeats what the test set gives when the same policy is trained here, in this process."""
     family = ("world.layouts=family", *(f"world.{name}_layouts=2" for name in ("training", "selection", "test")))
     given = (*TINY, *family, "world.layout_rows=9", "world.layout_columns=17")
@@ -179,7 +204,7 @@ def test_trained_animals_are_tested_in_layouts_that_no_selection_has_used(tmp_pa
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kept", "earlier"), [(True, ("a" * 40,)), (False, ())])
-def test_rows_that_are_kept_keep_the_version_that_made_them(trained, kept, earlier):
+def test_rows_that_are_kept_keep_the_version_that_made_them(trained, in_this_process, kept, earlier):
     path = trained[1]
     made = path.with_suffix(".json")
     former = Origin.read(made)

@@ -1,9 +1,10 @@
-"""Whole steps of environments in this checkout and in another one, such as the commit before a change.
+"""CPU time of whole steps of environments in this checkout and in another one, such as the commit before a change.
 
-Each checkout steps the same tasks with the same actions in a separate process. The two take turns of a third of a
-second, so variations of the machine's speed affect both. The ratio is this checkout's steps per second over the
-other's: the median over the turns, with the quartiles in brackets. Both checkouts must have the task names and the
-arguments of `sim.make_vec_env` that are used here.
+Each checkout steps the same tasks with the same actions in a separate process with one Dr.Jit thread. The two take
+turns of a third of a second of CPU time, so variations of the machine's speed affect both. The ratio is the other
+checkout's CPU time per step over that of this one, so more than 1 means that this one is faster: the median over the
+turns, with the quartiles in brackets. Both checkouts must have the task names and the arguments of `sim.make_vec_env`
+that are used here.
 
     python -m validation.benchmarks.two_checkouts OTHER [--turns 21] [--only detection]
 """
@@ -19,12 +20,12 @@ from dataclasses import replace
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from statistics import median, quantiles
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-LINE = "steps per second: "
-SECONDS, WARM_UP = 0.33, 1.5  # seconds of each turn, and before the first one
+LINE = "steps per CPU second: "
+SECONDS, WARM_UP = 0.33, 1.5  # seconds of CPU time of each turn, and before the first one
 
 
 def _example(name: str, task: str) -> Any:
@@ -77,20 +78,23 @@ def cases() -> dict[str, Callable[[], Any]]:
 
     found = {f"detection, {n} world(s)": built_in("detection", few, n) for n in (1, 64, 256)}
     found |= {f"navigation, {n} world(s)": built_in("navigation", many, n) for n in (1, 64, 256)}
-    found["detection behind a pinhole, 64 worlds"] = built_in("detection", behind_a_hole(few), 64)
-    found["navigation behind a pinhole, 64 worlds"] = built_in("navigation", behind_a_hole(many), 64)
+    for n in (1, 64, 256):
+        found[f"detection behind a pinhole, {n} world(s)"] = built_in("detection", behind_a_hole(few), n)
+        found[f"navigation behind a pinhole, {n} world(s)"] = built_in("navigation", behind_a_hole(many), n)
     found |= {f"find_ball, {n} world(s)": own(lambda: _example("find_ball", "FindBall"), n) for n in (1, 64)}
-    found["ant, 64 worlds"] = own(lambda: _example("ant_seeks", "AntSeeks"), 64)
-    found["humanoid, 64 worlds"] = own(_humanoid, 64)
+    found |= {f"ant, {n} world(s)": own(lambda: _example("ant_seeks", "AntSeeks"), n) for n in (1, 64, 256)}
+    found |= {f"humanoid, {n} world(s)": own(_humanoid, n) for n in (1, 64, 256)}
     return found
 
 
 def serve() -> None:
     """Measure on request of the parent process: a line with a case's name opens it, an empty line requests a turn."""
+    import drjit
     import numpy as np
 
     import sim
 
+    drjit.set_thread_count(1)
     assert Path(sim.__file__).is_relative_to(Path.cwd()), sim.__file__
     venv: Any = None
     actions = np.empty(0)
@@ -106,12 +110,12 @@ def serve() -> None:
 
 
 def rate(venv: Any, actions: Any, seconds: float) -> float:
-    """Return the steps of all worlds per second."""
-    start, steps = perf_counter(), 0
-    while perf_counter() - start < seconds:
+    """Return the steps of all worlds per second of CPU time."""
+    start, steps = process_time(), 0
+    while process_time() - start < seconds:
         venv.step(actions[steps % len(actions)])
         steps += 1
-    return float(steps * venv.num_envs / (perf_counter() - start))
+    return float(steps * venv.num_envs / (process_time() - start))
 
 
 class Checkout:
@@ -124,7 +128,7 @@ class Checkout:
         self.folder, self._child = folder, subprocess.Popen(command, cwd=folder, env=environment, **pipes)
 
     def asked(self, line: str = "") -> float:
-        """Let the process open the case `line` or, if it is empty, measure one turn; return the steps per second."""
+        """Let the process open the case `line` or, if it is empty, measure one turn; return steps per CPU second."""
         assert self._child.stdin
         assert self._child.stdout
         print(line, file=self._child.stdin, flush=True)
@@ -154,7 +158,7 @@ def main() -> None:
     if asked.other is None or not (asked.other / "sim").is_dir():
         options.error(f"OTHER = {asked.other}: must be the folder of a checkout")
     places = [Checkout(folder.resolve()) for folder in (asked.other, CHECKOUT)]
-    print("| case | other, steps/s | this, steps/s | ratio |\n|---|---|---|---|")
+    print("| case | other, steps per CPU s | this, steps per CPU s | ratio |\n|---|---|---|---|")
     for name in (name for name in cases() if asked.only in name):
         for place in places:
             place.asked(name)

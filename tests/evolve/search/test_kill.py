@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.slow_part import slow
+from tests.slow_part import number, slow
 
 ROOT = Path(__file__).parents[3]
 KILLS = int(os.environ.get("RHABDOM_KILLS", "50"))
@@ -91,8 +91,8 @@ def test_killed_run_resumes_to_the_history_of_an_uninterrupted_one(tmp_path, cal
 
 @pytest.mark.parametrize(
     ("script", "kills"),
-    [("kills.py", 5), slow("kills.py", KILLS), slow("training_kills.py", TRAINING_KILLS)],
-    ids=["search", "search again and again", "training"],
+    [("kills.py", number(KILLS, 5)), slow("training_kills.py", TRAINING_KILLS)],
+    ids=["search", "training"],
 )
 def test_kills_at_random_moments_change_nothing(tmp_path, script, kills):
     """The test runs in a separate process, because it forks. The printed seed allows a failure to be repeated."""

@@ -4,6 +4,7 @@ The error of a gradient is its relative L2 error for a random functional of the 
 tolerance; at most the tolerance is stated.
 """
 
+import itertools
 from functools import lru_cache
 
 import numpy as np
@@ -23,7 +24,6 @@ from tests.optics.point_spread.exact_gradients import (
     psf_and_adjoint,
     spline,
 )
-from tests.slow_part import slow
 
 SCENE = Scene()
 WEIGHT = np.random.default_rng(1).standard_normal(SCENE.shape)
@@ -95,19 +95,23 @@ def error(found, exact):
     return np.linalg.norm(found - exact) / np.linalg.norm(exact)
 
 
+TOLERANCES = 1e-2, 1e-4, 1e-6
+SAMPLED = [
+    *itertools.product(MAPS, ("zeros", "constant", "smooth", "random"), (8, 32)),
+    *((name, "random", 64) for name in MAPS),
+    ("height", "zeros", 64),
+]
+
+
+# Each map, all its values and each number of samples are tested at each tolerance.
 @pytest.mark.fast_cases(6)
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize(
-    ("name", "values", "n"),
+    ("name", "values", "n", "tolerance"),
     [
-        (name, values, n)
-        for name in MAPS
-        for values in ("zeros", "constant", "smooth", "random")
-        for n in (8, 32)
-        if (name, values) != ("mask", "zeros")  # behind a mask of zeros there is no light
-    ]
-    + [slow(name, "random", 64) for name in MAPS]
-    + [slow("height", "zeros", 64)],
+        pytest.param(*case, TOLERANCES[k % 3], marks=[pytest.mark.slow] * (case[2] == 64))
+        for k, case in enumerate(SAMPLED)
+        if case[:2] != ("mask", "zeros")  # behind a mask of zeros there is no light
+    ],
 )
 def test_gradients_by_the_samples_of_maps(name, values, n, tolerance):
     found, plan = gradient(samples(name, values, n), pupil_with(name), tolerance)
@@ -161,11 +165,15 @@ def cubic(t):
 NUMBERS = {"radius": 25e-6, "distance": 240e-6, "n": 1.5, "focal_length": 240e-6, "source_distance": 5e-3}
 
 
+BENT = (0.0, 1e-2), (0.0, 1e-6), (1e-9, 1e-4), (0.3e-6, 1e-2), (0.3e-6, 1e-6)  # heights [m] and tolerances
+
+
+# Three of the five for each number, and each of the five for three numbers.
 @pytest.mark.fast_cases(5)
 @pytest.mark.parametrize(
-    ("height", "tolerance"), [(0.0, 1e-2), (0.0, 1e-6), (1e-9, 1e-4), (0.3e-6, 1e-2), (0.3e-6, 1e-6)]
+    ("name", "height", "tolerance"),
+    [(name, *BENT[(k + step) % 5]) for k, name in enumerate(sorted(NUMBERS)) for step in (0, 1, 3)],
 )
-@pytest.mark.parametrize("name", sorted(NUMBERS))
 def test_derivatives_by_single_numbers(name, height, tolerance):
     """The derivative of every sample of the PSF is compared. Without derivatives, a height of 1 nm would be
     neglected.

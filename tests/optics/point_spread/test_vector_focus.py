@@ -126,7 +126,7 @@ def turn(field, before, after):
 
 
 @pytest.mark.fast_cases(1)
-@pytest.mark.parametrize(("relief", "defocus"), [(0.0, 0.0), (0.0, -2e-6), (0.0, 15e-6), (1e-6, -2e-6), (1e-6, 15e-6)])
+@pytest.mark.parametrize(("relief", "defocus"), [(0.0, 0.0), (0.0, 15e-6), (1e-6, -2e-6)])
 def test_predicted_errors_hold_for_each_component(defocus, relief):
     """Lenses with reliefs of some waves, in focus and far from it; plane waves are chosen if they are accurate
     enough."""

@@ -59,8 +59,9 @@ def caught(receptors="rgb"):
 
 
 @pytest.mark.filterwarnings("ignore:.*bands. receptor type")
-@pytest.mark.parametrize("bands", [4, 8, 16])
-@pytest.mark.parametrize("kind", LAMPS)
+@pytest.mark.parametrize(
+    ("kind", "bands"), [*((kind, 4) for kind in LAMPS), ("directional", 8), ("spot", 16), ("headlight", 8)]
+)
 def test_white_is_what_receptors_catch_of_the_lamp(kind, bands):
     """Sampling the lamp at the bands' centres would give up to twice this value, or half of it."""
     found, brightest = seen(kind, bands)
