@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from rhabdom import optics
-from rhabdom.optics.torch import see
+from rhabdom.optics.torch import eye_signals
 
 RADIUS, INDEX = 30e-6, 1.5
 SIDE, CELLS, BANDS = 15, 2, 2  # receptors along an axis, cells of a scene per receptor and axis, spectral bands
@@ -37,7 +37,7 @@ def scene(rng: np.random.Generator) -> np.ndarray:
 
 def difference(seeing: optics.Eye, radiance: np.ndarray) -> torch.Tensor:
     """Return the mean square difference from the signals of a perfect lens, relative to the variance of the latter."""
-    signals, wanted = see(seeing, radiance, CELLS), torch.from_numpy(PERFECT.see(radiance, CELLS))
+    signals, wanted = eye_signals(seeing, radiance, CELLS), torch.from_numpy(PERFECT.see(radiance, CELLS))
     signals, wanted = signals / signals.mean(), wanted / wanted.mean()  # the relief transmits less light
     return (signals - wanted).square().mean() / wanted.var()
 

@@ -2,7 +2,7 @@
 
 psf(pupil, wavelengths, sensor_distance, ...)     PSFs of one or several pupils, as a tensor
 camera_image(scene, pupil, sensor, ...)           electrons in the pixels of a camera
-see(eye, radiance, ...)                           signals of an eye's receptors
+eye_signals(eye, radiance, ...)                   signals of an eye's receptors
 PointSpread(radius, wavelengths, ...)             module with a learnable relief
 
 heights = torch.zeros(32, 32, dtype=torch.float64, requires_grad=True)    # [m]
@@ -38,7 +38,7 @@ from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
 from optics.point_spread.psf_result import OF_CELLS
 
-__all__ = ["PointSpread", "camera_image", "psf", "see"]
+__all__ = ["PointSpread", "camera_image", "eye_signals", "psf"]
 
 FORMER = "heights", "radius", "n", "pupil"  # arguments that `psf` had before it accepted pupils
 
@@ -187,7 +187,7 @@ def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any
     return _operation(lambda own: camera.camera_image(scene, own, sensor, **view), pupil, device)
 
 
-def see(
+def eye_signals(
     eye: Eye, radiance: np.ndarray, samples_per_receptor: int, rng: Any = None, z: Any = math.inf, *, device: Any = None
 ) -> torch.Tensor:
     """Return the signals of `optics.Eye.see` as a tensor (channel, h, w) with gradients to the tensors in the eye.

@@ -161,8 +161,7 @@ def test_pages_about_optics_run_on_three_packages():
 
 def test_outputs_that_differ_are_noticed():
     assert agrees("error 2.9e-06 of 12", "error 3.8e-06 of 12.1\n")
-    assert not agrees("error 0.12", "error 0.13")
-    assert not agrees("error 0.12", "mistake 0.12")
+    assert not any(agrees("error 0.12", other) for other in ("error 0.13", "mistake 0.12"))
     assert not agrees("1 2", "1 2 3")
 
 

@@ -1,7 +1,6 @@
 """The shipped run of `evolve demo` has the documented settings, and the current code replays and reports it."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest

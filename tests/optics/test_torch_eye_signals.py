@@ -24,7 +24,7 @@ def eye_of(points, fov_deg):
 def test_derivatives_agree_with_differences_of_the_plain_eye():
     """Central differences of `Eye.see` are the oracle, for heights, field of view and distance of the scene."""
     points, fov, z = (torch.tensor(value, dtype=torch.float64, requires_grad=True) for value in (POINTS, 40.0, 5e-3))
-    signals = optics.torch.see(eye_of(points, fov), SCENE, 4, z=z)
+    signals = optics.torch.eye_signals(eye_of(points, fov), SCENE, 4, z=z)
     assert signals.dtype == torch.float64
     (signals * WEIGHTS).sum().backward()
 
@@ -42,16 +42,18 @@ def test_derivatives_agree_with_differences_of_the_plain_eye():
 
 def test_signals_without_gradients_are_those_of_the_plain_eye():
     eye = eye_of(torch.tensor(POINTS), 40.0)
-    noisy = [see(SCENE, 4, np.random.default_rng(3), 1.0) for see in (lambda *a: optics.torch.see(eye, *a), eye.see)]
+    noisy = [
+        see(SCENE, 4, np.random.default_rng(3), 1.0) for see in (lambda *a: optics.torch.eye_signals(eye, *a), eye.see)
+    ]
     assert torch.equal(noisy[0], torch.from_numpy(noisy[1]))
     asking = eye_of(torch.tensor(POINTS, requires_grad=True), 40.0)
     with torch.no_grad():
-        assert torch.equal(optics.torch.see(asking, SCENE, 4, np.random.default_rng(3), 1.0), noisy[0])
+        assert torch.equal(optics.torch.eye_signals(asking, SCENE, 4, np.random.default_rng(3), 1.0), noisy[0])
 
 
 def test_only_eyes_are_accepted():
     with pytest.raises(ValueError, match=r"^eye = .*: must be"):
-        optics.torch.see(optics.Pupil(30e-6), SCENE, 4)
+        optics.torch.eye_signals(optics.Pupil(30e-6), SCENE, 4)
 
 
 @pytest.mark.slow
