@@ -244,7 +244,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     one, parameters = seen(*FIXED), np.geomspace(0.4, 12, 60)
     for light, strength in zip(DRAWN, np.linspace(0.3, 1, len(DRAWN)), strict=True):
         bits = np.array([information(one, parameter, light) for parameter in parameters])
-        right.semilogx(parameters, bits / bits.max(), color=COLORS["information"], alpha=strength, label=f"{light:g} lx")
+        right.semilogx(
+            parameters, bits / bits.max(), color=COLORS["information"], alpha=strength, label=f"{light:g} lx"
+        )
     right.axvline(LAW, color="#777777", lw=1)
     right.set(xlabel="eye parameter DΔφ / λ", ylabel="information / largest information", ylim=(0, 1.05))
     right.legend(frameon=False, fontsize=8)
