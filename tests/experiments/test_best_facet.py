@@ -29,7 +29,7 @@ CYCLES = np.linspace(0, 1.25, 200)
 
 
 def test_grating_of_a_gaussian_ommatidium():
-    """With M = exp(-q u²), c M √N = 1 gives u² = ln(c² N) / 2q at u = λ/(√3 p)."""
+    """The closed form for M = exp(-q u²) is c M √N = 1 at u² = ln(c² N) / 2q, with u = λ/(√3 p)."""
     one = Seen(CYCLES, np.exp(-2.0 * CYCLES**2), 50.0)
     for light in (1.0, 10.0):
         u = math.sqrt(math.log(GRATING**2 * 50 * light) / 4)

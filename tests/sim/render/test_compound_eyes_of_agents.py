@@ -1,5 +1,6 @@
 """Compound eyes of the agents of built-in tasks: signals, noise, fidelity, and refusals."""
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -34,8 +35,6 @@ def test_both_tracers_and_a_renderer_of_models_agree(moments):
     )
     assert closed.shape == (2, 2, 3, 3, 8)
     assert np.abs(closed - mitsuba).max() < 2e-3
-    import mujoco
-
     data = mujoco.MjData(world.model)
     pose(data, world, state, 1)
     lattice = sim.CompoundEye(sim.hexagonal_rows(3, 8, 90.0, 1.5), FACET)
@@ -46,7 +45,7 @@ def test_both_tracers_and_a_renderer_of_models_agree(moments):
 
 
 def test_observations_have_rows_and_each_facet_has_its_photons():
-    """With 64 worlds at the start of an episode, the noise of each ommatidium has the variance signal / photons."""
+    """The noise of each ommatidium has the variance signal / photons, in 64 worlds at the start of an episode."""
     budget = optics.PhotonBudget(30.0)
     dim = sim.Eyes(2, (3, 8), 90.0, 100.0, ommatidium=FACET, photon_budget=budget, noise_sigma=0.0)
     bright = sim.Eyes(2, (3, 8), 90.0, 100.0, ommatidium=FACET, noise_sigma=0.0)
