@@ -2,7 +2,7 @@
 
 The other samples are finer, their grid is shifted by a fraction of the pitch that is not a simple ratio, and their edge
 is sharper. The comparison therefore shows light that the samples alias, detail that they miss, and the softness of the
-edge. It also shows the error of the rank, because the slow factor is interpolated over the pupil, and not over the
+edge. It also shows the error of the rank, because the check interpolates the slow factor over the pupil instead of the
 window. The sum has an error of its own, which is at most half of the error that it finds.
 """
 
@@ -23,9 +23,9 @@ __all__ = ["window_errors"]
 
 CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_sampling.py
 ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
-SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities with which these are drawn, see `_drawn`
+SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
 INTERPOLATED = 2e-4  # choice: error of the interpolated kernel of the check
-# Choices: numbers of interpolation points across the pupil, and phases [rad] up to which the earlier ones may suffice.
+# Choices: numbers of interpolation points across the pupil, and phases [rad] from which on each is too small.
 ORDERS, PHASES = (3, 5, 7, 9, 12, 16), (0.1, 0.6, 1.5, 3.0, 6.0)
 
 
@@ -52,7 +52,7 @@ def window_errors(samples: SineSamples, path: Path, light: np.ndarray, images: n
     exact = _at_points(samples, path, light, u, v)
     drawn = images[np.arange(len(images))[:, None, None], rows[:, :, None], columns[:, None, :]]
     squared = np.mean(np.square(drawn - exact) / chance, (1, 2))
-    # choice: a PSF may be too bright, and errors are relative to the exact one
+    # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the exact PSF
     bright = np.minimum(total, np.mean(np.square(exact) / chance, (1, 2)))
     total = np.where(squared > 0.01 * total, bright, total)
     rounding = float(np.finfo(light.real.dtype).eps)
@@ -62,7 +62,8 @@ def window_errors(samples: SineSamples, path: Path, light: np.ndarray, images: n
 def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return |U|² in columns u and rows v [m], relative to the middle of the window, (stack, v, u).
 
-    The slow factor is interpolated from a few points (ξ_a, η_b) of the pupil, with weights L_a and L_b:
+    The slow factor G is interpolated from a few points (ξ_a, η_b) of the pupil, with weights L_a and L_b. P is the
+    light:
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v)/G(ξ_a, η_b; 0, 0) Σ_ηξ L_b e^{-ik v t} P G(ξ, η; 0, 0) L_a e^{-ik u s}.
     """
@@ -85,7 +86,7 @@ def _in_middle(samples: SineSamples, path: Path) -> np.ndarray:
 
 
 def _interpolated_kernel(path: Path, place: np.ndarray, sines: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return L_a e^{-ik u s}, (stack, place · a, sine)."""
+    """Return the Fourier kernel times the interpolation weights, L_a(s) e^{-ik u s}, (stack, place · a, sine)."""
     kernel = turned(1.0, place[..., None] * (sines / -path.wavelength), str(weight.dtype))
     return np.asarray((kernel[:, :, None, :] * weight).reshape(len(place), -1, len(sines)))
 
@@ -95,8 +96,8 @@ def _ratios(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return interpolation points in sines, and the slow factor there relative to the middle, (stack, v, u, b, a).
 
-    The interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. It
-    starts with a number of points that is usually sufficient for the phase there.
+    The interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. The
+    search starts with a number of points that is usually sufficient for the phase there.
     """
 
     def ratio(directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -14,18 +14,18 @@ from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 __all__ = ["DERIVATIVE_ERROR", "window_rank"]
 
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
-RANK_SHARE = 0.3  # choice: part of these errors that the rank may take
+RANK_SHARE = 0.3  # choice: part of the allowed errors that the choice of the rank may cause
 RAYS, PLACES = 40, 6  # choices: numbers of rays, and of places along a side of the window, that determine the rank
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
 MOST_RANK = 12  # choice: largest rank
-RANK_OF_DISTANCE = 3  # The Fourier kernel does not follow the distance, whose derivative is quadratic over the window.
+RANK_OF_DISTANCE = 3  # least rank for derivatives by the distance, which are quadratic in the window's positions
 
 
 def window_rank(problem: Problem, samples: SineSamples, half: float) -> int | None:
     """Return the necessary rank; None if it is too large.
 
-    It is sufficient for the end points of rays, around which the light is. Derivatives may move light anywhere, so the
-    rank is then also sufficient on average over the whole window.
+    The rank suffices at the end points of rays, around which the light arrives. If derivatives are requested, light may
+    move anywhere. The rank then also suffices on average over the whole window.
 
     half: distance [m] from the middle of the window within which the interpolation points lie.
     """

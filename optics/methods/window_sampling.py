@@ -41,13 +41,14 @@ TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling save
 # Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check, and width of
 # the passband relative to that of the whole spectrum.
 RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
-# Choices for the samples, in cycles per radius, at a tolerance of 0.01: light that is neglected, as a share of all
-# light; cycles for the edge; the same, relative to the cycles of the rays at the edge; exponent of the tolerance.
+# Choices for the number of samples, at a tolerance of 0.01: neglected fraction of the light; cycles per radius for the
+# edge; these cycles relative to those of the rays at the edge; exponent of the tolerance.
 NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 3.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
 CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
 DERIVATIVE_PART = 0.2  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
-# Choices: sampling densities and sharpnesses of the edge per octave; equal ones share arrays and tables.
+# Choices: steps per octave to which the sampling density and the sharpness of the edge are rounded, so that similar
+# PSFs share arrays and tables.
 STEPS, EDGES = 4, 8
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
@@ -73,7 +74,7 @@ class WindowSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         if problem.differentiated:
             return self._recorded(beam, problem).intensity
         return precision(problem.dtype).Float(padded_for_packets(self.plain_intensity(beam, problem)))
@@ -83,7 +84,7 @@ class WindowSampling:
         return intensity_of(self._field(beam, problem)).ravel()
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
         if problem.differentiated:
             return on_window(self._recorded(beam, problem), beam, problem)
         u = Field.from_numpy(self._field(beam, problem), problem.window.dx, precision(problem.dtype))
@@ -99,11 +100,11 @@ class WindowSampling:
         return recorded_field(light, beam.distance, sums, problem.window)
 
     def sums(self, path: Path, dtype: str) -> WindowSums:
-        """Return the arrays of the sums. The wavelength may be longer than that for which the samples are made."""
+        """Return the arrays of the sums. The wavelength may be longer than the one that determined the samples."""
         return _window_sums(self.pupil, self.rank, self.half_width, path, dtype)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return problem.wavelength / self.pupil.grid.dx
 
     @property
@@ -189,7 +190,7 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
     kernel = kernel / (axis_factor(path, pupil, 0, column, u) * axis_factor(path, pupil, 1, row, v))
 
     def by_distance() -> np.ndarray:
-        """Return the derivative of z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to z."""
+        """Return the derivative of the kernel z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to the distance z."""
         turns = 2j * np.pi / path.wavelength * (z / distance - z / np.sqrt(x * x + y * y + z * z))
         near_by = -(near.real * z / distance**2) / near
         return np.asarray(kernel * (1 / z - 2 * z / distance**2 + turns + near_by), complex_dtype)

@@ -5,10 +5,10 @@ window's centre,
 
     U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²).
 
-Pupils are sampled in units of their radius, so all share the soft edge, the samples' positions, and B-splines (reliefs)
-and powers (Zernike polynomials) at these positions. Slight changes of the slow factor's phase over the window are
-neglected. The error is predicted for each PSF from its own light. If the error exceeds the tolerance, `optics.psf`
-computes the PSF instead.
+c² is z² + ξ² plus the mean squares of the other coordinates. Pupils are sampled in units of their radius. All therefore
+share the soft edge, the positions of samples, and the values of B-splines (for reliefs) and of powers (for Zernike
+polynomials) at these positions. Slight changes of the slow factor's phase over the window are neglected. The error is
+predicted for each PSF from its own light. If the error exceeds the tolerance, `optics.psf` computes the PSF instead.
 """
 
 from __future__ import annotations
@@ -54,9 +54,9 @@ PER_ORDER, STEP = 4, 1e-4
 def population_pictures(
     members: Sequence[Member], window: Grid, tolerance: float
 ) -> Iterator[tuple[int, np.ndarray, Plan]]:
-    """Yield index of the member, PSF (y, x) [1/m²] and plan, if the common plan is accurate enough for the member.
+    """Yield index, PSF (y, x) [1/m²] and plan of each member for which the common plan is accurate enough.
 
-    Nothing is yielded for a tolerance below LOOSEST. window: a window about the axis.
+    Nothing is yielded for a tolerance below LOOSEST. The window is centred on the axis.
     """
     groups: dict[tuple[Aperture, int], list[int]] = defaultdict(list)
     plain = [index for index, member in enumerate(members) if member.plain]

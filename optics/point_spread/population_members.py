@@ -112,7 +112,7 @@ class Member:
 
     @property
     def detail(self) -> float:
-        """Cycles per radius that wavefront and mask add to those that follow from slopes."""
+        """Highest frequency [cycles per radius] of wavefront and mask, which adds to the frequencies due to slopes."""
         pupil, found = self.pupil, 0.0
         if pupil.wavefront is not None:
             found = pupil.wavefront.bandwidth(0.0)

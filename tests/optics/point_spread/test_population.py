@@ -26,7 +26,7 @@ Z, LAMBDA = 240e-6, 550e-9
 
 
 def eyes(count, seed=0, **options):
-    """Pupils of 15 to 40 µm, with reliefs close to a lens."""
+    """Return pupils with radii of 15 to 40 µm, whose reliefs are close to a lens."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         radius = rng.uniform(15e-6, 40e-6)
@@ -66,8 +66,9 @@ def test_in_a_medium_behind_any_lens():
 
 
 def test_the_batch_takes_it_and_leaves_it_the_rest():
-    """A height map, a wide pupil whose remainder is not slow, and a derivative take the ordinary way, all in one
-    batch."""
+    """Three members of one batch are computed separately: a height map, a wide pupil whose remaining phase is too
+    large, and a pupil with a derivative.
+    """
     wide = optics.Pupil(200e-6, thin_lens_focal_length=Z)
     pupils = [*eyes(3), optics.Pupil(20e-6, np.zeros((5, 5))), wide, optics.Pupil(Float64(20e-6))]
     options = {"dx": 0.25e-6, "shape": (33, 33), "tolerance": 1e-2}
@@ -83,7 +84,7 @@ def test_the_batch_takes_it_and_leaves_it_the_rest():
 
 
 def test_one_kernel_scale_for_all_rays_would_be_worse():
-    """The remainder has three times less phase with ξ/c(ξ) than with ξ over the distance."""
+    """The remaining phase is three times smaller with ξ/c(ξ) than with ξ over the distance."""
     stack, window = _Stack.from_members(members(eyes(4))), Grid((65, 65), 0.25e-6)
     ours = _spread(stack, window)[:, -1]
     xi = stack.radius[:, 0, 0] * 0.7
@@ -99,7 +100,9 @@ def test_one_kernel_scale_for_all_rays_would_be_worse():
     ids=["too many waves for float32", "near field"],
 )
 def test_each_limit_alone_excludes_a_pupil(suitable, unsuitable, dx):
-    """The path has R²/(zλ) = 2,900 or 4,500 waves over the pupil, or kz is 206 or 194. The limits are 3,000 and 200."""
+    """The path over the pupil changes by R²/(zλ) = 2,900 or 4,500 waves, and kz is 206 or 194. The limits are 3,000 and
+    200.
+    """
     lenses = [
         Member(optics.Pupil(radius, thin_lens_focal_length=z), LAMBDA, z, math.inf)
         for radius, z in (suitable, unsuitable)
@@ -120,7 +123,7 @@ def test_bad_input_is_named():
 
 
 def test_the_time_of_a_common_plan_follows_the_window():
-    """It was the same for every window: 3e-4 s, although 257 x 257 samples take 17 ms."""
+    """An earlier version predicted 3e-4 s for every window, although 257 x 257 samples take 17 ms."""
     pupils = [optics.Pupil(5e-6, optics.BSplineRelief(1e-8 * np.eye(4)))] * 2
     ask = {"sensor_distance": 240e-6, "tolerance": 3e-2}
     times = [optics.psf_batch(pupils, **ask, dx=3e-5 / n, shape=(n, n)).plan for n in (17, 257)]
@@ -141,7 +144,7 @@ def test_the_time_of_a_common_plan_follows_the_window():
     ids=["lens", "diverging lens", "relief", "wavefront"],
 )
 def test_cycles_per_radius_are_differences_of_the_phase(pupil, source):
-    """The phase in waves is that of relief, wavefront, lens, and paths from the source and to the sensor."""
+    """The phase consists of those of relief, wavefront and lens, and of the paths from the source and to the sensor."""
     member, window = Member(pupil, LAMBDA, Z, source), Grid.square(33, 0.5e-6)
     radius, wavelength, z, source, focal, before, _ = member.numbers
 

@@ -73,7 +73,9 @@ def test_predicted_errors_hold(kind, tolerance, radii, side):
 
 
 def test_powers_are_zernike_s_polynomials():
-    """Every mode up to the highest order, within the circle and its soft edge, minus its value in the middle."""
+    """Every mode up to the highest order agrees within the circle and its soft edge, except for its value in the
+    middle.
+    """
     x, y = 1.1 * np.random.default_rng(0).uniform(-0.7, 0.7, (2, 40))
     known = powers(x, y, HIGHEST_ORDER)
     for n in range(HIGHEST_ORDER + 1):
@@ -102,7 +104,9 @@ def test_light_from_one_side_of_a_near_pupil(side):
 
 
 def test_the_prediction_holds_behind_a_graded_mask_and_a_prism():
-    """The error is 0.115. A smaller factor between the spread of the phase and the error would predict 0.097."""
+    """The error is 0.115. If the factor from the spread of the phase to the error were smaller, the prediction would be
+    0.097.
+    """
     mask = optics.MaskMap(np.broadcast_to(0.45 + 0.422 * np.linspace(-1, 1, 5), (5, 5)))
     prism = optics.Zernike({(1, 1): 0.376})
     pupil = optics.Pupil(3e-6, thin_lens_focal_length=20e-6, mask=mask, wavefront=prism)
@@ -139,7 +143,9 @@ def test_a_batch_of_all_kinds():
 
 @pytest.mark.parametrize("waist", [0.03, 0.15])
 def test_a_narrow_mask_is_sampled_finely(waist):
-    """A narrow mask does not turn the phase, but changes within a few samples of an open pupil's grid."""
+    """A narrow mask does not change the phase, but its amplitude changes within a few samples of the grid for an open
+    pupil.
+    """
     radius = 10e-6
     pupil = optics.Pupil(radius, thin_lens_focal_length=Z, mask=optics.GaussianMask(waist * radius))
     member, window = Member(pupil, LAMBDA, Z, math.inf), Grid.square(33, 0.25e-6)
@@ -150,7 +156,7 @@ def test_a_narrow_mask_is_sampled_finely(waist):
 
 @pytest.mark.parametrize("common", [{"height": 1.0}, {"wavefront": 1e6}])
 def test_what_all_of_a_pupil_has_in_common_changes_nothing(common):
-    """A metre of glass, or of path, is a million waves, for which float32 resolves less than a tenth of a wave."""
+    """A metre of glass or of path is a million waves or more, which float32 does not resolve to a tenth of a wave."""
     lens = {
         "height": optics.BSplineRelief.paraboloid(0, 1 / (0.5 * Z), 15e-6),
         "wavefront": optics.Zernike({(3, 1): 0.1}),
@@ -171,8 +177,9 @@ def test_what_all_of_a_pupil_has_in_common_changes_nothing(common):
     [(0.8, 0.25, 1e-2), (0.7, 0.25, 1e-2), (0.6, 0.2, 5e-2), (0.5, 0.35, 5e-2), (0.3, 0.25, 1e-2)],
 )
 def test_masks_that_are_bright_where_the_aperture_is_shut_are_left_to_others(inner, waist, tolerance):
-    """The transmitted light is less than the soft edge's error, which is predicted for a bright pupil: errors would be
-    1.2e-2 to 2.6e-1."""
+    """The transmitted light is weaker than the error of the soft edge, which is predicted for a bright pupil. Errors
+    would be 0.012 to 0.26.
+    """
     mask = optics.GaussianMask(waist * 12e-6)
     pupil = optics.Pupil(12e-6, aperture=optics.Annulus(inner), mask=mask, thin_lens_focal_length=Z)
     assert not list(population_pictures([Member(pupil, LAMBDA, Z, math.inf)], Grid.square(33, 0.5e-6), tolerance))
@@ -185,7 +192,7 @@ def test_masks_that_are_bright_where_the_aperture_is_shut_are_left_to_others(inn
 
 @pytest.mark.parametrize(("inner", "waist", "tolerance"), [(0.5, 0.45, 1e-2), (0.5, 0.45, 5e-2), (0.4, 0.4, 2e-2)])
 def test_of_somewhat_dimmer_ones_errors_are_told(inner, waist, tolerance):
-    """The light is just above the limit below which other methods take over."""
+    """The transmitted light is just above the limit below which other methods are used."""
     pupil = optics.Pupil(
         12e-6, aperture=optics.Annulus(inner), mask=optics.GaussianMask(waist * 12e-6), thin_lens_focal_length=Z
     )
@@ -197,6 +204,8 @@ def test_of_somewhat_dimmer_ones_errors_are_told(inner, waist, tolerance):
 
 
 def test_dim_masks_are_no_reason_to_leave():
-    """No edge has more than its share of a light that is 0.001 everywhere."""
+    """The edge contributes no more than its usual share of the light if a mask transmits an amplitude of 0.001
+    everywhere.
+    """
     pupil = optics.Pupil(12e-6, mask=optics.MaskMap(np.full((4, 4), 0.03)), thin_lens_focal_length=Z)
     assert list(population_pictures([Member(pupil, LAMBDA, Z, math.inf)], Grid.square(33, 0.5e-6), 1e-2))
