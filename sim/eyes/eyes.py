@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -175,6 +175,12 @@ class Eyes:
             dynamics=self.dynamics,
             density=self.density,
         )
+
+    def with_perfect_lens(self) -> Eyes:
+        """Return camera eyes behind a perfect lens, with the same receptors and fields of view."""
+        plain = {"optics": None, "waveguide": None, "pupil_turned": False, "ommatidium": None, "acute_zone": 1.0}
+        vertical = self.vertical_fov_deg if self.ommatidium is None else self.fovy_deg
+        return replace(self, **plain, vertical_fov_deg=vertical)
 
     def _check_waveguide(self) -> None:
         from optics.eye.geometry import receptor_size
