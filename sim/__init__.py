@@ -9,7 +9,7 @@ choose_fidelity, Fidelity           rendering accuracy, chosen to match the rece
 FidelityWarning                     warning that no level of fidelity is accurate enough
 ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in `optics`
 ModelRenderer, Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides return several mounts
-CompoundEye                         ommatidia with any viewing directions; hexagonal_patch, whole_head
+CompoundEye                         ommatidia with any viewing directions; hexagonal_patch, whole_head, hexagonal_rows
 choose_model_fidelity               rendering accuracy for eyes on a model
 Task                                a user task for a robot with eyes, written for one world at a time
 BatchTask                           a user task written for arrays of all worlds, which runs faster
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from sim.exr.view import View
     from sim.eyes.compound_eye import CompoundEye
     from sim.eyes.eyes import Eyes
+    from sim.eyes.hexagonal_rows import hexagonal_rows
     from sim.eyes.mounts import Mount, both_sides, fan, ring
     from sim.eyes.viewing_directions import hexagonal_patch, whole_head
     from sim.physics.array_worlds import ArrayWorlds
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
 _HOME = {
     "CompoundEye": "sim.eyes.compound_eye",
     "hexagonal_patch": "sim.eyes.viewing_directions",
+    "hexagonal_rows": "sim.eyes.hexagonal_rows",
     "whole_head": "sim.eyes.viewing_directions",
     "Eyes": "sim.eyes.eyes",
     "Course": "sim.worlds.course",
@@ -151,6 +153,7 @@ __all__ = [
     "choose_model_fidelity",
     "fan",
     "hexagonal_patch",
+    "hexagonal_rows",
     "make_env",
     "make_parallel_env",
     "make_vec_env",

@@ -14,7 +14,17 @@ import pytest
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
-from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, TIME_CONSTANT, VERTICAL, gene_table
+from evolve.genome.genes import (
+    ALL_GENES,
+    FACETS,
+    LAMBDA_MAX,
+    OPTIONAL,
+    RHABDOM,
+    SIDE,
+    TIME_CONSTANT,
+    VERTICAL,
+    gene_table,
+)
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from optics.numerics import backend
@@ -88,6 +98,7 @@ OF_FAMILY = (
 # Receptors that see one frame per action.
 INSTANT = ("eye.rays_per_receptor=1", "eye.noise_sigma=0", *PERFECT)
 IN_TIME = ("eye.temporal_order=1", "genome.time_constant_ms.start=200", "eye.frames=1", *INSTANT)
+COMPOUND = ("eye.compound=true", "eye.illuminance=100")
 NAVIGATING = ("genome.resolution_height.start=1", "eye.rays_per_receptor=1", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", rides),
@@ -115,6 +126,8 @@ FIELDS = {
     "eye.rhabdom_absorption": Case("eye.rhabdom_absorption=1e4", point_image, ("eye.rhabdom_length=1e-4", *GUIDED)),
     "eye.head_radius": Case("eye.head_radius=100e-6", sight),
     "eye.receptor_width": Case("eye.receptor_width=100e-6", sight),
+    "eye.compound": Case("eye.compound=true", sight, ("eye.compound=false",)),
+    "eye.facet_area": Case("eye.facet_area=5e-9", sight, COMPOUND),
     "eye.temporal_order": Case("eye.temporal_order=1", moving_sight, INSTANT),
     "eye.latency_ms": Case("eye.latency_ms=200", moving_sight, IN_TIME),
     "eye.adaptation": Case("eye.adaptation=naka_rushton", moving_sight, IN_TIME),
@@ -196,6 +209,7 @@ GENE_OUTPUTS = {
     "aperture_shape": point_image,
     "rhabdom_diameter_um": sight,
     "time_constant_ms": moving_sight,
+    **dict.fromkeys(FACETS, sight),
     "memory_frames": life,
     "neurons": life,
     "layers": life,
@@ -205,9 +219,10 @@ GENE_OUTPUTS = {
 
 
 def small(task, settings):
-    """A small run with these settings."""
+    """A small run with these settings. The preset "quick" has a lens, which compound eyes do not have."""
+    preset = None if any(setting.startswith("eye.compound") for setting in settings) else "quick"
     oblong = () if any(setting.startswith("eye.square") for setting in settings) else OBLONG
-    return assemble(task, "quick", assignments=(*SMALL, *oblong, *settings))
+    return assemble(task, preset, assignments=(*SMALL, *oblong, *settings))
 
 
 @cache
@@ -236,7 +251,7 @@ def _names(cls, prefix=""):
 
 def test_tables_name_every_setting_and_every_gene():
     assert set(FIELDS) == set(_names(RunConfig))
-    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True, rhabdoms=True, heights=True, in_time=True))
+    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True, optional=frozenset(OPTIONAL)))
     assert all(is_dataclass(section) for section in SECTIONS.values())
 
 
@@ -255,7 +270,7 @@ def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
     spectral = ALL_GENES[name].cluster == "spectral"
     task = "foraging" if spectral else OWN if output is own_sight else "detection"  # only foraging has colours
-    special = {SIDE: SQUARE, RHABDOM: GUIDED, VERTICAL: HIGH, TIME_CONSTANT: IN_TIME}
+    special = {SIDE: SQUARE, RHABDOM: GUIDED, VERTICAL: HIGH, TIME_CONSTANT: IN_TIME, **dict.fromkeys(FACETS, COMPOUND)}
     given = FOUR_TYPES if spectral else special.get(name, () if output is point_image else PERFECT)
     before = _settled(output, task, given)
     config = small(task, (*given, f"genome.{name}.open=true"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from evolve.genome.phenotype import Phenotype
+from sim.eyes.hexagonal_rows import ROW_DISTANCE
 
 __all__ = ["acuity_cpd", "acuity_vertical_cpd"]
 
@@ -24,10 +25,12 @@ def acuity_cpd(phenotype: Phenotype) -> float:
 def acuity_vertical_cpd(phenotype: Phenotype) -> float:
     """Return the vertical acuity: the frequency of the finest horizontal grating that is resolved [cycles/degree].
 
-    It is 1 / (2 vertical fov/height). Square receptors have the same spacing as along the width, fov/width. Eyes are
-    placed side by side, so their number has no effect.
+    It is 1 / (2 vertical fov/height). Square receptors have the same spacing as along the width, fov/width, and
+    rows of ommatidia are √3/2 times as far apart. Eyes are placed side by side, so their number has no effect.
     """
     rows, columns = phenotype.resolution
+    if phenotype.facet_diameter_um is not None:
+        return columns / (2 * ROW_DISTANCE * phenotype.fov_deg)
     if phenotype.vertical_fov_deg is None:
         return columns / (2 * phenotype.fov_deg)
     return rows / (2 * phenotype.vertical_fov_deg)

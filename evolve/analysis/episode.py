@@ -51,7 +51,8 @@ class Episode:
     solved: True if the episode counts as solved
     failure: message of the failure that ended the episode; None without a failure
     signals: receptor signals with noise, (t, eye, channel, height, width), without the outputs of motion detectors
-    perfect_signals: signals of the same receptors behind a perfect lens, without noise, in the same shape
+    perfect_signals: signals of the same receptors behind a perfect lens, without noise, in the same shape. For compound
+        eyes: signals of the ommatidia without noise
     wavelengths_nm: wavelengths of the radiance's bands, (band,)
     radiance_frames: time steps at which radiance was recorded, (frame,)
     radiance: radiance of the scene in front of each eye, on a finer grid, (frame, eye, band, y, x)

@@ -159,16 +159,17 @@ class Recorder:
         """Return the fields of an episode that are rendered behind a perfect lens.
 
         These are the signals of the same receptors, and the radiance on a finer grid, in the same scenes and the same
-        light.
+        light. Ommatidia have no counterpart behind a perfect lens, so their own signals without noise take this place.
         """
-        perfect = replace(self.phenotype.eyes(self.config.eye), optics=None, waveguide=None, pupil_turned=False)
+        own = self.phenotype.eyes(self.config.eye)
+        perfect = own.with_perfect_lens()
         height, width = perfect.resolution
         factor = max(1, -(-FINE_PIXELS // max(height, width)))
         fine = replace(perfect, resolution=(factor * height, factor * width))
         fidelity = replace(prepared.fidelity, rays_per_receptor=FINE[prepared.fidelity.samples])
         receptors, pictures = (
             PreparedTask(animal_task(self.phenotype, self.config, self.mode, eyes), fidelity).renderer(simulation)
-            for eyes in (perfect, fine)
+            for eyes in (perfect if own.ommatidium is None else own, fine)
         )
         frames, lit = np.arange(0, len(poses), self.radiance_every), light[0, :, None, None, None, None]
         radiance = [np.moveaxis(pictures.receptor_radiance(poses[t]) * lit, 0, 2) for t in frames]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.genes import LAMBDA_MAX, RHABDOM, TILT, TIME_CONSTANT, VERTICAL
+from evolve.genome.genes import LAMBDA_MAX, OPTIONAL, TILT
 from evolve.genome.phenotype import Phenotype
 from optics.numerics.number_types import full_precision
 
@@ -154,7 +154,6 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
         "placement_range_deg": phenotype.placement_range_deg,
         **({} if phenotype.elevation_deg is None else {TILT: phenotype.elevation_deg}),
         "fov_deg": phenotype.fov_deg,
-        **({} if phenotype.vertical_fov_deg is None else {VERTICAL: phenotype.vertical_fov_deg}),
         "resolution_height": float(height),
         "resolution_width": float(width),
     }
@@ -169,10 +168,7 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
     if phenotype.refractive_index is not None:
         values["refractive_index"] = phenotype.refractive_index
         values |= {"dispersion": phenotype.dispersion, "aperture_shape": float(phenotype.aperture_shape)}
-    if phenotype.rhabdom_diameter_um is not None:
-        values[RHABDOM] = phenotype.rhabdom_diameter_um
-    if phenotype.time_constant_ms is not None:
-        values[TIME_CONSTANT] = phenotype.time_constant_ms
+    values |= {name: getattr(phenotype, name) for name in OPTIONAL if getattr(phenotype, name) is not None}
     brain = ("memory_frames", "neurons", "layers")
     values |= {name: float(getattr(phenotype, name)) for name in brain}
     if phenotype.lambda_max_nm is not None:

@@ -45,10 +45,18 @@ class Vision:
     ssim: float
 
 
+UNDEFINED = Vision(math.nan, math.nan, math.nan, math.nan)
+
+
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
-    """Return the measures of an animal's eyes in the run's task. If their optics cannot be computed, all are NaN."""
+    """Return the measures of an animal's eyes in the run's task.
+
+    If their optics cannot be computed, all are NaN, and also for compound eyes.
+    """
     medium = config.world.medium
     eye = animal.eye(config.eye, medium)
+    if not isinstance(eye, optics.Eye):
+        return UNDEFINED
     try:
         if eye.pupil is None:
             quality, contrast = eye_image_quality(animal, config.eye, medium), 1.0
@@ -57,7 +65,7 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
             quality, contrast = light.image_quality, light.contrast
         seen, perfect = seen_and_perfect(animal, config)
     except optics.AccuracyError:
-        return Vision(math.nan, math.nan, math.nan, math.nan)
+        return UNDEFINED
     gain = 1 / float(eye.white_signal)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
@@ -72,7 +80,7 @@ def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floa
         fidelity = replace(PreparedTask(task).fidelity, rays_per_receptor=RAYS)
     else:
         fidelity = sim.Fidelity(RAYS, eyes.bands, light=light)
-    perfect = animal_task(animal, config, eyes=replace(eyes, optics=None, waveguide=None, pupil_turned=False))
+    perfect = animal_task(animal, config, eyes=eyes.with_perfect_lens())
     with closing(Simulation(task, SCENES, 0)) as worlds:
         worlds.reset()
         poses = worlds.poses()

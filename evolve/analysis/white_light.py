@@ -82,6 +82,7 @@ def eye_image_quality(phenotype: Phenotype, config: EyeConfig, medium: str = "ai
         optics.AccuracyError: the PSF cannot be computed.
     """
     eye = phenotype.eye(config, medium)
+    assert isinstance(eye, optics.Eye)
     if eye.pupil is None:
         return max(1 - noise_of(eye, eye.white_signal), 0.0)
     return WhiteLight.from_eye(eye).image_quality

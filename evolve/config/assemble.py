@@ -26,6 +26,7 @@ from evolve.config.task_code import TaskCode, names_code
 from evolve.genome.genes import (
     ALL_GENES,
     CLUSTERS,
+    FACETS,
     FAMILIES,
     GENES,
     RHABDOM,
@@ -45,6 +46,7 @@ OF_SETTINGS = {
     RHABDOM: ("with rhabdoms", "eye.rhabdoms", "true"),
     VERTICAL: ("whose height evolves", "eye.vertical_fov", "gene"),
     TIME_CONSTANT: ("whose receptors have memory", "eye.temporal_order", "1"),
+    **dict.fromkeys(FACETS, ("that are compound eyes", "eye.compound", "true")),
 }
 GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
 TOP_LEVEL = ("task", "seed", "workers", "task_sha256")
@@ -252,6 +254,11 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
             raise ConfigError(
                 f"genome.{name}: is for user tasks; in built-in tasks eyes look along the floor",
                 *(f"genome.{name}", "task"),
+            )
+        if eye.compound and name in ALL_GENES and name not in eye.genes:
+            raise ConfigError(
+                f"genome.{name}: compound eyes have facets instead of a pupil; set eye.compound = false",
+                *(f"genome.{name}", "eye.compound"),
             )
         if name in ALL_GENES and name not in eye.genes:
             raise ConfigError(no_such_gene(name, eye), f"genome.{name}", "eye.relief_points", "eye.relief_symmetric")

@@ -13,6 +13,11 @@ from optics.spectra.receptors import RECEPTORS
 # Settings of receptors with memory, and settings that have an effect only with another one.
 IN_TIME = ("latency_ms", "adaptation", "adaptation_ms", "event_threshold", "motion_detectors", "motion_ms", "frames")
 NEEDED = {"adaptation_ms": "adaptation", "motion_ms": "motion_detectors"}
+# Settings of camera eyes, which compound eyes do not have.
+OF_CAMERAS = (
+    *("sensor_width", "relief_height", "relief_points", "relief_symmetric", "pupil_turned", "square", "vertical_fov"),
+    *("receptor_pitch", "rhabdoms", "rhabdom_length", "head_radius", "receptor_width", "temporal_order"),
+)
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
 # Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
 # no light, and above the upper limit it has hundreds of modes.
@@ -33,6 +38,7 @@ def check_eye(eye: EyeConfig) -> None:
         if (given := getattr(eye, name)) not in known:
             raise ConfigError(f"eye.{name} = {given!r}: must be one of {', '.join(known)}", f"eye.{name}")
     _check_light(eye)
+    _check_compound(eye)
     _check_rhabdoms(eye)
     _check_time(eye)
 
@@ -54,13 +60,30 @@ def _check_light(eye: EyeConfig) -> None:
         )
 
 
+def _check_compound(eye: EyeConfig) -> None:
+    """Check that settings of camera eyes and of compound eyes are changed only for eyes that have them."""
+    default = EyeConfig()
+    if not eye.compound and eye.facet_area != default.facet_area:
+        raise ConfigError(
+            "eye.facet_area: is for compound eyes: set eye.compound = true", "eye.facet_area", "eye.compound"
+        )
+    for name in OF_CAMERAS if eye.compound else ():
+        if getattr(eye, name) != getattr(default, name):
+            raise ConfigError(
+                f"eye.{name}: is for camera eyes: leave it unchanged, or set eye.compound = false",
+                *(f"eye.{name}", "eye.compound"),
+            )
+    if eye.compound and not eye.optics:
+        raise ConfigError("eye.compound = true: facets are optics; set eye.optics = true", "eye.compound", "eye.optics")
+
+
 def _check_rhabdoms(eye: EyeConfig) -> None:
     """Check that eyes with rhabdoms have optics and a plausible numerical aperture.
 
     Also check that settings of rhabdoms are changed only if receptors are rhabdoms.
     """
     default = EyeConfig()
-    for name in RHABDOMS if not eye.rhabdoms else ():
+    for name in RHABDOMS if not (eye.rhabdoms or eye.compound) else ():
         if getattr(eye, name) != getattr(default, name):
             raise ConfigError(f"eye.{name}: is for rhabdoms: set eye.rhabdoms = true", f"eye.{name}", "eye.rhabdoms")
     if eye.rhabdoms and not eye.optics:
@@ -69,7 +92,7 @@ def _check_rhabdoms(eye: EyeConfig) -> None:
             "eye.rhabdoms",
             "eye.optics",
         )
-    if eye.rhabdom_length == 0 and eye.rhabdom_absorption != default.rhabdom_absorption:
+    if eye.rhabdom_length == 0 and not eye.compound and eye.rhabdom_absorption != default.rhabdom_absorption:
         raise ConfigError(
             f"eye.rhabdom_absorption = {eye.rhabdom_absorption:g}: needs a length: set eye.rhabdom_length",
             *("eye.rhabdom_absorption", "eye.rhabdom_length"),

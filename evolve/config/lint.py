@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from evolve.config.run_config import EyeConfig, RunConfig, SearchConfig
-from evolve.genome.genes import INHERITED, LAMBDA_MAX
+from evolve.genome.genes import INHERITED, LAMBDA_MAX, GeneConfig, highest
 from optics.elements.turbid_medium import AIR, turbid_medium
 
 __all__ = ["coarse_bands", "idle_genes", "idle_settings", "idle_starts", "lint"]
@@ -56,8 +58,9 @@ def coarse_bands(config: RunConfig) -> list[str]:
 
 def _most_light(config: RunConfig) -> float:
     """Return the signal of a white surface behind the widest pupil of any animal (1 without a pupil)."""
-    use = config.genome["relative_aperture"]
-    return float(use.high if use.open else use.start) ** 2 if config.eye.optics else 1.0
+    if not config.eye.optics or config.eye.compound:
+        return 1.0
+    return highest("relative_aperture", config.genome) ** 2
 
 
 def _doublings(bands: int) -> list[int]:
@@ -91,20 +94,26 @@ def idle_genes(config: RunConfig) -> list[str]:
     notes = []
     if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
         notes.append("genome.placement_range_deg is open but has no effect: genome.n_eyes is fixed at 1")
-    relief = [name for name in table if name.startswith("doe_")]
-    index = uses["refractive_index"]
-    if not index.open and index.start == 1 and any(uses[name].open for name in (*relief, "dispersion")):
-        notes.append("the relief's open genes have no effect: genome.refractive_index is fixed at 1")
-    flat = not any(uses[name].open for name in relief) and len({uses[name].start for name in relief}) == 1
-    for name in ("refractive_index", "dispersion"):
-        if flat and uses[name].open:
-            notes.append(f"genome.{name} is open but has no effect: the relief is fixed and flat")
+    if not config.eye.compound:
+        notes += _idle_glass(uses, [name for name in table if name.startswith("doe_")])
     if config.card.grey and any(uses[name].open for name in LAMBDA_MAX):
         notes.append(f"genes of lambda_max are open but have no effect: the world of {config.task} is grey")
     types = uses["receptor_types"]
     most = int(types.high if types.open else types.start)
     for name in [name for name in list(LAMBDA_MAX)[most:] if uses[name].open]:
         notes.append(f"genome.{name} is open but has no effect: genome.receptor_types is at most {most}")
+    return notes
+
+
+def _idle_glass(uses: Mapping[str, GeneConfig], relief: list[str]) -> list[str]:
+    """Return warnings about open genes of the relief and its material that have no effect because of each other."""
+    notes, index = [], uses["refractive_index"]
+    if not index.open and index.start == 1 and any(uses[name].open for name in (*relief, "dispersion")):
+        notes.append("the relief's open genes have no effect: genome.refractive_index is fixed at 1")
+    flat = not any(uses[name].open for name in relief) and len({uses[name].start for name in relief}) == 1
+    for name in ("refractive_index", "dispersion"):
+        if flat and uses[name].open:
+            notes.append(f"genome.{name} is open but has no effect: the relief is fixed and flat")
     return notes
 
 

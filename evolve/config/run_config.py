@@ -33,7 +33,7 @@ from evolve.config.task_card import (
 from evolve.config.task_choice import TaskChoice
 from evolve.config.task_code import TaskCode
 from evolve.genome import anatomy
-from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
+from evolve.genome.genes import CLUSTERS, FACETS, GENES, INHERITED, RHABDOM, Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.elements.turbid_medium import MEDIA_OF_WORLDS
 from sim.worlds.catalog import SUBSTEPS, TASKS
@@ -109,6 +109,8 @@ class RunConfig:
                 "already determines the width of retinas: set one of the two",
                 *("eye.sensor_width", "eye.receptor_pitch"),
             )
+        if self.eye.compound and (missing := [name for name in (*FACETS, RHABDOM) if name not in self.genome]):
+            raise ConfigError(f"genome: must have {missing[0]}, a gene of compound eyes", "genome", "eye.compound")
         if (cramped := anatomy.contradiction(self.genome, self.eye)) is not None:
             message, keys = cramped
             raise ConfigError(message, *keys)

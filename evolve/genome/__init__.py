@@ -6,6 +6,7 @@ phenotype     Phenotype: eyes and brain of an animal; develop: the phenotype of 
 phenotype_on_record  checks of a phenotype that was read from a file
 eye_config    EyeConfig: settings shared by all eyes of a run
 anatomy       space constraints of eyes and receptors
+head_surface  space constraints of compound eyes
 relief_genes  genes of a pupil's relief
 interval      Interval: valid range of a value
 plain_values  checks of values that were read from a file

@@ -14,8 +14,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from evolve.genome import head_surface
 from evolve.genome.eye_config import EyeConfig
-from evolve.genome.genes import ALL_GENES, RHABDOM, SIDE, SIDES, VERTICAL, GeneConfig
+from evolve.genome.genes import ALL_GENES, RHABDOM, SIDE, SIDES, VERTICAL, GeneConfig, highest, lowest
 
 __all__ = ["contradiction", "fitted", "receptor_side", "retina_width", "sides", "vertical_fov"]
 
@@ -63,18 +64,22 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     this, the number of eyes is reduced. If the width of an eye depends on the number of its receptors, the numbers of
     eyes and of receptors are instead reduced in the same proportion.
 
+    For compound eyes, see `evolve.genome.head_surface`.
+
     values: value of each gene, by name
     uses: searched range of each gene, by name
     """
+    if sizes.compound:
+        return head_surface.fitted(values, uses, sizes)
     fits, width = dict(values), _width_gene(uses)
     fits[width] = min(values[width], float(_most_receptors(sizes)))
     eyes, receptors = values["n_eyes"], fits[width]
     needed = _least_range_deg(eyes, receptors, sizes)
     if eyes > 1 and values["placement_range_deg"] < needed:
-        widest = _highest("placement_range_deg", uses)
+        widest = highest("placement_range_deg", uses)
         fits["placement_range_deg"] = min(needed, widest)
-        fewest = receptors if sizes.receptor_pitch == 0 else _lowest(width, uses)
-        fits["n_eyes"], fits[width] = _thinned((eyes, receptors), (_lowest("n_eyes", uses), fewest), widest, sizes)
+        fewest = receptors if sizes.receptor_pitch == 0 else lowest(width, uses)
+        fits["n_eyes"], fits[width] = _thinned((eyes, receptors), (lowest("n_eyes", uses), fewest), widest, sizes)
     fits |= _with_high_receptors(fits, uses, sizes)
     if RHABDOM in values:
         side = 1e6 * receptor_side(sides(fits), fits["fov_deg"], vertical_fov(fits, sizes), sizes)
@@ -93,10 +98,10 @@ def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values
         return {}
     fov_deg, rows = values["fov_deg"], _height_gene(uses)
     shape = _RowsThatFit(values[_width_gene(uses)], rows == SIDE, sizes)
-    fewest = _lowest(rows, uses)
+    fewest = lowest(rows, uses)
     if VERTICAL in values:
-        vertical = min(max(vertical, shape.least_vertical_deg(fewest, fov_deg)), _highest(VERTICAL, uses))
-        fov_deg = max(min(fov_deg, shape.most_fov_deg(fewest, vertical)), _lowest("fov_deg", uses))
+        vertical = min(max(vertical, shape.least_vertical_deg(fewest, fov_deg)), highest(VERTICAL, uses))
+        fov_deg = max(min(fov_deg, shape.most_fov_deg(fewest, vertical)), lowest("fov_deg", uses))
     counts = range(int(values[rows]), int(fewest), -1)
     most = next((float(count) for count in counts if shape.fits(count, fov_deg, vertical)), fewest)
     return {rows: most} | ({VERTICAL: vertical, "fov_deg": fov_deg} if VERTICAL in values else {})
@@ -160,6 +165,8 @@ def _ratio(one: float, other: float) -> float:
 
 def contradiction(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
     """Return None if every genome can be repaired; else a message and the names of the contradicting settings."""
+    if sizes.compound:
+        return head_surface.contradiction(uses, sizes)
     return _crowded_retina(uses, sizes) or _low_retina(uses, sizes) or _crowded_head(uses, sizes)
 
 
@@ -171,7 +178,7 @@ def _crowded_retina(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
             ("eye.receptor_pitch", "eye.receptor_width"),
         )
     width = _width_gene(uses)
-    receptors = _lowest(width, uses)
+    receptors = lowest(width, uses)
     if receptors > _most_receptors(sizes):
         return (
             f"{receptors:g} receptors of at least {sizes.receptor_width:g} m (eye.receptor_width) do not fit side by "
@@ -182,11 +189,11 @@ def _crowded_retina(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
 
 
 def _low_retina(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
-    fields = {"fov_deg": _lowest("fov_deg", uses)} | ({VERTICAL: _highest(VERTICAL, uses)} if VERTICAL in uses else {})
+    fields = {"fov_deg": lowest("fov_deg", uses)} | ({VERTICAL: highest(VERTICAL, uses)} if VERTICAL in uses else {})
     vertical, rows, width = vertical_fov(fields, sizes), _height_gene(uses), _width_gene(uses)
     if vertical is None:
         return None
-    fewest, columns = _lowest(rows, uses), _lowest(width, uses)
+    fewest, columns = lowest(rows, uses), lowest(width, uses)
     if _RowsThatFit(columns, rows == SIDE, sizes).fits(fewest, fields["fov_deg"], vertical):
         return None
     return (
@@ -198,8 +205,8 @@ def _low_retina(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
 
 def _crowded_head(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
     width = _width_gene(uses)
-    eyes, receptors = _lowest("n_eyes", uses), _lowest(width, uses)
-    widest = _highest("placement_range_deg", uses)
+    eyes, receptors = lowest("n_eyes", uses), lowest(width, uses)
+    widest = highest("placement_range_deg", uses)
     if eyes == 1 or eyes <= _most_eyes(widest, receptors, sizes):
         return None
     pitched = sizes.receptor_pitch > 0
@@ -232,11 +239,3 @@ def _least_range_deg(eyes: float, receptors: float, sizes: EyeConfig) -> float:
 
 def _most_eyes(range_deg: float, receptors: float, sizes: EyeConfig) -> int:
     return 1 + int(math.radians(range_deg) * sizes.head_radius / retina_width(receptors, sizes) * (1 + SLACK))
-
-
-def _lowest(name: str, uses: Uses) -> float:
-    return uses[name].low if uses[name].open else uses[name].start
-
-
-def _highest(name: str, uses: Uses) -> float:
-    return uses[name].high if uses[name].open else uses[name].start

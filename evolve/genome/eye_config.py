@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from evolve.genome.genes import RELIEF_POINTS, Gene, gene_table
+from evolve.genome.genes import FACETS, RELIEF_POINTS, RHABDOM, TIME_CONSTANT, VERTICAL, Gene, gene_table
 from evolve.genome.interval import Interval
 
 __all__ = ["AUTO", "VERTICAL_FOVS", "EyeConfig", "setting"]
@@ -94,6 +94,18 @@ class EyeConfig:
         1e-6, Interval(0, 1e-2, open_low=True), "smallest width of a receptor [m]; receptors do not overlap"
     )
 
+    compound: bool = setting(
+        False,
+        None,
+        "eyes are compound eyes: their receptors are ommatidia in a hexagonal lattice, with genes for facets and "
+        "rhabdoms instead of the pupil",
+    )
+    facet_area: float = setting(
+        1e-7,
+        Interval(1e-10, 1e-2),
+        "area of the head on which the facets of all eyes fit [m²]; used only if compound",
+    )
+
     temporal_order: int = setting(
         0,
         Interval(0, 2),
@@ -121,7 +133,11 @@ class EyeConfig:
     @property
     def genes(self) -> Mapping[str, Gene]:
         """All genes of animals that have these eyes, by name."""
-        heights = self.vertical_fov == "gene"
-        return gene_table(
-            self.relief_points, self.relief_symmetric, self.square, self.rhabdoms, heights, self.temporal_order > 0
-        )
+        present = {
+            RHABDOM: self.rhabdoms or self.compound,
+            VERTICAL: self.vertical_fov == "gene",
+            TIME_CONSTANT: self.temporal_order > 0,
+            **dict.fromkeys(FACETS, self.compound),
+        }
+        optional = frozenset(name for name, has in present.items() if has)
+        return gene_table(self.relief_points, self.relief_symmetric, self.square, optional, pupils=not self.compound)

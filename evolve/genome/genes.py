@@ -17,10 +17,12 @@ __all__ = [
     "ALL_GENES",
     "APERTURE_SHAPES",
     "CLUSTERS",
+    "FACETS",
     "FAMILIES",
     "GENES",
     "INHERITED",
     "LAMBDA_MAX",
+    "OPTIONAL",
     "RELIEF_POINTS",
     "RHABDOM",
     "SIDE",
@@ -33,6 +35,8 @@ __all__ = [
     "gene_table",
     "group_members",
     "groups_of",
+    "highest",
+    "lowest",
 ]
 
 Cluster = Literal["morphological", "optical", "neural", "spectral"]
@@ -45,6 +49,9 @@ SIDES = ("resolution_height", "resolution_width")
 RHABDOM = "rhabdom_diameter_um"  # gene of eyes whose receptors are rhabdoms
 VERTICAL = "vertical_fov_deg"  # gene of eyes whose height evolves
 TIME_CONSTANT = "time_constant_ms"  # gene of eyes whose receptors integrate over time
+FACETS = ("acute_zone", "facet_diameter_um", "f_number", "rhabdom_length_um")  # genes of compound eyes
+OPTIONAL = (RHABDOM, VERTICAL, TIME_CONSTANT, *FACETS)  # genes that exist only with certain settings of eyes
+OF_PUPILS = ("relative_aperture", "refractive_index", "dispersion", "aperture_shape")  # with the relief's heights
 TILT = "elevation_deg"  # gene that exists only in user tasks; in built-in tasks eyes look along the floor
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
@@ -67,6 +74,16 @@ class GeneConfig:
     high: float
     start: float
     opens_at: int = 0
+
+
+def lowest(name: str, uses: Mapping[str, GeneConfig]) -> float:
+    """Return the lowest value that a gene can have in a run."""
+    return uses[name].low if uses[name].open else uses[name].start
+
+
+def highest(name: str, uses: Mapping[str, GeneConfig]) -> float:
+    """Return the highest value that a gene can have in a run."""
+    return uses[name].high if uses[name].open else uses[name].start
 
 
 @dataclass(frozen=True)
@@ -119,19 +136,19 @@ def gene_table(
     relief_points: int = 4,
     relief_symmetric: bool = False,
     square: bool = False,
-    rhabdoms: bool = False,
-    heights: bool = False,
-    in_time: bool = False,
+    optional: frozenset[str] = frozenset(),
+    pupils: bool = True,
 ) -> Mapping[str, Gene]:
     """Return all genes by name, in the order of the genome.
 
     The relief has relief_points² genes. If it is symmetric, it has only the genes of an eighth of its area. Square eyes
-    have one gene for both sides. Rhabdoms add a gene for their diameter, and `heights` one for the vertical field.
-    Receptors that integrate over time add a gene for their time constant.
+    have one gene for both sides.
+
+    optional: genes of OPTIONAL that the animals have
+    pupils: True if eyes have a pupil with a relief, and not facets
     """
-    relief = set(representatives(relief_points, relief_symmetric))
-    optional = {RHABDOM: rhabdoms, VERTICAL: heights, TIME_CONSTANT: in_time}
-    absent = (*(SIDES if square else (SIDE,)), *(name for name, present in optional.items() if not present))
+    relief = set(representatives(relief_points, relief_symmetric)) if pupils else set()
+    absent = {*(SIDES if square else (SIDE,)), *(() if pupils else OF_PUPILS), *OPTIONAL} - optional
     return {
         name: gene
         for name, gene in _all_genes(relief_points).items()
@@ -155,6 +172,7 @@ def _body() -> list[Gene]:
         gene("resolution_height", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
         gene("resolution_width", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, left to right"),
         gene(SIDE, INTEGER, (1, 64), (1, 16, 1), "receptors", "a square eye's receptors, along either side"),
+        gene("acute_zone", REAL, (1, 5), (1, 3, 1), "", "density of ommatidia in the middle of an eye / mean density"),
     ]
 
 
@@ -177,6 +195,10 @@ def _optics(relief_points: int) -> list[Gene]:
         _held(gene("aperture_shape", INTEGER, (0, last), (0, last, 0), "", f"pupil: {shapes}")),
         # Rhabdoms thinner than 0.8 µm guide almost no red light, and those wider than 10 µm have a hundred modes.
         _held(gene(RHABDOM, REAL, (0.8, 10), (1, 6, 2), "µm", "diameter of rhabdoms, at most a receptor's width")),
+        # Facets of small wasps are 5 µm wide, and those of dragonflies 80 µm.
+        gene("facet_diameter_um", REAL, (4, 100), (8, 40, 20), "µm", "width of a facet; all facets fit on the head"),
+        gene("f_number", REAL, (1, 10), (1.5, 4, 2), "", "focal length of a facet in air / its width"),
+        gene("rhabdom_length_um", REAL, (10, 1000), (50, 400, 200), "µm", "length of a compound eye's rhabdoms"),
     ]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from evolve.genome.anatomy import fitted, receptor_side, retina_width, sides, vertical_fov
 from evolve.genome.eye_config import EyeConfig
-from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, RHABDOM, TILT, TIME_CONSTANT, GeneConfig
+from evolve.genome.genes import APERTURE_SHAPES, FACETS, INHERITED, LAMBDA_MAX, RHABDOM, TILT, TIME_CONSTANT, GeneConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype_on_record import checked_fields
 from evolve.genome.relief_genes import representatives
@@ -29,6 +29,7 @@ SLIT_ASPECT = 4.0  # height of an upright slit divided by its width
 # have small encoders. A brain of 64 neurons has encoders of 16. Wider encoders take longer to compute, and did not
 # learn faster (docs/measurements/learning.md).
 NEURONS_PER_FEATURE = 4
+OMITTED = (TIME_CONSTANT, *FACETS)  # fields that a record contains only if they have a value
 FORMER_ENCODER = 16  # width of the encoders of animals whose record does not state it
 
 
@@ -57,6 +58,8 @@ class Phenotype:
     setting `eye.receptors` of the run determines the receptors.
     `vertical_fov_deg` is the vertical field of view. If it is None, receptors are square.
     `time_constant_ms` is the time constant of the receptors. If it is None, they have no memory, and records omit it.
+    `facet_diameter_um`, `f_number`, `rhabdom_length_um` and `acute_zone` describe compound eyes, whose `resolution` is
+    in ommatidia. If they are None, the eyes are camera eyes, and records omit them.
     """
 
     n_eyes: int
@@ -77,6 +80,34 @@ class Phenotype:
     rhabdom_diameter_um: float | None = None
     vertical_fov_deg: float | None = None
     time_constant_ms: float | None = None
+    facet_diameter_um: float | None = None
+    f_number: float | None = None
+    rhabdom_length_um: float | None = None
+    acute_zone: float | None = None
+
+    def ommatidium(self, eye: EyeConfig) -> optics.Ommatidium | None:
+        """Return the ommatidium of compound eyes; None for camera eyes. The facet is a lens with one curved surface."""
+        import optics
+
+        if self.facet_diameter_um is None or self.f_number is None or self.rhabdom_length_um is None:
+            return None
+        diameter, n = 1e-6 * self.facet_diameter_um, optics.FacetLens.n
+        return optics.Ommatidium(
+            optics.FacetLens(diameter, radius_front=(n - 1) * self.f_number * diameter),
+            self._guide(1e-6 * (self.rhabdom_diameter_um or 0), eye, 1e-6 * self.rhabdom_length_um),
+        )
+
+    @staticmethod
+    def _guide(diameter: float, eye: EyeConfig, length: float | None) -> optics.Waveguide:
+        import optics
+
+        return optics.Waveguide(
+            diameter=diameter,
+            n_core=eye.rhabdom_index,
+            n_clad=eye.rhabdom_surround,
+            length=length,
+            absorption=eye.rhabdom_absorption,
+        )
 
     def dynamics(self, eye: EyeConfig) -> optics.ReceptorDynamics | None:
         """Return the temporal properties of the receptors; None for receptors without memory."""
@@ -97,19 +128,14 @@ class Phenotype:
         )
 
     def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
-        """Return the waveguide that each receptor forms, at most as wide as the receptor; None for square receptors."""
-        import optics
+        """Return the waveguide that each receptor of a camera eye forms, at most as wide as the receptor.
 
-        if self.rhabdom_diameter_um is None:
+        It is None for square receptors and for compound eyes.
+        """
+        if self.rhabdom_diameter_um is None or self.facet_diameter_um is not None:
             return None
         side = receptor_side(self.resolution, self.fov_deg, self.vertical_fov_deg, eye)
-        return optics.Waveguide(
-            diameter=min(1e-6 * self.rhabdom_diameter_um, side),
-            n_core=eye.rhabdom_index,
-            n_clad=eye.rhabdom_surround,
-            length=eye.rhabdom_length or None,
-            absorption=eye.rhabdom_absorption,
-        )
+        return self._guide(min(1e-6 * self.rhabdom_diameter_um, side), eye, eye.rhabdom_length or None)
 
     def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
         """Return the pupil of the eyes; None for a perfect lens."""
@@ -148,19 +174,22 @@ class Phenotype:
             pupil_turned=eye.pupil_turned and pupil is not None,
             vertical_fov_deg=self.vertical_fov_deg,
             dynamics=self.dynamics(eye),
+            ommatidium=self.ommatidium(eye),
+            acute_zone=self.acute_zone or 1.0,
         )
 
-    def eye(self, eye: EyeConfig, medium: str = "air") -> optics.Eye:
-        """Return the optics and retina of one eye in the medium of a run's worlds, one of `MEDIA_OF_WORLDS`."""
+    def eye(self, eye: EyeConfig, medium: str = "air") -> optics.Eye | sim.CompoundEye:
+        """Return one eye in the medium of a run's worlds, one of `MEDIA_OF_WORLDS`: optics and retina, or facets."""
         import optics
+        import sim
 
-        found: optics.Eye = optics.immersed(self.eyes(eye).eye(), optics.turbid_medium(medium))
-        return found
+        found = self.eyes(eye).eye()
+        return found if isinstance(found, sim.CompoundEye) else optics.immersed(found, optics.turbid_medium(medium))
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values for a run file."""
         found = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
-        return {name: value for name, value in found.items() if value is not None or name != TIME_CONSTANT}
+        return {name: value for name, value in found.items() if value is not None or name not in OMITTED}
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> Phenotype:
@@ -179,8 +208,9 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
     Every genome with the right number of finite coordinates has a phenotype.
     """
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
-    seen_through = config.eye.optics
-    relief = tuple(values[name] for name in representatives(config.eye.relief_points, config.eye.relief_symmetric))
+    seen_through = config.eye.optics and not config.eye.compound
+    heights = representatives(config.eye.relief_points, config.eye.relief_symmetric) if seen_through else ()
+    relief = tuple(values[name] for name in heights)
     peaks = tuple(values[name] for name in LAMBDA_MAX)[: int(values["receptor_types"])]
     return Phenotype(
         n_eyes=int(values["n_eyes"]),
@@ -201,6 +231,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
         rhabdom_diameter_um=values.get(RHABDOM),
         vertical_fov_deg=vertical_fov(values, config.eye),
         time_constant_ms=values.get(TIME_CONSTANT),
+        **{name: values.get(name) for name in FACETS},
     )
 
 

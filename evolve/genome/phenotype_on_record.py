@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from math import isqrt
 from typing import Any
 
-from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RELIEF_POINTS, RHABDOM, TILT, TIME_CONSTANT, VERTICAL
+from evolve.genome.genes import ALL_GENES, FACETS, LAMBDA_MAX, OPTIONAL, RELIEF_POINTS, TILT
 from evolve.genome.interval import Interval
 from evolve.genome.plain_values import listed, real, whole_number
 
@@ -33,12 +33,14 @@ def checked_fields(record: Any, names: Iterable[str]) -> dict[str, Any]:
     fields = {name: _checked(name, value) for name, value in record.items()}
     if len({fields.get(name) is None for name in SEEN_THROUGH}) > 1:
         raise ValueError(f"phenotype: {', '.join(SEEN_THROUGH)} must all be null, or none of them")
+    if len({fields.get(name) is None for name in FACETS}) > 1:
+        raise ValueError(f"phenotype: {', '.join(FACETS)} must all be null, or none of them")
     return fields
 
 
 def _checked(name: str, value: Any) -> Any:
     key = f"phenotype.{name}"
-    if value is None and name in (*SEEN_THROUGH, "lambda_max_nm", TILT, RHABDOM, VERTICAL, TIME_CONSTANT):
+    if value is None and name in (*SEEN_THROUGH, "lambda_max_nm", TILT, *OPTIONAL):
         return None
     if name == "resolution":
         sides = zip(SIDES, listed(value, key, 2, 2), strict=True)

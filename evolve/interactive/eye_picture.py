@@ -16,6 +16,8 @@ from evolve.analysis.white_light import WhiteLight
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.report.eye_figures import DECADES, middle_of_psf, relief_heights
+from evolve.report.facet_figures import white_acceptance
+from sim.eyes.compound_eye import CompoundEye
 
 __all__ = ["eye_picture"]
 
@@ -24,15 +26,18 @@ def eye_picture(phenotype: Phenotype, config: EyeConfig, medium: str = "air") ->
     """Draw the fields of view around the head, the relief of the pupil [µm], and the PSF in white daylight.
 
     The PSF is drawn on a logarithmic scale, with the outline of a receptor. For a perfect lens, only the fields of view
-    are drawn.
+    are drawn. For compound eyes, the acceptance function is drawn instead of relief and PSF.
 
     medium: medium of the run's worlds
     """
     eye = phenotype.eye(config, medium)
-    figure, panels = pyplot.subplots(1, 1 if eye.pupil is None else 3, squeeze=False, layout="constrained")
+    count = 2 if isinstance(eye, CompoundEye) else 1 if eye.pupil is None else 3
+    figure, panels = pyplot.subplots(1, count, squeeze=False, layout="constrained")
     figure.set_size_inches(3.6 * panels.size, 3.4)
     _head(panels[0, 0], phenotype, config)
-    if eye.pupil is not None:
+    if isinstance(eye, CompoundEye):
+        _acceptance(panels[0, 1], eye)
+    elif eye.pupil is not None:
         _relief(panels[0, 1], eye.pupil)
         _psf(panels[0, 2], eye)
     return figure
@@ -49,6 +54,14 @@ def _head(axes: Axes, phenotype: Phenotype, config: EyeConfig) -> None:
     axes.add_patch(Circle((0, 0), 1, fc="0.85", ec="0.3"))
     axes.set(xlim=(-3.1, 3.1), ylim=(-3.1, 3.1), aspect="equal", xticks=[], yticks=[])
     axes.set_title(f"{phenotype.n_eyes} eyes of {phenotype.fov_deg:.0f}°, from above")
+
+
+def _acceptance(axes: Axes, eye: CompoundEye) -> None:
+    angles, white = white_acceptance(eye)
+    edge = float(angles[-1])
+    picture = axes.imshow(white, extent=(-edge, edge, -edge, edge), origin="lower", vmin=0)
+    axes.set(title="acceptance function", xlabel="right [°]", ylabel="up [°]")
+    _bar(axes, picture, "acceptance / maximum")
 
 
 def _relief(axes: Axes, pupil: optics.Pupil) -> None:

@@ -9,6 +9,7 @@ lineup           cards of the first and the best animal, with a slider through t
 agent_figure     drawing of an animal's head and eyes
 figures          figures of a whole run
 eye_figures      figures of one eye's optics
+facet_figures    figures of a compound eye's ommatidia
 picture_sheet    rendered images of an episode, on a page
 views            images at one time of an episode, behind a perfect lens and behind the evolved optics
 player           player of an episode on a page

@@ -14,6 +14,7 @@ import optics
 from evolve.analysis.white_light import WhiteLight
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
+from evolve.report.facet_figures import facet_figures
 from evolve.report.hints import hint
 from evolve.report.markup import Html, figure, html, joined, key, rounded
 from evolve.report.svg import drawing, inline
@@ -32,9 +33,13 @@ SHOWN_POWER = 0.98  # fraction of the PSF's light that lies within the image
 def eye_figures(phenotype: Phenotype, config: EyeConfig, medium: str = "air") -> Html:
     """Return the figures with their captions. For a perfect lens, return a sentence instead.
 
+    For compound eyes, see `facet_figures`.
+
     medium: medium of the run's worlds
     """
     eye = phenotype.eye(config, medium)
+    if not isinstance(eye, optics.Eye):
+        return facet_figures(eye, phenotype)
     if eye.pupil is None:
         return html("<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n")
     pupil = _pupil(eye, phenotype)

@@ -90,26 +90,28 @@ def _sights(episode: Episode) -> Html:
     aspect = eyes.field_aspect
     shape = style(f"width:{room * min(aspect, 1):.4g}px;aspect-ratio:{aspect:.4g}")
     size = html('width="{}" height="{}" {}', width, height, shape)
-    pairs = [_pair(eye, name, size) for eye, name in enumerate(eyes.names())]
+    clean = "perfect lens" if eyes.ommatidium is None else "no noise"
+    pairs = [_pair(eye, name, size, clean) for eye, name in enumerate(eyes.names())]
     brighter = "" if gain == 1 else f", brightened {rounded(gain)} times (1/a², to compensate for the pupil's area)"
     note = html(
         "<b>Signals of the eyes</b>, from left to right: receptor signals with noise, shown as linear red, green and "
-        "blue{}; next to them the signals of the same receptors behind a perfect lens, without noise.",
-        brighter,
+        "blue{}; next to them the signals of the same {}, without noise.",
+        *(brighter, "receptors behind a perfect lens" if eyes.ommatidium is None else "ommatidia"),
     )
     return html(
         '<figure class="sights"><div class="eyes">{}</div><figcaption>{}</figcaption></figure>\n', joined(pairs), note
     )
 
 
-def _pair(eye: int, name: str, size: Html) -> Html:
+def _pair(eye: int, name: str, size: Html, clean: str) -> Html:
+    """Return the canvases of an eye. `clean` is the label of the signals without noise."""
     canvases = joined(
         html(
             '<div><canvas data-eye="{}" data-sheet="{}" {} role="img" aria-label="{} eye: {}"></canvas>'
             "<span>{}</span></div>",
             *(eye, sheet, size, name, label, label),
         )
-        for sheet, label in (("seen", "signals"), ("perfect", "perfect lens"))
+        for sheet, label in (("seen", "signals"), ("perfect", clean))
     )
     return html('<div class="sight"><span class="name">{}</span><div class="pair">{}</div></div>', name, canvases)
 

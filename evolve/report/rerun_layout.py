@@ -28,10 +28,11 @@ def layout(rr: Any, episode: Episode) -> Any:
         return views.Grid(*shown, grid_columns=min(len(names), ACROSS), name=name)
 
     as_numbers = grid("signals as numbers", ("signals",), views.TensorView)
+    clean = "behind perfect lenses" if episode.eyes.ommatidium is None else "without noise"
     scenes = grid(f"the scene, at the latest of {len(episode.radiance_frames)} times", ("scene",))
     seen = views.Vertical(
         views.Tabs(grid("signals of the eyes", EYES), as_numbers),
-        views.Tabs(grid("behind perfect lenses", ("perfect_lens",)), scenes),
+        views.Tabs(grid(clean, ("perfect_lens",)), scenes),
     )
     world = views.Spatial3DView(origin="/world", name="world")
     over_time = ("reward", "action", *episode.beside)

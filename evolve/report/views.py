@@ -10,6 +10,7 @@ from evolve.analysis.statistics import psnr
 from evolve.report.hints import hint
 from evolve.report.markup import Html, html, joined, rounded, style
 from evolve.report.picture import data_uri, display
+from sim.eyes.compound_eye import WorldEye
 
 __all__ = ["through_optics", "what_it_sees"]
 
@@ -27,6 +28,14 @@ def what_it_sees(episode: Episode) -> Html:
     brighter = f", brightened {rounded(gain)} times (1/a²)" if gain != 1 else ""
     rest = f" Only the first {MOST_EYES} of {len(names)} eyes are shown." if len(names) > MOST_EYES else ""
     quality = psnr(episode.signals, episode.perfect_signals, gain)
+    if not isinstance(lens, optics.Eye):
+        caption = html(
+            "<b>Views</b> at {} s of the episode above, from left to right: the scene's {} on a fine grid; the {}s of "
+            "the ommatidia without noise, in rows; and the same signals with noise, which are the input of the brain.{}"
+            " Over the whole episode the signals have a PSNR of {} dB relative to those without noise.",
+            *(rounded(time * episode.seconds), hint("radiance"), hint("signal"), rest, rounded(quality)),
+        )
+        return _figure(rows, caption)
     caption = html(
         "<b>Views</b> at {} s of the episode above, from left to right: the scene's {} on a fine grid; the {}’ {}s "
         "behind a perfect lens; the signals behind the eye's own optics, without noise{}; and the same signals with "
@@ -35,6 +44,10 @@ def what_it_sees(episode: Episode) -> Html:
         *(rounded(time * episode.seconds), hint("radiance"), hint("receptor", "receptors"), hint("signal")),
         *(brighter, rest, rounded(quality)),
     )
+    return _figure(rows, caption)
+
+
+def _figure(rows: Html, caption: Html) -> Html:
     return html('<figure class="views"><div class="eyes">{}</div><figcaption>{}</figcaption></figure>\n', rows, caption)
 
 
@@ -47,16 +60,18 @@ def _busiest(episode: Episode) -> int:
     return int(np.argmax(episode.radiance.mean(axis=2).var(axis=-1).mean(axis=(1, 2))))
 
 
-def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) -> Html:
+def _row(episode: Episode, eye: int, name: str, frame: int, lens: WorldEye) -> Html:
     time = episode.radiance_frames[frame]
     scene = np.einsum("cb,byx->cyx", lens.spectral_bands.weights, episode.radiance[frame, eye])
     gain = 1 / lens.white_signal
-    pictures = (
-        ("scene", display(scene)),
-        ("perfect lens", display(episode.perfect_signals[time, eye])),
-        ("own optics, no noise", display(through_optics(lens, episode.radiance[frame, eye]), gain)),
-        ("own optics, noise", display(episode.signals[time, eye], gain)),
-    )
+    perfect, noisy = display(episode.perfect_signals[time, eye]), display(episode.signals[time, eye], gain)
+    pictures = [("scene", display(scene)), ("no noise", perfect), ("noise", noisy)]
+    if isinstance(lens, optics.Eye):
+        clean = display(through_optics(lens, episode.radiance[frame, eye]), gain)
+        pictures = [
+            *(("scene", display(scene)), ("perfect lens", perfect)),
+            *(("own optics, no noise", clean), ("own optics, noise", noisy)),
+        ]
     aspect = episode.eyes.field_aspect
     size = style(f"width:{WIDTH * min(aspect, 1):.4g}px;aspect-ratio:{aspect:.4g}")
     cells = joined(

@@ -43,6 +43,8 @@ def starts_from(text: str) -> Source:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in AXES}
     if candidate.phenotype.rhabdom_diameter_um is not None:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("rhabdoms", *RHABDOMS)}
+    if candidate.phenotype.facet_diameter_um is not None:
+        tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("compound", "facet_area")}
     if candidate.phenotype.time_constant_ms is not None:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("temporal_order", *IN_TIME)}
     if height != "receptors":

@@ -77,7 +77,7 @@ class EyesOfKind:
     def _as_frames(self, signals: np.ndarray) -> np.ndarray:
         """Return signals (..., eye, channel, h, w) in the form of an observation."""
         eye = self.renderer.eye
-        return eye.as_frames(signals) if isinstance(eye, CompoundEye) else signals
+        return eye.as_frames(signals) if isinstance(eye, CompoundEye) and eye.rows is None else signals
 
     def _launch_in_time(
         self, receptors: ReceptorsInTime, poses: Poses, worlds: np.ndarray | None, fresh: bool
@@ -137,7 +137,7 @@ class EyesOfKind:
         # The light from a point light has no upper bound, because it increases as the distance to the light decreases.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
         low, eye = -margin if np.isfinite(high) else -np.inf, self.renderer.eye
-        if isinstance(eye, CompoundEye):
+        if isinstance(eye, CompoundEye) and eye.rows is None:
             return OmmatidiaBox(low, high, frames, eye.directions_on(self.renderer.mounts))
         return spaces.Box(low, high, frames, np.float32)
 

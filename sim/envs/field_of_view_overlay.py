@@ -187,14 +187,12 @@ def _fan(eyes: Eyes) -> np.ndarray:
 
 
 def _receptor_rays(eyes: Eyes) -> np.ndarray:
-    """Return the azimuths of receptor columns relative to the eye's axis [rad], positive to the left.
+    """Return the azimuths of receptor columns, see `Eyes.column_azimuths`.
 
     If there are more than MOST_RAYS columns, only every second, third, ... column is included.
     """
     columns = eyes.resolution[1]
-    shown = np.arange(columns)[:: -(-columns // MOST_RAYS)]
-    across = np.tan(np.radians(eyes.fov_deg) / 2)
-    return -np.arctan((2 * shown + 1 - columns) / columns * across)
+    return eyes.column_azimuths()[:: -(-columns // MOST_RAYS)]
 
 
 def _radius(eyes: Eyes) -> float:

@@ -114,7 +114,9 @@ def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
 
 def _drawn(frame: np.ndarray, eye: WorldEye) -> np.ndarray:
     """Return an image of a frame of signals: hexagons of a compound eye, or squares."""
-    return hexagon_map(frame, eye) if isinstance(eye, CompoundEye) else side_by_side(frame[:, : eye.channels], eye)
+    if isinstance(eye, CompoundEye):
+        return hexagon_map(frame if eye.rows is None else eye.as_frames(frame), eye)
+    return side_by_side(frame[:, : eye.channels], eye)
 
 
 def _overview(model: mujoco.MjModel) -> Viewpoint:

@@ -12,6 +12,7 @@ depth_layers         distances for which an eye has a PSF
 allowed_error        largest acceptable error of a signal, small compared with the receptors' noise
 compound_eye         CompoundEye: ommatidia with any viewing directions
 viewing_directions   hexagonal patches, whole heads, measured directions
+hexagonal_rows       hexagonal lattices in rows of equal length, with an acute zone
 ommatidial_sampling  rays drawn from the acceptance functions of ommatidia
 mounts               Mount: position and direction of an eye on a model; fan, ring, both_sides
 inside               depth of a point inside a geom

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 import optics
-from optics.numerics.arguments import in_range, of_kind, positive, reals, shown
+from optics.numerics.arguments import in_range, of_kind, positive, reals, shown, whole
 from optics.numerics.read_only import read_only
 from optics.ommatidia.acceptance import AcceptanceFunction, acceptance_function
 from optics.spectra.receptors import receptors_of
@@ -45,12 +45,14 @@ class CompoundEye:
     noise_sigma: standard deviation of a receptor's Gaussian noise, in the unit of signals
     photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised. A
         wide facet therefore has less shot noise than a narrow one with the same field. None: no shot noise
+    rows: number of rows, if the directions are those of `sim.hexagonal_rows`. Observations then have the axes of an
+        `optics.Eye`, (memory, eye, channel, row, column). None: the directions are in no order
     radius: radius [m] of the eye's surface, a sphere around the mount on which the facets lie. Facets must not overlap.
         None: all facets are at the mount, and may overlap
 
     Raises:
-        ValueError: an argument is invalid, the number of ommatidia is not in 1 to 1,000,000, two directions are equal,
-            or facets overlap.
+        ValueError: an argument is invalid, the number of ommatidia is not in 1 to 1,000,000 or no multiple of `rows`,
+            two directions are equal, or facets overlap.
     """
 
     directions: Any
@@ -61,6 +63,7 @@ class CompoundEye:
     noise_sigma: float = 0.01
     photon_budget: optics.PhotonBudget | None = None
     radius: float | None = None
+    rows: int | None = None
     spectral_bands: optics.SpectralBands = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -81,6 +84,8 @@ class CompoundEye:
         put("bands", len(self.spectral_bands.wavelengths))
         if self.radius is not None:
             positive("radius", self.radius)
+        if self.rows is not None and len(self) % whole("CompoundEye: rows", self.rows, 1, len(self)):
+            raise ValueError(f"CompoundEye: rows = {self.rows}: must divide the number of ommatidia, {len(self)}")
         self._refuse_overlap()
 
     def __len__(self) -> int:
@@ -94,7 +99,7 @@ class CompoundEye:
         both = np.concatenate([self.directions, self.directions * [1, -1, 1]])
         each = self.ommatidium if isinstance(self.ommatidium, optics.Ommatidium) else (*self.ommatidium,) * 2
         types = None if self.types is None else np.concatenate([self.types, self.types])
-        return replace(self, directions=both, ommatidium=each, types=types)
+        return replace(self, directions=both, ommatidium=each, types=types, rows=None)
 
     def directions_on(self, mounts: Sequence[Mount]) -> np.ndarray:
         """Return the viewing directions on these mounts, unit vectors (ommatidia of all mounts, 3).
@@ -107,8 +112,8 @@ class CompoundEye:
 
     @property
     def resolution(self) -> tuple[int, int]:
-        """Receptors as one row: (1, number of ommatidia)."""
-        return 1, len(self)
+        """Number of rows, and of ommatidia in a row; a single row if the directions are in no order."""
+        return self.rows or 1, len(self) // (self.rows or 1)
 
     @property
     def channels(self) -> int:
@@ -117,11 +122,11 @@ class CompoundEye:
 
     @property
     def mosaic(self) -> np.ndarray | None:
-        """Receptor type of each signal, (channel, ommatidium).
+        """Receptor type of each signal, (channel, row, column).
 
         It is None if every ommatidium has receptors of all types, in the order of `receptors`.
         """
-        return None if self.types is None else self.types.T
+        return None if self.types is None else self.types.T.reshape(-1, *self.resolution)
 
     @property
     def fov_deg(self) -> float:
@@ -181,12 +186,12 @@ class CompoundEye:
 
     @property
     def receptor_photons(self) -> np.ndarray | None:
-        """`photons` in the shape of signals, (channel, 1, ommatidium)."""
-        return None if self.photons is None else self.photons[:, None]
+        """`photons` in the shape of signals, (channel, row, column)."""
+        return None if self.photons is None else self.photons.reshape(-1, *self.resolution)
 
     def as_frames(self, signals: np.ndarray) -> np.ndarray:
-        """Return a renderer's signals (..., eye, channel, 1, ommatidium) as (..., ommatidia of all eyes, channel)."""
-        frames = np.swapaxes(signals[..., 0, :], -1, -2)
+        """Return signals (..., eye, channel, row, column) as (..., ommatidia of all eyes, channel)."""
+        frames = np.swapaxes(signals.reshape(*signals.shape[:-2], -1), -1, -2)
         return np.ascontiguousarray(frames.reshape(*frames.shape[:-3], -1, frames.shape[-1]))
 
     def _one_for_each(self, given: Any) -> tuple[optics.Ommatidium, ...]:

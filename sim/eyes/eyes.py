@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,9 +19,11 @@ from optics.spectra.bands import FINEST
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptor_dynamics import ReceptorDynamics
 from optics.spectra.receptors import receptors_of
+from sim.eyes.hexagonal_rows import ROW_DISTANCE, SHARPEST, hexagonal_rows, lattice_fovy_deg
 
 if TYPE_CHECKING:
-    from optics import Eye, Pupil, Waveguide
+    from optics import Ommatidium, Pupil, Waveguide
+    from sim.eyes.compound_eye import WorldEye
 
 BODY_RADIUS = 0.2  # [m]
 MOST = 10**6  # chosen limit for all counts; larger numbers would exceed any computer's memory
@@ -57,9 +59,14 @@ class Eyes:
         without memory
     density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: all receptors are
         alike
+    ommatidium: an optics.Ommatidium: the eyes are compound eyes. `resolution` is then the number of rows and of
+        ommatidia in a row of `sim.hexagonal_rows`, and fov_deg / width the angle between neighbours. Compound eyes
+        have neither optics, sensor_width, vertical_fov_deg, dynamics nor density. None: the eyes are camera eyes.
+    acute_zone: density of the ommatidia in the middle of a compound eye, see `sim.hexagonal_rows`
 
     Raises:
-        ValueError: a value is outside its range, or the receptors are unknown; the message suggests the nearest name.
+        ValueError: a value is outside its range, a compound eye has a property of camera eyes, or the receptors are
+            unknown; the message suggests the nearest name.
     """
 
     n_eyes: int = 2
@@ -77,6 +84,8 @@ class Eyes:
     vertical_fov_deg: float | None = None
     dynamics: ReceptorDynamics | None = None
     density: Any = None
+    ommatidium: Ommatidium | None = None
+    acute_zone: float = 1.0
 
     def __post_init__(self) -> None:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
@@ -122,11 +131,35 @@ class Eyes:
             )
         if self.waveguide is not None:
             self._check_waveguide()
+        check("acute_zone", lambda x: 1 <= x <= SHARPEST, f"in [1, {SHARPEST:g}]")
+        if self.acute_zone != 1 and self.ommatidium is None:
+            raise ValueError(f"Eyes: acute_zone = {shown(self.acute_zone)}: must be 1, the eyes have no ommatidia")
+        if self.ommatidium is not None:
+            self._refuse_parts_of_camera_eyes()
+            self.eye()
 
-    def eye(self) -> Eye:
-        """Return the optics and retina of one eye."""
+    def _refuse_parts_of_camera_eyes(self) -> None:
+        for name in ("optics", "waveguide", "vertical_fov_deg", "dynamics", "density"):
+            if getattr(self, name) is not None:
+                value = shown(getattr(self, name))
+                raise ValueError(f"Eyes: {name} = {value}: must be None for compound eyes, which have an ommatidium")
+
+    def eye(self) -> WorldEye:
+        """Return one eye: its optics and retina, or a compound eye."""
         from optics import Eye
 
+        if self.ommatidium is not None:
+            from sim.eyes.compound_eye import CompoundEye
+
+            return CompoundEye(
+                hexagonal_rows(*self.resolution, self.fov_deg, self.acute_zone),
+                self.ommatidium,
+                receptors=self.receptors,
+                bands=self.bands,
+                noise_sigma=self.noise_sigma,
+                photon_budget=self.photon_budget,
+                rows=self.resolution[0],
+            )
         return Eye(
             pupil=self.optics,
             resolution=self.resolution,
@@ -142,6 +175,12 @@ class Eyes:
             dynamics=self.dynamics,
             density=self.density,
         )
+
+    def with_perfect_lens(self) -> Eyes:
+        """Return camera eyes behind a perfect lens, with the same receptors and fields of view."""
+        plain = {"optics": None, "waveguide": None, "pupil_turned": False, "ommatidium": None, "acute_zone": 1.0}
+        vertical = self.vertical_fov_deg if self.ommatidium is None else self.fovy_deg
+        return replace(self, **plain, vertical_fov_deg=vertical)
 
     def _check_waveguide(self) -> None:
         from optics.eye.geometry import receptor_size
@@ -177,6 +216,19 @@ class Eyes:
         half = math.radians(self.placement_range_deg) / 2
         return np.linspace(half, -half, self.n_eyes)
 
+    def column_azimuths(self) -> np.ndarray:
+        """Return the azimuth of each column of receptors relative to the eye's axis [rad], (width,), left is positive.
+
+        In a compound eye, rows are shifted to either side of these azimuths by a quarter of the angle between
+        neighbours.
+        """
+        columns = self.resolution[1]
+        if self.ommatidium is not None:
+            ahead, left, _ = hexagonal_rows(1, columns, self.fov_deg, self.acute_zone).T
+            return np.arctan2(left, ahead)
+        across = np.tan(np.radians(self.fov_deg) / 2)
+        return -np.arctan((2 * np.arange(columns) + 1 - columns) / columns * across)
+
     def names(self) -> tuple[str, ...]:
         """Return the names of the eyes from left to right.
 
@@ -188,7 +240,9 @@ class Eyes:
 
     @property
     def fovy_deg(self) -> float:
-        """Vertical field of view of one eye [deg]: `vertical_fov_deg`, or that of square receptors."""
+        """Vertical field of view of one eye [deg]: `vertical_fov_deg`, or that of square receptors or of ommatidia."""
+        if self.ommatidium is not None:
+            return lattice_fovy_deg(*self.resolution, self.fov_deg)
         if self.vertical_fov_deg is not None:
             return self.vertical_fov_deg
         height, width = self.resolution
@@ -196,7 +250,13 @@ class Eyes:
 
     @property
     def field_aspect(self) -> float:
-        """Width of an eye's field of view divided by its height, on a plane in front of the eye."""
+        """Width of an eye's field of view divided by its height, on a plane in front of the eye.
+
+        For compound eyes it is the ratio of the lattice's width to its height, in units of the angle between
+        neighbours.
+        """
+        if self.ommatidium is not None:
+            return self.resolution[1] / (self.resolution[0] * ROW_DISTANCE)
         if self.vertical_fov_deg is None:
             return self.resolution[1] / self.resolution[0]
         return math.tan(math.radians(self.fov_deg) / 2) / math.tan(math.radians(self.vertical_fov_deg) / 2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import optics
+from sim.eyes.compound_eye import CompoundEye, WorldEye
 from sim.eyes.eyes import Eyes
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import AREAS, Fidelity
@@ -65,12 +65,12 @@ class BatchedRenderer(EyeRenderer):
         return super()._launched(poses, frozen)
 
 
-def in_whole_rays(fidelity: Fidelity, eye: optics.Eye) -> Fidelity:
+def in_whole_rays(fidelity: Fidelity, eye: WorldEye) -> Fidelity:
     """Return the fidelity with a whole number of samples per receptor, unless receptors share their samples.
 
     Receptors behind a pupil share rays. They share areas only if there are fewer areas than receptors.
     """
     asked = fidelity.rays_per_receptor
-    if eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):
+    if isinstance(eye, CompoundEye) or eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):
         return replace(fidelity, rays_per_receptor=float(max(1, round(asked))))
     return fidelity

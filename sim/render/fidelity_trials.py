@@ -14,6 +14,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+import optics
 from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import BODY_RADIUS
@@ -44,6 +45,7 @@ class FidelityTrials:
     """Trials of sampling methods in one scene."""
 
     def __init__(self, scene: WorldScene) -> None:
+        assert isinstance(scene.eye, optics.Eye)
         self._scene, self._eyes, self._eye = scene, scene.eyes, scene.eye
         self._everywhere = everywhere(scene, VIEWS[1])
         self._views, self._receptors = self._everywhere.views, self._everywhere.receptors
@@ -170,7 +172,7 @@ class FidelityTrials:
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
         """
-        sampling = self._scene.sampling(finest)
+        sampling = self._scene.camera_sampling(finest)
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
         truth = self._signals(trial, finest, lighting.DIRECT)
         nodes = trial.weights.reshape(finest.count, -1, *trial.weights.shape[1:])

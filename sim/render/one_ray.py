@@ -22,10 +22,12 @@ def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarr
     """Return the noise-free signals of one world of a state, (eye, channel, height, width).
 
     Raises:
-        ValueError: the world has a medium, or the receptors have a density.
+        ValueError: the world has a medium, the receptors have a density, or the eyes are compound eyes.
     """
     if eyes.density is not None:
         raise ValueError("eyes: their density must be None, this renderer has receptors of one size only")
+    if eyes.ommatidium is not None:
+        raise ValueError("eyes: their ommatidium must be None, a single ray has no acceptance function")
     if world.medium is not None:
         raise ValueError("world: its medium must be None, a single ray renders clear air only")
     bands, data = eyes.eye().spectral_bands, mujoco.MjData(world.model)

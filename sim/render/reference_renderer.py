@@ -43,8 +43,8 @@ class ReferenceRenderer:
     seed: seed of the samples; the attribute may be changed between images
 
     Raises:
-        ValueError: an argument is invalid, the world has a medium, or the sides of a receptor are not in the ratio of
-            small whole numbers.
+        ValueError: an argument is invalid, the world has a medium, the eyes are compound eyes, or the sides of a
+            receptor are not in the ratio of small whole numbers.
         optics.AccuracyError: the light of a pupil spreads too far.
     """
 
@@ -64,7 +64,10 @@ class ReferenceRenderer:
     ) -> None:
         if world.medium is not None:
             raise ValueError("world: its medium must be None, the reference renders clear air only")
-        self.world, self.eyes, self.eye = world, eyes, eyes.eye()
+        eye = eyes.eye()
+        if not isinstance(eye, optics.Eye):
+            raise ValueError("eyes: their ommatidium must be None, the reference renders camera eyes only")
+        self.world, self.eyes, self.eye = world, eyes, eye
         self.bands: optics.SpectralBands = self.eye.spectral_bands
         fewest = cells_for(self.eye) if self.eye.waveguide is not None else 4
         self.samples_per_receptor = samples_per_receptor or (1 if self.eye.pupil is None else fewest)

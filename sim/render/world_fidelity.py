@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import optics
 from optics.numerics.arguments import of_kind
 from sim.eyes.allowed_error import allowed_error
+from sim.eyes.compound_eye import CompoundEye
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.render import fidelity_stages as stages
 from sim.render.fidelity import Fidelity, Level
 from sim.render.fidelity_choice import Allowed, Samples, Shares, cheapest
 from sim.render.fidelity_trials import FidelityTrials
+from sim.render.model_fidelity import AUTO, ModelStages
+from sim.render.random_views import near_views, random_views
 from sim.render.sample_choice import fewest_samples
 from sim.render.world_scene import WorldScene
+from sim.scene.poses import Poses
 from sim.worlds.world import World
 
+MOMENTS = 6  # number of random views of each kind in which compound eyes are tried
 SHARES = Shares(bands=0.35, depth=0.35, light=0.5)  # chosen; 0.71 of the tolerance remains for samples
 
 
@@ -30,7 +36,8 @@ def choose_fidelity(
     tolerance: allowed error of a receptor's signal (root mean square), both over all receptors and over receptors that
         see a nearby object; None: half of the receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE`
         times the signal of a white surface behind the eyes' pupil
-    bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments
+    bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments.
+        Compound eyes always have their own.
     tracer: tracer for the trials, see `sim.BatchedRenderer`
 
     Raises:
@@ -41,16 +48,27 @@ def choose_fidelity(
     if bands not in ("auto", "own"):
         raise ValueError(f"bands = {bands!r}: must be 'auto' or 'own'")
     allowed = allowed_error(eyes.eye(), tolerance)
-    if bands == "own":
+    if bands == "own" or eyes.ommatidium is not None:
         return chosen_fidelity(WorldScene(world, eyes, tracer), allowed)
-    n_bands, level = stages.bands(eyes.eye(), SHARES.bands * allowed, world.medium)
+    eye = eyes.eye()
+    assert isinstance(eye, optics.Eye)
+    n_bands, level = stages.bands(eye, SHARES.bands * allowed, world.medium)
     fidelity = chosen_fidelity(WorldScene(world, replace(eyes, bands=n_bands), tracer), allowed)
     return replace(fidelity, levels=(level, *fidelity.levels[1:]))
 
 
 def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fidelity:
     """Return the result of `choose_fidelity` for a prepared scene with its own bands."""
+    if isinstance(scene.eye, CompoundEye):
+        return cheapest(ModelStages(scene, _moments(scene), allowed_error(scene.eye, tolerance), AUTO))
     return cheapest(WorldStages(scene, tolerance))
+
+
+def _moments(scene: WorldScene) -> Poses:
+    """Return poses from random places and, if there are objects, near one, for trials of compound eyes."""
+    drawn = [random_views, near_views] if scene.world.objects else [random_views]
+    views = [draw(scene.world, scene.eyes, MOMENTS) for draw in drawn]
+    return Poses.joined(*(scene.poses_at(view.position, view.heading, view.objects) for view in views))
 
 
 class WorldStages:
@@ -59,6 +77,7 @@ class WorldStages:
     shares: Shares | None = SHARES
 
     def __init__(self, scene: WorldScene, tolerance: float | None = None) -> None:
+        assert isinstance(scene.eye, optics.Eye)
         self.eye, self.allowed = scene.eye, allowed_error(scene.eye, tolerance)
         self._scene, self._trials = scene, FidelityTrials(scene)
 
@@ -72,8 +91,8 @@ class WorldStages:
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
         """See `Stages`."""
-        return stages.light(self._trials, self._scene.sampling(depth, self.allowed), allowed)
+        return stages.light(self._trials, self._scene.camera_sampling(depth, self.allowed), allowed)
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """See `Stages`."""
-        return fewest_samples(self._trials, self._scene.sampling(depth, self.allowed), light, allowed)
+        return fewest_samples(self._trials, self._scene.camera_sampling(depth, self.allowed), light, allowed)

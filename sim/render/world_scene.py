@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-import optics
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.eyes.mounts import ring
@@ -32,8 +31,6 @@ class WorldScene(PreparedScene):
         ValueError: `sim.BatchedRenderer` refuses the world or the tracer.
     """
 
-    eye: optics.Eye
-
     def __init__(self, world: World, eyes: Eyes, tracer: str = "auto") -> None:
         self.world, self.eyes = world, eyes
         mounts = ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))
@@ -47,9 +44,9 @@ class WorldScene(PreparedScene):
         self._reference = ReferencePose(world.model, bodies)
         self._turns = self._reference.poses.xmat[0, bodies]
 
-    def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
-        """See PreparedScene. Built-in layouts have no compound eyes."""
-        found = super().sampling(depth, tolerance)
+    def camera_sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
+        """Return `sampling` for eyes that are no compound eyes."""
+        found = self.sampling(depth, tolerance)
         assert not isinstance(found, OmmatidialSampling)
         return found
 

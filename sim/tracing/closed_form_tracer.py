@@ -109,7 +109,7 @@ class ClosedForm:
         irradiance = np.array([source.irradiance for source in self.lights]).reshape(-1, len(wavelengths))
         fewest = components_of if light == lighting.DIRECT else reflected_components_of
         medium = scene.medium
-        self.components = (fewest if medium is None else components_in_bands)(atlas.texels, irradiance)
+        self.components = (components_in_bands if scene.in_bands else fewest)(atlas.texels, irradiance)
         self.basis = self.components.basis
         self.medium = None if medium is None else MediumOnRays.from_bands(medium, self.basis)
         self.faces = face_rows(self.walls.uv, atlas, place)

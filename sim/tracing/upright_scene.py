@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from optics import BandMedium
+from sim.eyes.compound_eye import CompoundEye
 from sim.scene import bsdfs, shapes, surfaces
 from sim.scene.appearances import Appearance
 from sim.scene.variant import MitsubaObject
@@ -43,6 +44,7 @@ class UprightScene:
     variant: Mitsuba's variant
     bsdfs: BSDF of each geom, by id; geoms of equal appearance share one object
     medium: water or air in the eye's bands; None: clear air
+    in_bands: True if light is traced in the eye's bands, because the medium or the rays of ommatidia weight them
     """
 
     model: mujoco.MjModel
@@ -56,6 +58,7 @@ class UprightScene:
     settled: np.ndarray
     bsdfs: dict[int, MitsubaObject]
     medium: BandMedium | None
+    in_bands: bool
 
     @property
     def has_own(self) -> bool:
@@ -105,6 +108,7 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
         np.array([_keeps_height(model, data, geom) for geom in bodies], bool),
         same,
         scene.medium,
+        scene.medium is not None or isinstance(scene.eye, CompoundEye),
     )
 
 

@@ -71,8 +71,10 @@ ON_MODELS = {
             "noise_sigma": 0.5,
             "photon_budget": optics.PhotonBudget(1.0),
             "radius": 0.6,
+            "rows": 2,
         },
     ),
+    "hexagonal_rows": Walk(lambda **given: sim.hexagonal_rows(2, 4, 60.0, **given), {"acute_zone": 2.0}),
     "hexagonal_patch": Walk(
         lambda **given: sim.hexagonal_patch(1, 5.0, **given), {"azimuth_deg": 9.0, "elevation_deg": 9.0}
     ),

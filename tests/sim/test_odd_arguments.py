@@ -25,6 +25,8 @@ CALLS = {
         "photon_budget": None,
         "waveguide": None,
         "pupil_turned": False,
+        "ommatidium": None,
+        "acute_zone": 1.0,
     },
     "Fidelity": {"rays_per_receptor": 8, "bands": 4, "tolerance": None, "light": "direct", "samples": "rays"},
     "Mount": {
@@ -44,7 +46,9 @@ CALLS = {
         "noise_sigma": 0.01,
         "photon_budget": None,
         "radius": None,
+        "rows": None,
     },
+    "hexagonal_rows": {"rows": 2, "columns": 3, "fov_deg": 60.0, "acute_zone": 1.0},
     "hexagonal_patch": {"rings": 1, "interommatidial_deg": 5.0, "azimuth_deg": 0.0, "elevation_deg": 0.0},
     "whole_head": {"interommatidial_deg": 30.0},
     "View": VIEW | {"receptors": None, "rgb": None},

@@ -51,6 +51,7 @@ def met(**given):
         return observations, None if env.render_mode is None else env.render()
 
 
+FACET = optics.Ommatidium(optics.FacetLens(20e-6, 18e-6), optics.Waveguide(2e-6))
 SMALL_FAMILY = {"seed": 0, "n_training": 1, "n_selection": 1, "n_test": 1, "rows": 13, "columns": 21}
 FAMILY = sim.LayoutFamily(**SMALL_FAMILY)
 
@@ -108,6 +109,8 @@ IN_WORLDS = {
             "vertical_fov_deg": 30.0,
             "dynamics": optics.ReceptorDynamics(200.0),
             "density": optics.Fovea(10.0),
+            "ommatidium": FACET,
+            "acute_zone": With(2.0, {"ommatidium": FACET}),
         },
     ),
     "build_world": Walk(

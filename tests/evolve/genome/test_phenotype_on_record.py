@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from evolve.genome.genes import ALL_GENES
+from evolve.genome.genes import ALL_GENES, FACETS, TIME_CONSTANT
 from evolve.genome.genotype import Genotype
 from evolve.genome.interval import Interval
 from evolve.genome.phenotype import Phenotype, develop
@@ -73,5 +73,5 @@ def test_missing_and_unknown_fields_are_named():
         Phenotype.from_json({**animal, "wings": 2})
     with pytest.raises(TypeError, match="n_eyes"):
         Phenotype.from_json({name: value for name, value in animal.items() if name != "n_eyes"})
-    # Records of animals whose receptors have no memory are as before there was this gene.
-    assert set(animal) == set(NAMES) - {"time_constant_ms"}
+    # Records of animals without memory in their receptors, and with camera eyes, are as before these genes existed.
+    assert set(animal) == set(NAMES) - {TIME_CONSTANT, *FACETS}

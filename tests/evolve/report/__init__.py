@@ -13,7 +13,8 @@ hints: test_hints.py
 svg: test_theme.py, test_markup.py, test_report_page.py
 theme: test_theme.py
 eye_figures: test_eye_figures.py
-views: test_eye_figures.py
+facet_figures: test_facet_figures.py
+views: test_facet_figures.py, test_eye_figures.py
 picture: test_picture.py
 player: test_player.py
 picture_sheet: analysis/test_recorder.py

@@ -12,7 +12,8 @@ depth_layers: test_depth_layers.py
 allowed_error: test_allowed_error.py
 mounts: test_mounts.py
 viewing_directions: test_viewing_directions.py
-compound_eye: test_compound_eye.py, render/test_ommatidia.py
+hexagonal_rows: test_hexagonal_rows.py
+compound_eye: test_compound_eye.py, render/test_ommatidia.py, render/test_compound_eyes_of_agents.py
 ommatidial_sampling: test_compound_eye.py, render/test_ommatidia.py
 inside: test_mounts.py
 """

@@ -9,8 +9,21 @@ import numpy as np
 import pytest
 
 import sim
-from optics import Fovea, MaskMap, PhotonBudget, Pupil, ReceptorDynamics, Receptors, Waveguide, Zernike
+from optics import (
+    FacetLens,
+    Fovea,
+    MaskMap,
+    Ommatidium,
+    PhotonBudget,
+    Pupil,
+    ReceptorDynamics,
+    Receptors,
+    Waveguide,
+    Zernike,
+)
 from sim.eyes.eyes import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
+
+FACET = Ommatidium(FacetLens(20e-6, 18e-6), Waveguide(2e-6))
 
 
 def test_eyes_spread_evenly_from_left_to_right():
@@ -70,6 +83,8 @@ def test_cameras_of_a_world_are_the_eyes(n_eyes, first):
         ("fov_deg", 0),
         ("fov_deg", "wide"),
         ("noise_sigma", None),
+        ("acute_zone", 0.9),
+        ("acute_zone", 2.0),
     ],
 )
 def test_values_out_of_range_are_named(name, value):
@@ -77,7 +92,22 @@ def test_values_out_of_range_are_named(name, value):
         sim.Eyes(**{name: value})
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("optics", Pupil(50e-6)),
+        ("vertical_fov_deg", 30.0),
+        ("dynamics", ReceptorDynamics(adaptation="naka_rushton")),
+        ("density", Fovea(5.0)),
+    ],
+)
+def test_compound_eyes_have_no_parts_of_camera_eyes(name, value):
+    with pytest.raises(ValueError, match=f"Eyes: {name} = .*must be None for compound eyes"):
+        sim.Eyes(ommatidium=FACET, **{name: value})
+
+
 # Every field, a changed value, and the shape of the signals after the change.
+OF_KIND = {"lens": ("sensor_width", "waveguide", "pupil_turned"), "facets": ("acute_zone",)}
 CHANGES = {
     "n_eyes": (3, (3, 3, 4, 5)),
     "resolution": ((5, 4), (2, 3, 5, 4)),
@@ -94,6 +124,8 @@ CHANGES = {
     "vertical_fov_deg": (60.0, (2, 3, 4, 5)),
     "density": (Fovea(5.0), (2, 3, 4, 5)),
     "dynamics": (ReceptorDynamics(adaptation="naka_rushton"), (2, 3, 4, 5)),
+    "ommatidium": (FACET, (2, 3, 4, 5)),
+    "acute_zone": (2.0, (2, 3, 4, 5)),
 }
 
 
@@ -103,23 +135,23 @@ def test_every_field_moves_what_is_seen(field):
     matters behind a lens of fixed focal length.)
     """
     value, shape = CHANGES[field]
-    behind_a_lens = field in ("sensor_width", "waveguide", "pupil_turned")
-    before = _settled(behind_a_lens)
-    after = _seen(sim.Eyes(**{**_given(behind_a_lens), field: value}))
+    kind = next((kind for kind, fields in OF_KIND.items() if field in fields), "perfect")
+    before = _settled(kind)
+    after = _seen(sim.Eyes(**{**_given(kind), field: value}))
     assert after.shape == shape
     assert not np.array_equal(before, after)
 
 
-def _given(behind_a_lens):
+def _given(kind):
     coma = Zernike({(3, -1): 0.2})
-    lens = {"optics": Pupil(50e-6, thin_lens_focal_length=240e-6, wavefront=coma)} if behind_a_lens else {}
-    return {"resolution": (4, 5), **lens}
+    lens = {"optics": Pupil(50e-6, thin_lens_focal_length=240e-6, wavefront=coma)}
+    return {"resolution": (4, 5), **{"lens": lens, "facets": {"ommatidium": FACET}, "perfect": {}}[kind]}
 
 
 @cache
-def _settled(behind_a_lens):
+def _settled(kind):
     """Return the signals before the change, after checking that they are reproducible."""
-    first, again = (_seen(sim.Eyes(**_given(behind_a_lens))) for _ in range(2))
+    first, again = (_seen(sim.Eyes(**_given(kind))) for _ in range(2))
     assert np.array_equal(first, again)
     first.flags.writeable = False
     return first
