@@ -44,8 +44,11 @@ from tests.parameter_outputs import (
     views,
 )
 
-# One training run of two updates and one evaluation episode, through a perfect lens.
+# One training run of two updates and one evaluation episode. The preset freezes the field of view, which is open here.
 SMALL = (
+    "eye.relief_symmetric=false",
+    "genome.doe.open=false",
+    "genome.fov_deg.open=true",
     "learning.n_envs=4",
     "learning.n_steps=8",
     "learning.total_steps=64",

@@ -20,8 +20,9 @@ Tree = dict[str, Any]
 def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
     """Return the settings `tree` with start values for the number of relief genes that these eyes have.
 
-    If `tree` contains start values of all 4 x 4 genes and the eyes have more genes, the values are converted to the
-    same surface with more genes. If reliefs are symmetric, start values that follow from others are removed.
+    If `tree` contains start values of all 4 x 4 genes, or of all genes of a symmetric relief of 4 x 4 points, and the
+    eyes have more genes, the values are converted to the same surface with more genes. If reliefs are symmetric, start
+    values that follow from others are removed.
 
     Raises:
         ConfigError: `tree` contains start values for more than 4 x 4 genes, but the eyes have another number of genes.
@@ -34,10 +35,12 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
             f"must be {side}",
             "eye.relief_points",
         )
-    if side == PATCH < eye.relief_points:
-        finer = refined(np.array([genes[name]["start"] for name in doe_names(PATCH)]), eye.relief_points)
+    given = next((names for names in _patches(eye) if set(names) == _with_start(genes)), None)
+    if given is not None and eye.relief_points > PATCH:
+        finer = refined(np.array([genes[name]["start"] for name in given]), eye.relief_points)
+        exist = set(representatives(eye.relief_points, given != doe_names(PATCH)))
         starts = {name: {**genes.get(name, {}), "start": float(u)} for name, u in zip(names, finer, strict=True)}
-        genes = {**genes, **starts}
+        genes = {**genes, **{name: use for name, use in starts.items() if name in exist}}
     if eye.relief_symmetric and all("start" in genes.get(name, {}) for name in names):
         own = dict(zip(names, representatives(eye.relief_points, True), strict=True))
         images = {name for name in names if own[name] != name and _same(genes[name], genes[own[name]])}
@@ -45,10 +48,19 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
     return {**tree, "genome": genes} if genes else tree
 
 
+def _patches(eye: EyeConfig) -> list[list[str]]:
+    """Return the names of the genes of 4 x 4 heights: all of them, or only those of a symmetric relief."""
+    return [representatives(PATCH, symmetric) for symmetric in (False, True)[: 1 + eye.relief_symmetric]]
+
+
 def _spelled_out(genes: Tree) -> int:
     """Return N if exactly the relief genes of an N x N square have start values, else 0."""
-    given = {name for name, use in genes.items() if name.startswith("doe_") and "start" in use}
+    given = _with_start(genes)
     return next((side for side in range(PATCH, int(RELIEF_POINTS.high) + 1) if given == set(doe_names(side))), 0)
+
+
+def _with_start(genes: Tree) -> set[str]:
+    return {name for name, use in genes.items() if name.startswith("doe_") and "start" in use}
 
 
 def _same(one: Tree, other: Tree) -> bool:

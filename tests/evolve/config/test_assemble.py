@@ -33,7 +33,7 @@ def test_written_config_needs_no_defaults(tmp_path):
 def test_later_sources_win(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("[search]\npopulation = 5\ngenerations = 9\n")
-    assert assemble("detection", "quick").search.population == 6
+    assert assemble("detection", "quick").search.population == 8
     both = assemble("detection", "quick", file, ["search.generations=2"])
     assert (both.search.population, both.search.generations) == (5, 2)
     assert both.learning.total_steps == assemble("detection", "quick").learning.total_steps

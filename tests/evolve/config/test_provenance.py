@@ -49,7 +49,7 @@ def test_contradiction_names_every_place_that_made_it(tmp_path):
     with pytest.raises(ConfigError, match="open, but low = 20 is not below high = 20") as caught:
         assemble("detection", file=tmp_path / "mine.toml", assignments=["genome.fov_deg.high=20"])
     assert str(caught.value).endswith("mine.toml, line 3; --set genome.fov_deg.high=20)")
-    (tmp_path / "mine.toml").write_text("[genome.fov_deg]\n\nopens_at = 5\n")
+    (tmp_path / "mine.toml").write_text("[genome.n_eyes]\n\nopens_at = 5\n")
     with pytest.raises(
         ConfigError, match=r"must be below search\.generations = 5.*mine\.toml, line 3; preset quick, line"
     ):

@@ -33,7 +33,7 @@ def test_eyes_that_are_not_square_have_the_genes_they_had():
 
 def test_what_was_said_alike_of_both_sides_holds_for_a_square_eye():
     quick = assemble("detection", "quick", assignments=[SQUARE])
-    assert develop(Genotype(quick.genome).start, quick).resolution == (6, 6)
+    assert develop(Genotype(quick.genome).start, quick).resolution == (8, 8)
     larger = assemble("detection", "quick", assignments=[SQUARE, "genome.resolution.start=12"])
     assert develop(Genotype(larger.genome).start, larger).resolution == (12, 12)
     # this preset freezes the cluster and opens both sides

@@ -13,7 +13,6 @@ from evolve.config.run_config import TASKS
 from evolve.genome.genes import ALL_GENES, APERTURE_SHAPES, LAMBDA_MAX
 from evolve.genome.genotype import CLUSTERS, GENES, Genotype, group_members
 from evolve.genome.phenotype import Phenotype, develop
-from optics import BSplineRelief
 from tests.slow_part import sweep
 
 CONFIG = assemble("detection")
@@ -112,21 +111,6 @@ def test_animals_on_record_that_name_no_encoder_have_one_of_16():
     assert Phenotype.from_json(record).encoder == 1
     del record["encoder"]
     assert Phenotype.from_json(record).encoder == 16
-
-
-def test_quick_preset_starts_behind_a_lens_in_focus():
-    """The relief at the start agrees with the paraboloid h0 - r²/(2 f (n - 1)) to a quarter wave of optical path over
-    the pupil (Rayleigh's criterion).
-    """
-    config = assemble("detection", "quick")
-    animal = develop(Genotype(config.genome).start, config)
-    eyes = animal.eyes(config.eye)
-    radius, focal_length = eyes.optics.aperture_radius, eyes.eye().sensor_distance
-    ideal = BSplineRelief.paraboloid(0.0, 1 / (focal_length * (animal.refractive_index - 1)), radius)
-    difference = eyes.optics.height.control_points - ideal.control_points
-    # A B-spline lies within the convex hull of its control points.
-    path_error = (animal.refractive_index - 1) * np.ptp(difference) / 2
-    assert path_error < 550e-9 / 4
 
 
 def test_there_are_more_than_1e20_genotypes_and_a_tenth_of_a_range_makes_another_animal():
