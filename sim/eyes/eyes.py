@@ -178,15 +178,9 @@ class Eyes:
 
     def with_perfect_lens(self) -> Eyes:
         """Return camera eyes behind a perfect lens, with the same receptors and fields of view."""
-        plain: dict[str, Any] = {
-            "optics": None,
-            "waveguide": None,
-            "pupil_turned": False,
-            "ommatidium": None,
-            "acute_zone": 1.0,
-        }
         vertical = self.vertical_fov_deg if self.ommatidium is None else self.fovy_deg
-        return replace(self, **plain, vertical_fov_deg=vertical)
+        camera = replace(self, ommatidium=None, acute_zone=1.0, vertical_fov_deg=vertical)
+        return replace(camera, optics=None, waveguide=None, pupil_turned=False)
 
     def _check_waveguide(self) -> None:
         from optics.eye.geometry import receptor_size

@@ -32,6 +32,7 @@ BALL = Path(__file__).parents[3] / "examples" / "find_ball.py"
 SMALL = (
     *("learning.n_envs=8", "learning.n_steps=16", "learning.total_steps=256", "learning.batch_size=64"),
     *("learning.n_epochs=2", "learning.eval_interval=128", "evaluation.episodes=3", "eye.optics=false"),
+    "genome.n_eyes.start=2",
 )
 
 
