@@ -111,7 +111,7 @@ def _require_owner(found: Any, owner: Mapping[str, Any]) -> None:
 
 
 def _end(content: bytes) -> int:
-    """Return the end of a file's header; a damaged length may exceed the file."""
+    """Return the position [bytes] at which a file's header ends; with a damaged length, it may lie beyond the file."""
     return LENGTH_BYTES + int.from_bytes(content[:LENGTH_BYTES], "little")
 
 

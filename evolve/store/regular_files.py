@@ -38,7 +38,10 @@ _FLAGS = {"rb": os.O_RDONLY, "r+b": os.O_RDWR, "ab": os.O_WRONLY | os.O_APPEND}
 
 
 class StrangeFileError(OSError):
-    """A path is not a regular file, or not a folder, as it must be; `strerror` and `filename` give details."""
+    """A path is not the regular file or folder that it must be, or a file is too large or has several hard links.
+
+    `strerror` and `filename` give details.
+    """
 
 
 def opened(path: Path, mode: Literal["rb", "r+b", "ab"] = "rb", create: bool = False) -> BinaryIO:

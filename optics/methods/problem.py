@@ -180,7 +180,7 @@ class Problem:
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
-        """Return the aperture with nodes in the cells between knots, for derivatives; None for too many cells.
+        """Return the aperture, divided at the knots of splines into cells with nodes for derivatives; None if too many.
 
         band: highest frequency [1/m] in the pupil's plane of the light that must be resolved. None: the light that
             arrives at any point of the window, as in `turning`.

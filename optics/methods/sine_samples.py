@@ -55,7 +55,7 @@ class SineSamples:
 
     @property
     def at(self) -> np.ndarray:
-        """Positions along either axis: sines minus the sines of the pupil's centre."""
+        """Coordinates of the samples along either axis: direction sines of their rays, minus the centre's."""
         return self.grid.x
 
     @property

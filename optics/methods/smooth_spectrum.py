@@ -200,7 +200,7 @@ def _samples(outermost: float, pitch: float) -> Grid:
 
 
 def _third_derivative(problem: Problem) -> float:
-    """Return the largest third derivative of the waves behind the pupil [1/m³], at least one per cubed radius."""
+    """Return the largest third derivative of the phase behind the pupil, in cycles [1/m³], or 1/radius³ if larger."""
     slopes = problem.slopes
     along = slopes.along_x / problem.light.wavelength, slopes.along_y / problem.light.wavelength
     xx, yy = _gradient(along[0], slopes.grid.dx)[0], _gradient(along[1], slopes.grid.dx)[1]

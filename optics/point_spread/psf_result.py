@@ -49,8 +49,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
         that arrives there; evanescent light, for example, does not. The PSF is never renormalised.
     plans: one plan per wavelength; `plan` is the least accurate one.
-    requests: one request per wavelength, from which measures recompute the PSF; empty if `psf` did not compute it.
-    shares: weights of a mean over wavelengths, (request,), see `mean`. None: there is one PSF per request.
+    requests: one per wavelength, also of a mean; measures recompute the PSF from them (empty for PSFs not from `psf`).
+    shares: weight of each request in a mean over wavelengths (see `mean`), (request,). None: it is not a mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
         derivatives; None unless `psf` was called with field=True. The amplitude includes the carrier exp(ikz), and its
         squared modulus is the PSF. `field` is the same as one complex NumPy array.

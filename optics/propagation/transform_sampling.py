@@ -218,7 +218,8 @@ def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
 def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
     """Return the amplitude of the blur in the sampling `roomier`, which has more padding, relative to that in `how`.
 
-    It is assumed that the power at the Nyquist frequency is the same for all frequencies along the other axis.
+    It is assumed that the power at the Nyquist frequency along one axis does not depend on the frequency along the
+    other axis.
     """
     power, left = (sum(float(_blur_weights(sampling, axis).sum()) for axis in (0, 1)) for sampling in (how, roomier))
     return math.sqrt(left / power) if power else 1.0

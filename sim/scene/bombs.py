@@ -36,7 +36,7 @@ def require_modest(text: str, name: str) -> None:
     """Refuse MJCF that exceeds the memory of a computer. Text that is not XML is ignored here; MuJoCo refuses it.
 
     Raises:
-        ValueError: there are too many elements or cells; one line names them.
+        ValueError: there are too many elements, or too many cells in a height field. The message states their number.
     """
     try:
         root = ElementTree.fromstring(text)
@@ -58,7 +58,7 @@ def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset
     Every existing file that it names must be a regular file, since MuJoCo would wait for a pipe forever.
 
     Raises:
-        ValueError: there are too many elements or cells, or a file is not regular; one line names them.
+        ValueError: there are too many elements or cells, or a file is not regular. The message names the cause.
     """
     text = path.read_text(encoding="utf-8", errors="replace")
     require_modest(text, name)

@@ -1,7 +1,7 @@
 """NumPy arrays in aligned memory that kernels can read.
 
-Dr.Jit compiles a kernel again for every alignment of its inputs. It also records a frozen kernel again if the alignment
-of any existing shape's arrays differs, even in another scene.
+Dr.Jit compiles a kernel again for every alignment of its inputs. It also records a frozen kernel again if the arrays of
+any Mitsuba shape in memory, even in another scene, have another alignment than when the kernel was recorded.
 """
 
 from __future__ import annotations

@@ -277,7 +277,7 @@ class AreaTracer:
 
 
 def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) -> list[Array]:
-    """Divide light from the distance 1 / inverse_distance along the eye's axis among depth layers."""
+    """Divide light among depth layers. It comes from the distance 1 / inverse_distance along the eye's axis."""
     if depth.count == 1:
         return light
     return [share * component for share in depth.shares(inverse_distance) for component in light]

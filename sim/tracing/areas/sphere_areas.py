@@ -150,8 +150,8 @@ class _Outline:
     closed: True if the outline is an ellipse, which the other fields describe
     middle: middle of the ellipse, across and along the area
     half: half of the ellipse's width across the area, and half of the chord through its middle along the area
-    slant: shift of chords along the area per unit of position across it
-    low, high: angles at which the area cuts the ellipse off
+    slant: shift of the ellipse's middle along the area per unit of position across it (0: the ellipse is not tilted)
+    low, high: values of the ellipse's parameter, an angle, at which the area's edges cut the ellipse off
     """
 
     closed: Array

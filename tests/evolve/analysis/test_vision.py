@@ -13,8 +13,8 @@ from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from optics.numerics import backend
 
-EIGHT = ["genome.resolution.start=8"]
-CONFIG = assemble("detection", "quick", assignments=EIGHT)
+FOCUS = ["genome.doe_11.start=0.931"]  # the preset starts out of focus
+CONFIG = assemble("detection", "quick", assignments=FOCUS)
 
 
 @pytest.fixture(scope="module")

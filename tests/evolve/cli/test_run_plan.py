@@ -89,17 +89,26 @@ def test_the_exported_episode_is_the_recorded_one():
 def test_dry_run_prints_the_plan_and_begins_nothing(tmp_path, paced, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     late = ["--set", "genome.optical.opens_at=1", "--set", "genome.n_eyes.open=false"]
-    late += ["--set", "genome.doe.open=true", "--set", "learning.total_steps=100_000"]
+    late += [
+        "--set",
+        "eye.relief_symmetric=false",
+        "--set",
+        "genome.doe.open=true",
+        "--set",
+        "learning.total_steps=100_000",
+    ]
+    frozen = ("fov_deg", "relative_aperture", "refractive_index", "doe_00", "doe_01")  # by the preset
+    late += [part for name in frozen for part in ("--set", f"genome.{name}.open=true")]
     assert main(["run", "detection", "--preset", "quick", "--dry-run", *late]) == 0
     out = capsys.readouterr().out
-    assert "5 generations x 6 candidates = 30" in out
+    assert "5 generations x 8 candidates = 40" in out
     assert "optical from generation 1: relative_aperture, refractive_index, doe_00 … doe_33 (16)" in out
     assert "21 of 32" in out
     assert main(["run", "detection", "--preset", "quick", "--dry-run", "--json", *late]) == 0
     plan = json.loads(capsys.readouterr().out)
-    assert plan["evaluations"] == 30
-    assert plan["steps"] == 30 * 102_400
-    assert "up to 102,400 (100,000 rounded up to rollouts of 4,096) each, 3,072,000 in all" in out
+    assert plan["evaluations"] == 40
+    assert plan["steps"] == 40 * 102_400
+    assert "up to 102,400 (100,000 rounded up to rollouts of 4,096) each, 4,096,000 in all" in out
     assert plan["genes"]["doe_00"] == 1
     assert plan["hours"].keys() == {"start", "middle"}
     assert list(tmp_path.iterdir()) == []
