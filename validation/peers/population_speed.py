@@ -14,9 +14,9 @@ nodes, which is accurate to 1e-5. The table states the median and the largest er
 **Table.** `psf_batch` runs with five tolerances and `psf` with three. The peers run with 32 to 256 samples across the
 pupil. The second table is for the design of lenses. The pupils have a radius of 1 mm, a focal length of 10 mm, and a
 map of heights or Zernike modes. A map of heights is a smooth map plus random deviations with the stated standard
-deviation ("noise"). The table states CPU times of single PSFs, without and with the gradient with respect to all heights or
-coefficients, and the predicted and the actual error of the PSF. The last two columns state the time and the error of a
-matrix Fourier transform in NumPy. Unlike `optics`, it does not predict its error.
+deviation ("noise"). The table states CPU times of single PSFs, without and with the gradient with respect to all
+heights or coefficients, and the predicted and the actual error of the PSF. The last two columns state the time and the
+error of a matrix Fourier transform in NumPy. Unlike `optics`, it does not predict its error.
 
 **Limits.** The other codes cannot share a plan between the eyes of a population. Unlike `optics.psf`, they also have no
 exact propagator whose output grid can be chosen freely. Their matrix Fourier transform from the pupil to the focal
