@@ -72,7 +72,7 @@ def test_bad_arguments_are_named(stages, arguments, reason):
 
 def test_stages_use_the_trials_and_sampling_of_their_scene(stages, monkeypatch):
     scene = SimpleNamespace(
-        world="world", eyes=EYES, eye=EYES.eye(), sampling=lambda depth, allowed: ("sampling", depth, allowed)
+        world="world", eyes=EYES, eye=EYES.eye(), camera_sampling=lambda depth, allowed: ("sampling", depth, allowed)
     )
     one, trials = WorldStages(scene, 0.2), ("trials", scene)
     for name in ("own_bands", "depth", "light"):
