@@ -83,8 +83,10 @@ def test_a_silent_cluster_ends_the_run_which_can_be_resumed(tmp_path, cluster, c
     assert time.monotonic() - began < 12 * PATIENCE_S
     assert f"waited 6 s for {missing}" in str(caught.value)
     assert str(caught.value).count("\n") == 0
-    assert any(f"waiting for {missing}" in note for note in notes)
-    assert len(notes) == 1
+    # The last signs of two workers may be seconds apart: then the run gives up one before it ends for the other.
+    waits = [note for note in notes if "has given no sign of life" not in note]
+    assert [f"waiting for {missing}" in note for note in waits] == [True]
+    assert len(notes) - len(waits) <= (missing == "a heartbeat of worker")
     said = capfd.readouterr()
     assert said.out + said.err == ""
     assert after <= len(Run.open(run.path).candidates) < config.candidates
