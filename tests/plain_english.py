@@ -17,16 +17,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from tests.sources import ROOT, tree
-
+ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("optics", "sim", "evolve", "rhabdom", "validation", "experiments", "examples", "tests")
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "docs")
 CODE = tuple(
     re.compile(pattern, flags) for pattern, flags in ((r"```.*?```", re.S), (r"^\|.*$", re.M), (r"`[^`]*`", 0))
 )
 LINK = re.compile(r"\]\([^)]*\)")
-# Strings are matched too, so that a "#" in a string does not count as a comment. Python's tokenizer takes eighteen times
-# as long.
+# Strings are matched too, so that a "#" in a string does not count as a comment. Python's tokenizer takes 18 times as
+# long.
 STRING_OR_COMMENT = re.compile(
     r'''"{3}[^"\\]*(?:(?:\\.|"(?!""))[^"\\]*)*"{3}|"[^"\\]*(?:\\.[^"\\]*)*"'''
     r"""|'{3}[^'\\]*(?:(?:\\.|'(?!''))[^'\\]*)*'{3}|'[^'\\]*(?:\\.[^'\\]*)*'|(?P<comment>\#[^\n]*)""",
@@ -95,13 +94,13 @@ def document(path: Path) -> Text:
 
 def texts_in(path: Path) -> Iterator[Text]:
     """Docstrings, comments and messages of a Python file."""
-    for node in ast.walk(tree(path)):
+    source = path.read_text(encoding="utf-8")
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             if text := ast.get_docstring(node):
                 yield Text("docstring", path, getattr(node, "lineno", 1), _without_code(text))
         elif message := _message(node):
             yield Text("message", path, getattr(node, "lineno", 1), message)
-    source = path.read_text(encoding="utf-8")
     for found in STRING_OR_COMMENT.finditer(source):
         comment = found["comment"]
         if comment and not re.match(r"#\s*(noqa|type:|ruff:|!)", comment):

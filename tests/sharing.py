@@ -16,7 +16,6 @@ SHARING = {
     "a run and an episode": ("tests/evolve/analysis/test_episode.py", "tests/evolve/cli/test_products.py"),
     "the sources, parsed": (
         *("tests/test_architecture.py", "tests/test_conventions.py", "tests/rhabdom/test_dependencies.py"),
-        "tests/test_plain_english.py",
         *("tests/test_docs.py::test_paths", "tests/test_docs.py::test_names"),
     ),
     "the built site": tuple(f"tests/test_docs.py::test_{name}" for name in ("site", "menus", "reference")),
