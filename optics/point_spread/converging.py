@@ -109,11 +109,13 @@ class Converging(ReadOnlyArrays):
         return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "confirmed by a check against the direct sum")
 
     def _crossed(self, scalar: np.ndarray, window: Grid) -> float:
-        """Return the error of field components to which both planes of polarisation contribute.
+        """Return the error of field components to which light of both planes of polarisation contributes.
 
         A check of a single plane of polarisation does not detect this error. It results from the approximation that the
-        path has the same curvature for the whole pupil. Only the light that rotated rays contribute to the other
-        component interferes. Its fraction is the squared sine of the steepest ray.
+        path has the same curvature for the whole pupil. Only light whose polarisation rotates with its ray contributes
+        to the other component. The fraction of this light is the squared sine of the steepest ray.
+
+        scalar: scalar field over the window, (y, x).
         """
         z, bright = number(self.beam.distance), np.abs(scalar) ** 2
         off = np.add.outer((window.y - self.image[1]) ** 2, (window.x - self.image[0]) ** 2)

@@ -165,7 +165,7 @@ def _finer_detail(beam: Beam, problem: Problem) -> float:
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the flat indices of the points to compare, and the probability with which each was drawn.
 
-    They are drawn at even steps of the cumulative probability, so that no likely point is omitted.
+    The points are drawn at even steps of the cumulative probability, so that no likely point is omitted.
     """
     # If there are few points, each is compared once.
     even = np.full(points, 1 / points)
@@ -197,6 +197,7 @@ def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarra
 
 
 def _at_points(beam: Beam, problem: Problem, reference: _DirectSum, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the exact PSF [1/m²] at points (x, y) [m], (point,)."""
     import drjit as dr
 
     types = precision("float64")
@@ -268,7 +269,7 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of points to sides and corners, and the part of their probabilities that no PSF affects.
+    """Return the nearness of points to sides and corners, and the probabilities that do not depend on the PSF.
 
     Both are flat arrays. The second one is the sum of three of the distributions that `_chances` lists.
 
