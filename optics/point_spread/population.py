@@ -5,11 +5,10 @@ window's centre,
 
     U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²).
 
-P is the light behind the pupil. Π is the product over both axes, and c² is z² + ξ² along an axis, plus the mean squares
-of the other coordinates. Positions are in units of the radius, so all pupils share the soft edge and the positions of
-samples. They also share the values of B-splines (for reliefs) and powers (for Zernike polynomials) there. Changes of
-the slow factor's phase over the window are neglected. The resulting error is predicted for each PSF from its own light.
-If it exceeds the tolerance, `optics.psf` computes the PSF instead.
+P is the light behind the pupil. Π is the product over both axes. Along an axis, c² is z² + ξ², plus the mean squares of
+the other coordinates. In units of the radius, all pupils share the soft edge and the positions of samples, with the
+values of B-splines (for reliefs) and powers (for Zernike polynomials). Changes of the slow factor's phase over the
+window cause an error, which is predicted for each PSF. If it exceeds the tolerance, `optics.psf` computes the PSF.
 """
 
 from __future__ import annotations
