@@ -155,6 +155,7 @@ def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, t
 
 
 def _read(part: Array, ahead: Array, behind: Array, there: Array) -> Parts:
+    """Return the elements at the indices `ahead`, with 0 outside the mask `there`, and those at `behind`."""
     import drjit as dr
 
     return dr.gather(type(part), part, ahead, there), dr.gather(type(part), part, behind)
