@@ -50,9 +50,9 @@ def strips(
         for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
             if not (end > start).any():
                 continue
-            u, share = gauss_legendre(gauss_legendre_count(cycles * float((end - start).max()), digits + 0.3, degree))
+            u, across = gauss_legendre(gauss_legendre_count(cycles * float((end - start).max()), digits + 0.3, degree))
             x = start[:, None] + (end - start)[:, None] * u
-            size = (weight * (end - start))[:, None] * share
+            size = (weight * (end - start))[:, None] * across
             yield x.ravel(), np.broadcast_to(y[:, None], x.shape).ravel(), size.ravel()
 
 

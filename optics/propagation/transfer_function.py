@@ -160,8 +160,8 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
     error is of the order of the cell's width squared.
     """
     f = np.fft.fftfreq(samples) * wavelength / dx
-    share: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
-    return share
+    fraction: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
+    return fraction
 
 
 @lru_cache(maxsize=8)
