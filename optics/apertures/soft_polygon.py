@@ -113,9 +113,10 @@ class _Line:
     def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
         """Return the contribution W(d, s) of a line from its foot to the distance s.
 
-        near: mask of the points with the line within the kernel's reach.
-        half, chord: half the length of the chord within the reach, and half of its contribution, which is 0 without a
-            chord.
+        near: whether the line's distance from each point is less than the kernel's reach, so that the disc of this
+            radius around the point contains a chord of the line.
+        half: half the length of the chord.
+        chord: contribution of half the chord; 0 if there is no chord.
         """
         import drjit as dr
 

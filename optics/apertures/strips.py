@@ -57,9 +57,9 @@ def strips(
 
 
 def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Return the ends of panels, which become shorter towards the top or bottom of a circle.
+    """Return the ends of panels that become shorter towards the top or bottom of a circle.
 
-    The length of a chord changes there like a square root, which polynomials do not approximate.
+    At the top and the bottom, the length of a chord changes like a square root, which polynomials do not approximate.
     """
     more = []
     for at in tangent:

@@ -90,8 +90,8 @@ class SphericalIndex:
     def _along(self, h: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return values at quadrature nodes along rays of relative height h, (*h.shape, node).
 
-        The values are y = √(r² - a²), where a is the radius of the turning point, the upper end of y (with the shape of
-        h), n, n at the turning point, and √(n² r² - h²).
+        The five values are y = √(r² - a²), where a is the radius of the ray's turning point; the largest y, √(1 - a²),
+        with the shape of h; the index n(r); the index n(a); and √(n² r² - h²).
         """
         turn = self._turning_point(h)
         end, least = np.sqrt(1 - turn), self.index(turn)[..., None]

@@ -134,9 +134,9 @@ def _nodes(problem: Problem, count: int) -> WindowNodes:
 
 
 def _step(error: float) -> float:
-    """Return the phase step [rad] between samples of a unit wave at which eight-point interpolation has this error.
+    """Return the phase step [rad] between samples of a unit wave for this error of eight-point Lagrange interpolation.
 
-    The result is at most 1.5. The interpolation is that of Lagrange.
+    The step is at most 1.5.
     """
     return min(1.5, (error / LAGRANGE_8) ** 0.125)
 

@@ -189,8 +189,8 @@ class SmoothPupil:
         """Return the integral of each Gaussian over the aperture, complex (point,).
 
         Each side that is near contributes one factor. Where the relief is steep, only light that one side diffracts
-        remains, and this light comes from the side itself. All other factors are then those of the conditional
-        Gaussian along this side.
+        remains. This light comes from points on this side, so the factors of all other sides are computed for the
+        conditional Gaussian along this side.
 
         inner: Gaussians of the points.
         x, y: positions of the points, in radii.

@@ -106,7 +106,7 @@ class SmoothSpectrum(SpectrumSampling):
     def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
         """Return the transfer function to the window, divided by the spectrum of both Gaussians, complex (fy, fx).
 
-        It is even, so the result contains only frequencies from 0 on.
+        The function is even along both axes, so only its values at non-negative frequencies are returned.
         """
         found = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
         exponent = 2 * math.pi**2 * (self.smooth.width**2 + self.blur**2)
@@ -192,9 +192,10 @@ def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
 
 
 def _pitch(band: float, width: float, tolerance: float) -> float:
-    """Return the sampling pitch [m] for a band [1/m] of light that is convolved with a Gaussian of this width [m].
+    """Return the sampling pitch [m] for light that is convolved with a Gaussian of this width [m].
 
-    The Gaussian attenuates light that is aliased onto the band more than light in the band.
+    Sampling aliases the frequency 1/pitch - band onto the edge of the band [1/m]. The pitch is the one for which the
+    Gaussian attenuates the aliased light by the factor ALIASED * tolerance relative to the light at the edge.
     """
     exponent = math.log(1 / (ALIASED * tolerance))
     return 1 / (band + math.sqrt(band**2 + exponent / (2 * (math.pi * width) ** 2)))

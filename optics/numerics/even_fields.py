@@ -56,7 +56,7 @@ def _cosines(
 ) -> Array:
     """Return the matrix (k, j) of the cosines with which samples contribute to frequencies, both counted from 0.
 
-    The entry contains the contribution of sample j and that of its mirror image.
+    An entry is the contribution of sample j plus that of its mirror image.
 
     first, count: first sample j and number of samples. None: all samples from `first` on.
     """

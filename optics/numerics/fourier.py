@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 LONGEST_FFT = 2**31
-SUM_ARRAYS = 4  # number of real arrays that each complex array of a sum needs: two parts, each with a temporary array
+SUM_ARRAYS = 4  # real arrays that each complex array of a sum needs: two parts, each with a temporary array
 AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a megabyte), and fewest lines
 
 
@@ -150,7 +150,7 @@ def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int,
 
 
 def kept_indices(across: int) -> np.ndarray:
-    """Return the `across` indices nearest 0 in FFT order: 0, 1, …, -2, -1. They are the same for every period."""
+    """Return the `across` indices nearest 0 in FFT order, 0, 1, …, -2, -1, where -1 is the last sample of a period."""
     kept = np.arange(across) - across // 2
     return np.roll(kept, -(across // 2))
 

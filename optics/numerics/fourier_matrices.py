@@ -113,7 +113,7 @@ def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[li
     """Return the sums and the differences of rows j and -j, after the sum along x.
 
     across: sums along x in the form that `_both_sides` combines.
-    size: number of rows, and of results in each.
+    size: number of rows j and number of results along x.
     """
     ny, mx = size
     shape = ny // 2 + 1, mx

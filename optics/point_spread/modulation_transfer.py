@@ -140,8 +140,8 @@ class MTF(ReadOnlyArrays):
     def _at_nyquist(self) -> np.ndarray:
         """Root mean square of the contrasts at the highest frequencies along each axis, (wavelength,).
 
-        Contrasts beyond these frequencies are of this size, and are aliased. Behind pupils about a wavelength wide,
-        contrasts do not end sharply at the cutoff.
+        Contrasts beyond these frequencies are aliased, and are assumed to be of this size. They exist because the
+        contrasts of pupils about a wavelength wide do not end sharply at the cutoff.
         """
         rim = np.concatenate([self.mtf[:, 0], self.mtf[:, :, 0]], axis=1)
         found: np.ndarray = np.sqrt(np.mean(np.square(rim), axis=1))

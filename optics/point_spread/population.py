@@ -281,7 +281,7 @@ def _rings(window: Grid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _spread(stack: _Stack, window: Grid) -> np.ndarray:
-    """Return the spread [rad] of the slow factor's phase over the pupil, at each ring's outer end, (member, ring)."""
+    """Return the spread [rad] over the pupil of the slow factor's phase at each ring's outer end, (member, ring)."""
     turns = (np.arange(40) + 0.5) * (math.sqrt(5) - 1) / 2
     r = np.sqrt((np.arange(40) + 0.5) / 40)
     xi = stack.radius[:, 0, :, None].astype(np.float64) * (r * np.exp(2j * np.pi * turns))

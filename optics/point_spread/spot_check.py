@@ -106,8 +106,9 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
 def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> float:
     """Return the relative error of the intensity that the direct sum itself has.
 
-    It has two causes. The quadrature has `digits` digits relative to the amplitude of all light in phase, and the
-    relative error of the intensity is twice that of the amplitude. The other cause is the rounding of paths.
+    It has two causes. The first is the quadrature, whose error is 10^-digits times the amplitude that all light would
+    have in phase; the relative error of the intensity is twice that of the amplitude. The second is the rounding of
+    paths.
     """
     return 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
 
