@@ -160,9 +160,9 @@ def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
 
 
 def _near_segment(by_axis: list[np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) that lie within a segment's range along one axis, the one along which it is shorter.
+    """Return the points (n, 2) near a segment: those within the smaller of its two ranges, of x or of y.
 
-    by_axis: all points sorted by x, and sorted by y.
+    by_axis: all points sorted by x, and all points sorted by y.
     """
     axis = int(abs(end[1] - start[1]) < abs(end[0] - start[0]))
     low, high = sorted((start[axis], end[axis]))

@@ -89,7 +89,7 @@ def _arcs_share(edge: SoftEdge, arcs: np.ndarray, x: Array, y: Array, types: Pre
 class _Arc:
     """Contribution of arcs to the transmittance.
 
-    Arcs run counterclockwise around their centre. Points (x, y) are relative to it.
+    Arcs run counterclockwise around their centre. Points (x, y) are relative to the centre.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:

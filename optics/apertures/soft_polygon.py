@@ -81,9 +81,9 @@ class _Line:
     The piece extends from the foot of the perpendicular from the point to a distance s along the line. d is the signed
     length of the perpendicular.
 
-    Parts of the line beyond the kernel's reach contribute the angle that they subtend. If the line passes through the
-    reach, the whole chord contributes a value tabulated for a half-plane. A piece that ends within the reach
-    contributes ∫ d H(r) dt.
+    The kernel covers a disc around the point, whose radius is the kernel's reach. Parts of the line outside this disc
+    contribute the angle that they subtend. If the piece ends outside, the chord within the disc contributes a value
+    tabulated for a half-plane. A piece that ends within the disc contributes ∫ d H(r) dt.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:

@@ -162,10 +162,10 @@ def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 
 def _oval(corners: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return a polygon around the corners with the area of an oval, and the oval's relative residual.
+    """Return a polygon with the area of an oval around the corners of a hull, and the relative residual of the fit.
 
-    The oval is an ellipse whose radius is multiplied by a Fourier series of the angle: the image of a round stop is an
-    ellipse only to first order. The residual is infinite if the best conic is not an ellipse.
+    The oval is an ellipse whose radius is multiplied by a Fourier series of the angle, because the image of a round
+    stop is an ellipse only to first order. The residual is infinite if the best conic is not an ellipse.
     """
     origin = corners.mean(axis=0)
     x, y = (corners - origin).T

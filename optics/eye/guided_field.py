@@ -97,8 +97,8 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
     """Return the accepted fraction of a source's light, E, over the cells of a window.
 
-    The window is widened until it contains all of E except for a fraction of at most the tolerance. It is never wider
-    than the light of `spot` and the waveguide together.
+    The window is widened until it contains all of E except for a fraction of at most the tolerance, but not beyond the
+    half width of `spot` plus the radius of the waveguide's modes.
     """
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))

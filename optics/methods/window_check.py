@@ -96,8 +96,9 @@ def _ratios(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return interpolation points in sines, and the slow factor G(·; u, v)/G(·; 0, 0) there, (stack, v, u, b, a).
 
-    The interpolated factor is compared with the exact one at the rim of the pupil, for the outermost columns and rows.
-    The search for the number of points starts with one that is usually sufficient for the phase there.
+    The number of points is increased until the interpolated factor equals the exact one, up to an error of
+    INTERPOLATED, on the pupil's rim and for the outermost columns and rows. The first number is usually sufficient for
+    the largest phase of the factor there.
     """
 
     def ratio(directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -125,9 +125,9 @@ class Converging(ReadOnlyArrays):
         return bend * math.sqrt(float((bright * off**2).sum() / bright.sum())) * squared / 2
 
     def _exact(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        """Return the field from Smythe's integral. All fields use the method that suits the scalar field.
+        """Return the field from Smythe's integral. All components use the samples that suit the scalar field.
 
-        The other fields may need more samples. If a check shows that they do, they are computed again with more.
+        If a check shows that other components need more samples, all are computed again with a smaller tolerance.
         """
         for tolerance in (self.tolerance, self.tolerance / FINER):
             found, plan = self._smythe(window, tolerance)

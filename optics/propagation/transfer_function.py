@@ -168,7 +168,8 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
 def _fade_table(ripple: float) -> Interpolant:
     """Return a fade from 1 at 0 to 0 at 1: the complement of the integral of a Kaiser window.
 
-    The fade blurs a field over the distance β/(π fade). Beyond this distance, a fraction `ripple` remains.
+    A fade of this shape over a band of width Δf blurs a field over the distance β/(π Δf). The amplitude beyond this
+    distance is the fraction `ripple`.
     """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)

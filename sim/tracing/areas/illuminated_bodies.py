@@ -1,6 +1,6 @@
 """Light on the moving bodies: the fraction of each light that reaches them, and the reflected light around them.
 
-It does not depend on the eye, so it is computed once per world, in a table that all areas of the world read.
+The light does not depend on the eye, so it is computed once per world, in a table that all areas of the world read.
 """
 
 from __future__ import annotations
