@@ -17,7 +17,7 @@ from optics.apertures.polygonal import Polygon
 __all__ = ["Rim", "rim_around"]
 
 BETTER = 0.5  # choice: an oval is chosen if its residual is less than this part of the residual of a circle
-MUCH_BETTER = 0.1  # choice: the same for a Fourier series, which on square grids may reach a third by chance
+MUCH_BETTER = 0.1  # choice: the same for a Fourier series, whose residual may by chance be a third on square grids
 FULL = 0.8  # choice: part of a circle that the hull must fill. A hexagon fills 0.83, a square 0.64.
 LEAST_CORNERS = 8  # choice: corners of the hull that an oval, which has at least 5 parameters, needs
 EXACT = 1e-4  # choice, radii: a residual below this is always accepted

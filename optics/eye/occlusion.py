@@ -69,7 +69,7 @@ def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[La
             remaining = behind
             continue
         places = distance_transform_edt(~behind, return_distances=False, return_indices=True)
-        nearest = np.ravel_multi_index(tuple(places), level.shape)  # of the cells behind
+        nearest = np.ravel_multi_index(tuple(places), level.shape)  # nearest of the cells behind
         hiding = cells & edge.ravel()[nearest]
         yield Layer(source, cells, hiding)
         source = np.where(hiding, source.ravel()[nearest], source)

@@ -35,7 +35,7 @@ __all__ = ["SmoothSpectrum", "may_be_steep", "smooth_spectrum"]
 
 # Choices, see test_smooth_spectrum.py.
 CUBIC = 0.5  # largest error of the amplitude due to the third derivative of the phase, relative to the tolerance
-ATTENUATED = 2.5  # largest a if the Gaussian attenuates light in the window to e^{-a}, at a tolerance of 0.01
+ATTENUATED = 2.5  # largest a, where e^{-a} is the Gaussian's factor on light in the window, at a tolerance of 0.01
 ALIASED = 0.02  # largest amplitude of aliased light, relative to the tolerance
 AT_ONCE = 2**19  # choice: samples of columns that are transformed at once
 SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
