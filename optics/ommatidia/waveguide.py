@@ -125,7 +125,7 @@ class Waveguide:
                 raise ValueError(f"length = None: must be a length in m, because proximal_diameter = {end:g} m")
 
     def v_number(self, wavelength: float) -> float:
-        """Return V = πd/λ √(n_core² - n_clad²) of the tip at a vacuum wavelength [m]. Below 2.405, it has a single mode.
+        """Return V = πd/λ √(n_core² - n_clad²) of the tip at a vacuum wavelength [m]. Below 2.405, it has one mode.
 
         Raises:
             ValueError: the index of the core is not above that of the surroundings, or V is above 60.
