@@ -20,7 +20,7 @@ from experiments.means import Interval, mean_of
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import Origin
 
-__all__ = ["change_of_slope", "complete", "designs", "eye_parameter", "page", "slope"]
+__all__ = ["best_octave", "complete", "designs", "eye_parameter", "page", "shift"]
 
 NAME = "facets_and_light"
 SURFACE = 2e-8  # area of all facets of an animal [m²]
@@ -28,7 +28,7 @@ EYES, FOV_DEG, RANGE_DEG = 2, 60.0, 45.0
 WAVELENGTH = 500e-9  # unit of eye parameters [m]
 # Facets across an eye, and the rhabdom [µm] and the F-number with which the acceptance angle d/f is about Δφ.
 FACETS = {21: (1.0, 4.0), 15: (1.6, 3.0), 10: (3.0, 2.5), 7: (4.0, 2.0)}
-LIGHTS = (1e4, 100.0, 10.0, 1.0)  # [lx]
+LIGHTS = (1e4, 30.0, 1.0)  # [lx]
 SEEDS = range(2711, 2717)
 SETTINGS = (
     f"eye.facet_area={SURFACE:g}",
@@ -36,7 +36,7 @@ SETTINGS = (
     "learning.total_steps=131072",
     "learning.eval_interval=65536",
 )
-COLORS = ("#56B4E9", "#0072B2", "#7B4173", "#000000")  # from bright to dim
+COLORS = ("#56B4E9", "#0072B2", "#000000")  # from bright to dim
 
 
 def facet_diameter(across: int) -> float:
@@ -63,20 +63,26 @@ def designs() -> list[Design]:
     ]  # fmt: skip
 
 
-def slope(rows: Sequence[Trained], seed: int, light: float) -> float:
-    """Return the change of fitness when the eye parameter doubles, by least squares over the eyes of one seed."""
+def best_octave(rows: Sequence[Trained], seed: int, light: float) -> float:
+    """Return log2 of the best eye parameter among FACETS: where a parabola fitted to fitness is highest.
+
+    The parabola is a function of log2 of the eye parameter. It is fitted by least squares to the eyes that were trained
+    with this seed in this light, and its maximum is taken within the range of the eyes.
+    """
     mine = [row for row in rows if (row.seed, _light(row)) == (seed, light)]
     octaves = np.log2([eye_parameter(row.width) for row in mine])
-    return float(np.polyfit(octaves, [row.fitness for row in mine], 1)[0])
+    parabola = np.polyfit(octaves, [row.fitness for row in mine], 2)
+    tried = np.linspace(octaves.min(), octaves.max(), 1001)
+    return float(tried[np.polyval(parabola, tried).argmax()])
 
 
-def change_of_slope(rows: Sequence[Trained], light: float) -> tuple[Interval, float]:
-    """Return the mean slope in this light minus that in the brightest light, and its p value.
+def shift(rows: Sequence[Trained], light: float) -> tuple[Interval, float]:
+    """Return the mean of `best_octave` in this light minus that in the brightest light, and its p value.
 
-    Seeds are pairs. p is the fraction of all assignments of the pairs' signs whose mean is at least as large: a
-    permutation test of the hypothesis that light has no effect on the slope.
+    Both lights of a seed are a pair. p is the fraction of all assignments of the pairs' signs whose mean is at least as
+    large: a permutation test of the hypothesis that light has no effect on the best eye parameter.
     """
-    differences = np.array([slope(rows, seed, light) - slope(rows, seed, LIGHTS[0]) for seed in complete(rows)])
+    differences = np.array([best_octave(rows, n, light) - best_octave(rows, n, LIGHTS[0]) for n in complete(rows)])
     signs = np.array(list(itertools.product((1, -1), repeat=len(differences))))
     chance = float(np.mean((signs * differences).mean(axis=1) >= differences.mean() - 1e-12))
     return mean_of(differences), chance
@@ -97,7 +103,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
             "answer": answer,
             "eyes": _eyes_table(),
             "fitness": _fitness_table(rows),
-            "slopes": _slope_table(rows),
+            "shifts": _shift_table(rows),
             "surface": f"{1e6 * SURFACE:g}",
             "field": f"{FOV_DEG:g}",
             "seeds": str(len(complete(rows))),
@@ -139,13 +145,15 @@ def _fitness_table(rows: Sequence[Trained]) -> str:
     )
 
 
-def _slope_table(rows: Sequence[Trained]) -> str:
+def _shift_table(rows: Sequence[Trained]) -> str:
     lines = []
     for light in LIGHTS:
-        mine = mean_of(np.array([slope(rows, seed, light) for seed in complete(rows)]))
-        change, chance = change_of_slope(rows, light)
-        lines.append([f"{light:g}", str(mine), *(("-", "-") if light == LIGHTS[0] else (str(change), f"{chance:.2g}"))])
-    return markdown_table(["light [lx]", "slope", "minus slope in the brightest light", "p value"], lines)
+        best = mean_of(np.array([best_octave(rows, seed, light) for seed in complete(rows)]))
+        change, chance = shift(rows, light)
+        shown = (f"{2**x:.2f}" for x in (best.mean, best.low, best.high))
+        cells = ("-", "-") if light == LIGHTS[0] else (str(change), f"{chance:.2g}")
+        lines.append([f"{light:g}", "{} [{}, {}]".format(*shown), *cells])
+    return markdown_table(["light [lx]", "best p [λ]", "shift against bright light [octaves]", "p value"], lines)
 
 
 def _cell(rows: Sequence[Trained], light: float, across: int) -> np.ndarray:
@@ -157,7 +165,7 @@ def _light(row: Design) -> float:
 
 
 def draw(rows: Sequence[Trained], path: Path) -> None:
-    """Draw fitness over the eye parameter in each light, and the slopes over light."""
+    """Draw fitness over the eye parameter in each light, and the best eye parameter over light."""
     figure, axes = new_figure(10.5, 4.2, columns=2)
     left, right = axes[0]
     parameters = [eye_parameter(across) for across in FACETS]
@@ -170,12 +178,11 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
     left.text(1 / math.sqrt(3), left.get_ylim()[1], " λ/√3", color="#777777", va="top")
     left.set(xlabel="eye parameter DΔφ / λ", ylabel="fitness")
     left.legend(frameon=False, title="light")
-    for seed in complete(rows):
-        right.semilogx(LIGHTS, [slope(rows, seed, light) for light in LIGHTS], color="#BBBBBB", lw=1)
-    means = [np.mean([slope(rows, seed, light) for seed in complete(rows)]) for light in LIGHTS]
-    right.semilogx(LIGHTS, means, "o-", color="#222222", lw=2)
-    right.axhline(0, color="#777777", lw=1)
-    right.set(xlabel="illuminance [lx]", ylabel="change of fitness per doubling of p")
+    best = np.array([[2 ** best_octave(rows, seed, light) for light in LIGHTS] for seed in complete(rows)])
+    right.loglog(LIGHTS, best.T, color="#BBBBBB", lw=1)
+    right.loglog(LIGHTS, np.exp(np.log(best).mean(axis=0)), "o-", color="#222222", lw=2)
+    right.axhline(1 / math.sqrt(3), color="#777777", lw=1)
+    right.set(xlabel="illuminance [lx]", ylabel="best eye parameter DΔφ / λ", ylim=(0.4, 6))
     save(figure, path)
 
 
