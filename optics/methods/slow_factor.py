@@ -13,11 +13,12 @@ import numpy as np
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples
 from optics.methods.sine_samples import SineSamples
+from optics.methods.sine_stack import SineGeometry, SineStack
 from optics.numerics.array_library import turned
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
-__all__ = ["RANKS", "Path", "axis_factor", "fourier_kernel", "remaining_factor", "slow_factor", "uniform_rank"]
+__all__ = ["RANKS", "Path", "axis_factor", "axis_kernel", "cross_term", "fourier_kernel", "remaining_factor", "slow_factor", "uniform_rank"]
 
 # Choice: ranks to try, in ascending order.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
@@ -28,15 +29,26 @@ TRIED = 41  # choice: number of test positions along a line through the window
 
 @dataclass(frozen=True)
 class Path:
-    """The geometry of a problem: the wavelength [m] in the medium, and the distance [m] and samples of the window."""
+    """The geometry of a problem: the wavelength [m] in the medium, and the distance [m] and samples of the window.
 
-    wavelength: float
-    distance: float
+    Wavelength and distance may be arrays (pupil,). All other arrays then have pupils as their first axis.
+    """
+
+    wavelength: float | np.ndarray
+    distance: float | np.ndarray
     window: Grid
 
     @classmethod
     def from_problem(cls, problem: Problem) -> Path:
         return cls(problem.wavelength, problem.distance, problem.window)
+
+    def numbers(self, axes: int) -> tuple[float | np.ndarray, float | np.ndarray]:
+        """Return wavelength and distance, with as many axes as the arrays with which they broadcast."""
+        wavelength, distance = (
+            part.reshape(-1, *[1] * (axes - 1)) if isinstance(part, np.ndarray) else part
+            for part in (self.wavelength, self.distance)
+        )
+        return wavelength, distance
 
 
 def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
@@ -94,32 +106,37 @@ def slow_factor(
     """
     (xi, eta), (u, v), (s, t) = pupil, window, directions
     x, y = u + path.window.centre[0], v + path.window.centre[1]
-    z = path.distance
+    wavelength, z = path.numbers(max(part.ndim for part in (xi, eta, x, y)))
     rho2 = x * x + y * y + z * z
     excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
     distance = np.sqrt(rho2 + excess)
-    waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / path.wavelength
+    waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / wavelength
     found: np.ndarray = turned(z * z / distance**2, waves, dtype)
     return found
 
 
-def axis_factor(path: Path, samples: SineSamples, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
+def axis_factor(
+    path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
+) -> np.ndarray:
     """Return the slow factor along x (0) or y (1), relative to its value at the middle of the window, complex.
 
     It depends on one sine and one position, as the Fourier kernel along its axis does, which can therefore include it.
+    The other sine is `elsewhere`, since the slow factor depends on its square.
 
-    sines: sines along the axis, minus those of the pupil's centre. The other sines are those of the pupil's centre.
+    sines: sines along the axis, minus those of the pupil's centre.
     places: positions [m] along the axis, relative to the middle of the window. They broadcast with the sines.
     """
-    none = np.zeros(1)
-    directions, window = ((sines, none), (places, none)) if axis == 0 else ((none, sines), (none, places))
+    none = np.zeros((1,) * max(sines.ndim, places.ndim))
+    elsewhere = samples.elsewhere
+    other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
+    directions, window = ((sines, other), (places, none)) if axis == 0 else ((other, sines), (none, places))
     points = samples.points_at(*directions)
     return slow_factor(path, points, directions, window) / slow_factor(path, points, directions, (none, none))
 
 
 def remaining_factor(
     path: Path,
-    samples: SineSamples,
+    samples: SineSamples | SineGeometry,
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
@@ -128,6 +145,41 @@ def remaining_factor(
     for axis in (0, 1):
         whole = whole / axis_factor(path, samples, axis, directions[axis], window[axis])
     return whole
+
+
+def cross_term(
+    path: Path,
+    samples: SineGeometry,
+    directions: tuple[np.ndarray, np.ndarray],
+    window: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return factors a and b, so that the slow factor divided by both axis factors is about 1 + a b.
+
+    It is the term -ik us vt/D of the phase, with the mean of 1/D over the pupil. The factor a depends on u and s, and b
+    on v and t, so it costs as much as a second Fourier kernel along either axis.
+
+    directions: s and t. window: u and v. Their last two axes broadcast.
+    """
+    (s, t), (u, v) = directions, window
+    wavelength, z = path.numbers(s.ndim)
+    cosine = np.sqrt(1 - 2 * np.square(samples.elsewhere)).reshape(-1, *[1] * (s.ndim - 1))
+    return u * s * (cosine * (-2j * np.pi) / (wavelength * z)), v * t
+
+
+def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, dtype: str) -> np.ndarray:
+    """Return the Fourier kernel times `axis_factor`, (stack, place, sample), complex.
+
+    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window.
+
+    places: positions [m] along the axis, relative to the middle of the window, (stack, place).
+    dtype: "float32" or "float64".
+    """
+    none, at, place = np.zeros((1, 1, 1)), samples.at[:, None, :], places[:, :, None]
+    other = samples.elsewhere[:, None, None]
+    directions, window = ((at, other), (place, none)) if axis == 0 else ((other, at), (none, place))
+    points = samples.points_at(*directions)
+    moved = slow_factor(path, points, (none, none), window, dtype)
+    return moved / slow_factor(path, points, (none, none), (none, none)).astype(moved.dtype)
 
 
 def fourier_kernel(

@@ -14,7 +14,8 @@ from optics.elements.beam import Beam
 from optics.elements.torch_numbers import torch_numbers
 from optics.methods.problem import Problem
 from optics.methods.sine_samples import SineSamples
-from optics.methods.window_sampling import TIGHTEST, WindowSampling
+from optics.methods.window_plan import TIGHTEST
+from optics.methods.window_sampling import WindowSampling
 from optics.methods.window_stack import WindowStack
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.autodiff import Array, carries_derivative, plain

@@ -1,0 +1,239 @@
+"""Samples of several pupils at coarse tolerances: as few as the light in the window needs.
+
+Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
+width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
+diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. The softer edge only
+changes light far from the geometrical rays of the edge, where there is little light.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from optics.apertures.aperture import EDGE_REACH, SoftAperture
+from optics.apertures.soft_edge import SoftEdge
+from optics.elements.light_stack import LightStack
+from optics.elements.wavefront import Zernike
+from optics.methods.pupil_sampling import MOST_ACROSS
+from optics.methods.sine_stack import SineGeometry, SineStack, rim_sines
+from optics.methods.window_rank import Derivatives, WindowRays, window_ranks
+from optics.numerics.grid import Grid
+
+__all__ = ["TIGHTEST", "WindowPlan"]
+
+TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
+# Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check.
+RIPPLES = (0.03, 0.0075)
+# Choices for the passband of the soft edge, in cycles per radius, at a tolerance of 0.01: of light along the axis, and
+# relative to the cycles of the rays at the edge; exponent of the tolerance; and passband of the check, relative to it.
+EDGE_CYCLES, RIM_CYCLES, EXPONENT, SHARPER = 4.0, 1.2, -0.4, 1.4
+# Choices: light that is neglected, as a share of all light; part of the stopband that may not be aliased.
+NEGLECTED, ALIASED = 3e-4, 1.0
+QUANT=.9
+RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
+CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
+DERIVATIVE_PART = 0.2  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
+# Choices: numbers of samples and sharpnesses of the edge per octave; equal ones share arrays and tables.
+STEPS, EDGES = 4, 8
+FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
+# Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
+PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 8e-4, 4e-8, 3e-8, 2.5e-10
+MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of the slow factor
+
+
+@dataclass(frozen=True, eq=False)
+class WindowPlan:
+    """Samples of several pupils for one window.
+
+    tolerance: tolerances of the PSFs, (beam,).
+    derivatives: needs of derivatives; None if none are requested.
+    """
+
+    stack: LightStack
+    window: Grid
+    tolerance: np.ndarray
+    derivatives: Derivatives | None = None
+
+    @property
+    def half(self) -> float:
+        """Distance [m] from the middle of the window within which interpolation points lie."""
+        return max(self.window.own_half_width, self.window.dx)
+
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """Numbers n of samples between the middle and either end, (beam,); 0 if the method is not suitable.
+
+        A pupil has 2n + 1 samples along either axis.
+        """
+        suitable, across = self._rims[2] & self._finer_rims[2], self._rims[0]
+        needed = np.where(suitable, across / self._pitch(self._density), 0)
+        within = suitable & (needed < MOST_ACROSS)
+        least = np.ceil(np.where(within, needed, 1) - 1e-9)
+        step = np.maximum(1, 2 ** np.floor(np.log2(least / STEPS)))
+        found = np.where(within, np.ceil(least / step) * step, 0).astype(int)
+        finer = 2 * self.finer_count(found) + 1
+        fits = np.maximum(self.ranks * (2 * found + 1), finer) <= math.sqrt(MOST_ENTRIES)
+        return np.where(fits & (self.ranks > 0), found, 0)
+
+    @staticmethod
+    def finer_count(count: np.ndarray) -> np.ndarray:
+        """Return the number of samples of the check between the middle and an end."""
+        return np.ceil(FINER * count + SHIFT).astype(int)
+
+    @property
+    def ranks(self) -> np.ndarray:
+        """Ranks of the slow factor over the window, (beam,); 0 if the method is not suitable."""
+        return self._ranks[0]
+
+    @property
+    def crossed(self) -> np.ndarray:
+        """Whether the sums include `cross_term`, (beam,)."""
+        return self._ranks[1]
+
+    @cached_property
+    def _rays(self) -> WindowRays:
+        return WindowRays.from_stack(self.stack, self.window)
+
+    @cached_property
+    def _ranks(self) -> tuple[np.ndarray, np.ndarray]:
+        steepest = np.minimum(self._rims[1], 1.0)
+        geometry = SineGeometry(self.stack.distance, self.window.centre, steepest, self._rays.mean_sine)
+        return window_ranks(self.stack, geometry, self._rays, self.window, self.tolerance, self.derivatives)
+
+    def samples(self, places: np.ndarray) -> tuple[SineStack, SineStack]:
+        """Return the samples of some pupils, which have the same count, and the finer samples of the check.
+
+        places: indices of the beams.
+        """
+        count = int(self.counts[places[0]])
+        sets = (count, 0.0, self._rims, self._edges), (
+            int(self.finer_count(np.array(count))), SHIFT, self._finer_rims, self._finer_edges,
+        )  # fmt: skip
+        found = []
+        for many, shift, (half, steepest, _), edges in sets:
+            at = (half[places] / (many - shift))[:, None] * (np.arange(-many, many + 1) + shift)
+            geometry = self.stack.distance[places], self.window.centre, steepest[places], self._rays.mean_sine[places]
+            found.append(SineStack(*geometry, at, tuple(edges[k] for k in places), self.stack.radius[places]))
+        return found[0], found[1]
+
+    @cached_property
+    def seconds(self) -> np.ndarray:
+        """Predicted times of single PSFs [s], (beam,)."""
+        return self._costs[0]
+
+    @cached_property
+    def bytes(self) -> np.ndarray:
+        """Predicted memory of single PSFs, (beam,)."""
+        return self._costs[1]
+
+    @cached_property
+    def _costs(self) -> tuple[np.ndarray, np.ndarray]:
+        across, (height, width) = 2 * self.counts + 1, self.window.shape
+        inner = self.ranks * across
+        products = (inner * inner * width + height * inner * width) * np.where(self.crossed, 2, 1)
+        samples = across**2 + (2 * self.finer_count(self.counts) + 1) ** 2
+        entries = np.where(self.ranks == 1, 0, inner * inner)
+        seconds = PER_PSF + samples * PER_SAMPLE + entries * PER_ENTRY + products * PER_PRODUCT
+        return seconds, 16 * (4 * inner * inner + inner * (height + 2 * width) + samples)
+
+    @cached_property
+    def _window_cycles(self) -> np.ndarray:
+        """Cycles per radius of the Fourier kernel at the sides of the window."""
+        stack = self.stack
+        found: np.ndarray = self.half * stack.radius / (stack.wavelength * stack.distance)
+        return found
+
+    @cached_property
+    def _density(self) -> np.ndarray:
+        """Numbers of samples per radius, which are also the numbers of cycles per radius that they resolve."""
+        stack, along = self.stack, self._to_middle
+        share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
+        last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
+        reach = np.take_along_axis(np.sort(along, axis=1), last[:, None], axis=1)[:, 0]
+        edge = self._passband + _transition(RIPPLES[0])
+        masks = [
+            0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(min(tolerance, 0.1), radius) * radius
+            for beam, radius, tolerance in zip(stack.beams, stack.radius, self.tolerance, strict=True)
+        ]
+        found: np.ndarray = self._window_cycles + masks + np.maximum(reach, self._rim + ALIASED * edge)
+        return found
+
+    @cached_property
+    def _to_middle(self) -> np.ndarray:
+        """Cycles per radius of the paths to the middle of the window, along x or y, (beam, point)."""
+        stack, slopes, window = self.stack, self.stack.slopes, self.window
+        radius, index, distance = (part[:, None] for part in (stack.radius, stack.index, stack.distance))
+        x, y = radius * slopes.x - window.centre[0], radius * slopes.y - window.centre[1]
+        scale = index / np.sqrt(x * x + y * y + distance * distance)
+        along = np.maximum(np.abs(slopes.along_x + x * scale), np.abs(slopes.along_y + y * scale))
+        found: np.ndarray = along * (stack.radius / stack.vacuum_wavelength)[:, None]
+        return found
+
+    @cached_property
+    def _rim(self) -> np.ndarray:
+        """Cycles per radius of nearly all rays at the edge, (beam,)."""
+        slopes = self.stack.slopes
+        found: np.ndarray = np.quantile(self._to_middle[:, np.hypot(slopes.x, slopes.y) > RIM], QUANT, axis=1)
+        return found
+
+    @cached_property
+    def _passband(self) -> np.ndarray:
+        """Cycles per radius that the soft edge leaves unchanged, (beam,)."""
+        sharp, cells = EDGE_CYCLES + RIM_CYCLES * (self._rim + self._window_cycles), 0.0
+        if self.derivatives is not None:
+            # High modes grow outside the circle, so that their derivatives need a sharper edge.
+            fronts = [beam.pupil.wavefront for beam in self.stack.beams]
+            orders = np.array([front.order if isinstance(front, Zernike) else 0 for front in fronts])
+            sharp = sharp * DERIVATIVE_PART**EXPONENT + orders
+            cells = self.derivatives.cells * CELL_CYCLES
+        found: np.ndarray = (sharp + cells) * (self.tolerance / 0.01) ** EXPONENT
+        return found
+
+    def _pitch(self, density: np.ndarray) -> np.ndarray:
+        """Return the largest spacing of sines at which a pupil has `density` samples per radius everywhere.
+
+        The distance of two points in the pupil is at most z/cos³θ times the distance of their sines.
+        """
+        steepest = np.minimum(self._rims[1], 1 - 1e-12)
+        found: np.ndarray = self.stack.radius * (1 - np.square(steepest)) ** 1.5 / (self.stack.distance * density)
+        return found
+
+    @cached_property
+    def _edges(self) -> list[SoftAperture]:
+        return self._soft(self._passband, RIPPLES[0])
+
+    @cached_property
+    def _finer_edges(self) -> list[SoftAperture]:
+        return self._soft(SHARPER * self._passband, RIPPLES[1])
+
+    def _soft(self, passband: np.ndarray, ripple: float) -> list[SoftAperture]:
+        """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""
+        passband = 2.0 ** (np.ceil(EDGES * np.log2(passband)) / EDGES)
+        return [
+            beam.pupil.aperture.with_edge(cycles, cycles + _transition(ripple), ripple)
+            for beam, cycles in zip(self.stack.beams, map(float, passband), strict=True)
+        ]
+
+    @cached_property
+    def _rims(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self._sines(self._edges)
+
+    @cached_property
+    def _finer_rims(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self._sines(self._finer_edges)
+
+    def _sines(self, edges: list[SoftAperture]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        outermost = (1 + np.array([edge.reach for edge in edges])) * self.stack.radius
+        return rim_sines(outermost, self.window.centre, self.stack.distance)
+
+
+def _transition(ripple: float) -> float:
+    """Return the smallest width of the transition from passband to stopband, in cycles per radius.
+
+    The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to this one.
+    """
+    return SoftEdge(0.0, 1.0, ripple).reach / EDGE_REACH
