@@ -16,6 +16,7 @@ from optics.numerics.autodiff import number
 
 __all__ = ["LightStack", "StackSlopes"]
 
+SPHERE_POINTS = 8  # choice: number of Chebyshev points across the pupil for spheres, in addition to those of polynomials
 FEW, MANY = 27, 53  # choices: points across the pupil at which slopes are evaluated, without and with fine detail
 
 
@@ -102,6 +103,14 @@ class LightStack:
             if one is not None:
                 found[place, : len(one), : len(one)] = one
         return found, [place for place, one in enumerate(known) if one is None]
+
+    @cached_property
+    def smooth_points(self) -> int | None:
+        """Number of Chebyshev points across the pupils that determine the paths; None for maps and oblique light."""
+        coefficients, others = self._polynomials
+        if others or any(self._tilted):
+            return None
+        return len(coefficients[0]) + SPHERE_POINTS
 
     def waves(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the optical paths at points (x, y) [m], in waves, up to a constant, (beam, y, x).

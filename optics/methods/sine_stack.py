@@ -16,11 +16,13 @@ from optics.apertures.aperture import SoftAperture
 from optics.elements.light_stack import LightStack
 from optics.methods.sine_samples import MOST_SQUARE, MOST_STRETCH, RIM, SineSamples
 from optics.numerics.array_library import turned
+from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["SineGeometry", "SineStack", "rim_sines", "single_stack"]
+__all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines", "single_stack"]
 
 LEVELS = 16384  # choice: number of values in a table of the transmittance against r²
+SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a few points
 FAR = 1000.0  # choice: smallest kz for which the near-field term of the kernel is constant over the pupil
 
 
@@ -75,6 +77,10 @@ class SineStack(SineGeometry):
     edges: tuple[SoftAperture, ...]
     radius: np.ndarray
 
+    def smooth(self, reach: float) -> bool:
+        """Return whether paths to points up to `reach` [m] from the axis vary smoothly over all samples."""
+        return bool(max(self.steepest.max(), reach / self.distance.min()) <= SMOOTH_SINE)
+
     @property
     def pitch(self) -> np.ndarray:
         """Spacing of the samples, (pupil,)."""
@@ -100,53 +106,86 @@ class SineStack(SineGeometry):
         sx, sy = (part[:, None] for part in self._middle)
         return (self.at + sx)[:, None, :] * slant + self.centre[0], (self.at + sy)[:, :, None] * slant + self.centre[1]
 
-    @cached_property
-    def weights(self) -> np.ndarray:
-        """Areas of the samples [m²] times the transmittance of the apertures, (pupil, y, x)."""
+    def arriving(self, stack: LightStack, dtype: str) -> np.ndarray:
+        """Return the contribution of each sample to the field at the middle of the window, (beam, y, x), complex.
+
+        It is the light behind the pupils, times the areas of the samples, times z/(λD²) (1/(kD) - i) e^{ik(D - ρ)}, up
+        to a constant phase.
+
+        dtype: type of the real and imaginary parts, in which the phase is rounded, "float32" or "float64".
+        """
+        size = self._sizes(dtype) / stack.wavelength[:, None, None].astype(dtype)
+        near = (2 * np.pi * stack.distance / stack.wavelength).min() < FAR
+        if not near and all(beam.pupil.mask is None for beam in stack.beams):
+            return np.asarray(turned(size, self._waves(stack), dtype))
         x, y = self.points
-        area = np.square((self.distance * self.pitch)[:, None, None] / self._cosine2)
+        amplitude = stack.amplitude(x, y)
+        size = size if amplitude is None else size * amplitude
+        waves = self._waves(stack)
+        if near:
+            there = (self.distance[:, None, None] / np.sqrt(self._cosine2)) / stack.wavelength[:, None, None]
+            size = size * np.sqrt(1 + 1 / np.square(2 * np.pi * there))
+            waves = waves + np.arctan(1 / (2 * np.pi * there)) / (2 * np.pi)
+        return np.asarray(turned(size, waves, dtype))
+
+    def _sizes(self, dtype: str) -> np.ndarray:
+        """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x)."""
+        known = self._known_sizes
+        if dtype not in known:
+            known[dtype] = self._new_sizes(dtype)
+        return known[dtype]
+
+    @cached_property
+    def _known_sizes(self) -> dict[str, np.ndarray]:
+        return {}
+
+    def _new_sizes(self, dtype: str) -> np.ndarray:
+        cosine2 = self._cosine2.astype(dtype)
+        size = (self.distance * np.square(self.pitch))[:, None, None].astype(dtype) / cosine2
         first: dict[int, int] = {}
         same = np.array([first.setdefault(id(edge), place) for place, edge in enumerate(self.edges)])
         for place in first.values():
             own = slice(None) if len(first) == 1 else np.flatnonzero(same == place)
-            radius = self.radius[own, None, None]
-            area[own] *= _transmittance(self.edges[place], x[own] / radius, y[own] / radius)
-        return area
+            edge, radius = self.edges[place], self.radius[own, None, None]
+            if edge.rotationally_symmetric:
+                per_level = LEVELS / ((1 + edge.reach) * radius) ** 2
+                if self.centre == (0.0, 0.0):  # r² = z² (1/cos²θ - 1)
+                    scale = (np.square(self.distance)[own, None, None] * per_level).astype(dtype)
+                    level = scale / cosine2[own]
+                    level -= scale
+                else:
+                    x, y = self.points
+                    level = (np.square(x[own]) + np.square(y[own])) * per_level
+                size[own] *= _profile(edge).astype(dtype).take(level.astype(np.int32), mode="clip")
+            else:
+                x, y = self.points
+                size[own] *= _transmittance(edge, x[own] / radius, y[own] / radius)
+        return size
 
-    def light(self, stack: LightStack, dtype: str) -> np.ndarray:
-        """Return the light behind the pupils times the areas of the samples, (beam, y, x), complex.
+    def _waves(self, stack: LightStack) -> np.ndarray:
+        """Return the paths through all samples to the middle of the window, in waves up to a constant, (beam, y, x).
 
-        dtype: type of the real and imaginary parts, in which the phase is rounded, "float32" or "float64".
+        Paths without fine detail are interpolated from a few points of the pupil.
         """
-        return np.asarray(turned(self._size(stack), stack.waves(*self.points), dtype))
+        count = stack.smooth_points
+        if count is None or count >= self.at.shape[1] or not self.smooth(0.0):
+            return self._paths(stack, *self.points)
+        side = self.at[:, [0, -1]]
+        nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
+        weight = even_weights(self.at.shape[1], count)
+        paths = self._paths(stack, *self.points_at(nodes[:, None, :], nodes[:, :, None]))
+        return np.asarray(weight @ paths @ weight.T)
 
-    def arriving(self, stack: LightStack, dtype: str) -> np.ndarray:
-        """Return the contribution of each sample to the field at the middle of the window, (beam, y, x), complex.
-
-        It is the result of `light` times z/(λD²) (1/(kD) - i) e^{ik(D - ρ)}, up to a constant phase.
-        """
-        x, y = self.points
-        z, wavelength = (part[:, None, None] for part in (self.distance, stack.wavelength))
-        middle = math.hypot(*self.centre)
-        cosine2 = self._cosine2
-        far = z / np.sqrt(cosine2)  # D
+    def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the paths through points (x, y) [m], in waves up to a constant."""
+        z, middle = stack.distance[:, None, None], math.hypot(*self.centre)
         # D - ρ = (ξ² - 2 c·ξ) / (D + ρ), without a difference of nearly equal numbers
-        excess = x * x + y * y
+        excess, rho = x * x + y * y, np.hypot(z, middle)
         if middle:
             excess -= 2 * (self.centre[0] * x + self.centre[1] * y)
-        waves = stack.waves(x, y)
-        waves += excess / ((far + np.hypot(z, middle)) * wavelength)
-        size = self._size(stack) * cosine2
-        size /= z * wavelength
-        if (2 * np.pi * z / wavelength).min() < FAR:
-            near = wavelength / (2 * np.pi * far)
-            size *= np.sqrt(1 + near * near)
-            waves += np.arctan(near) / (2 * np.pi)
-        return np.asarray(turned(size, waves, dtype))
-
-    def _size(self, stack: LightStack) -> np.ndarray:
-        amplitude = stack.amplitude(*self.points)
-        return self.weights if amplitude is None else self.weights * amplitude
+        excess /= (np.sqrt(excess + rho * rho) + rho) * stack.wavelength[:, None, None]
+        excess += stack.waves(x, y)
+        return excess
 
 
 @lru_cache(maxsize=64)
@@ -194,13 +233,15 @@ def _sines(
 
 def _transmittance(edge: SoftAperture, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the transmittance of a soft aperture at points in units of its radius."""
-    if edge.rotationally_symmetric:
-        table = _profile(edge)
-        r2 = x * x + y * y
-        return table.take((r2 * (LEVELS / (1 + edge.reach) ** 2)).astype(np.int32), mode="clip")
     types = precision("float64")
     across, down = (types.Float64(padded_for_packets(part)) for part in (x, y))
     return np.asarray(edge.transmittance(across, down, types).numpy().reshape(x.shape))
+
+
+@lru_cache(maxsize=64)
+def even_weights(samples: int, count: int) -> np.ndarray:
+    """Return interpolation weights of Chebyshev points at evenly spaced samples, (sample, point)."""
+    return np.ascontiguousarray(lagrange_basis(np.linspace(-1, 1, samples), chebyshev_points(count)).T)
 
 
 @lru_cache(maxsize=128)

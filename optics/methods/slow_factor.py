@@ -13,7 +13,7 @@ import numpy as np
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples
 from optics.methods.sine_samples import SineSamples
-from optics.methods.sine_stack import SineGeometry, SineStack
+from optics.methods.sine_stack import SineGeometry, SineStack, even_weights
 from optics.numerics.array_library import turned
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
@@ -24,6 +24,7 @@ __all__ = ["RANKS", "Path", "axis_factor", "axis_kernel", "cross_term", "fourier
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 # Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; see test_low_rank.py.
 RANK_RIPPLE = 0.4
+SMOOTH = 12  # choice: number of sines, and of positions, from which smooth phases are interpolated
 TRIED = 41  # choice: number of test positions along a line through the window
 
 
@@ -104,15 +105,7 @@ def slow_factor(
 
     dtype: type in which the phase is rounded, "float32" or "float64".
     """
-    (xi, eta), (u, v), (s, t) = pupil, window, directions
-    x, y = u + path.window.centre[0], v + path.window.centre[1]
-    wavelength, z = path.numbers(max(part.ndim for part in (xi, eta, x, y)))
-    rho2 = x * x + y * y + z * z
-    excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
-    distance = np.sqrt(rho2 + excess)
-    waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / wavelength
-    found: np.ndarray = turned(z * z / distance**2, waves, dtype)
-    return found
+    return np.asarray(turned(*_slow(path, pupil, directions, window), dtype))
 
 
 def axis_factor(
@@ -126,12 +119,7 @@ def axis_factor(
     sines: sines along the axis, minus those of the pupil's centre.
     places: positions [m] along the axis, relative to the middle of the window. They broadcast with the sines.
     """
-    none = np.zeros((1,) * max(sines.ndim, places.ndim))
-    elsewhere = samples.elsewhere
-    other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
-    directions, window = ((sines, other), (places, none)) if axis == 0 else ((other, sines), (none, places))
-    points = samples.points_at(*directions)
-    return slow_factor(path, points, directions, window) / slow_factor(path, points, directions, (none, none))
+    return np.asarray(turned(*_along(path, samples, axis, sines, places), "float64"))
 
 
 def remaining_factor(
@@ -139,12 +127,55 @@ def remaining_factor(
     samples: SineSamples | SineGeometry,
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
+    dtype: str = "float64",
 ) -> np.ndarray:
-    """Return the slow factor divided by both axis factors. It varies even more slowly over the window."""
-    whole = slow_factor(path, samples.points_at(*directions), directions, window)
+    """Return the slow factor, relative to the middle of the window, divided by both axis factors.
+
+    It varies even more slowly over the window. Arguments: see `slow_factor`.
+    """
+    none, points = np.zeros((1,) * directions[0].ndim), samples.points_at(*directions)
+    size, waves = _slow(path, points, directions, window)
+    middle = _slow(path, points, directions, (none, none))
+    size, waves = size / middle[0], waves - middle[1]
     for axis in (0, 1):
-        whole = whole / axis_factor(path, samples, axis, directions[axis], window[axis])
-    return whole
+        along = _along(path, samples, axis, directions[axis], window[axis])
+        size /= along[0]
+        waves -= along[1]
+    return np.asarray(turned(size, waves, dtype))
+
+
+def _slow(
+    path: Path,
+    pupil: tuple[np.ndarray, np.ndarray],
+    directions: tuple[np.ndarray, np.ndarray],
+    window: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return amplitude and phase [waves] of `slow_factor`."""
+    (xi, eta), (u, v), (s, t) = pupil, window, directions
+    x, y = u + path.window.centre[0], v + path.window.centre[1]
+    wavelength, z = path.numbers(max(part.ndim for part in (xi, eta, x, y)))
+    rho2 = x * x + y * y + z * z
+    excess = xi * xi + eta * eta - 2 * (x * xi + y * eta)
+    distance2 = rho2 + excess
+    excess /= np.sqrt(distance2) + np.sqrt(rho2)
+    excess += u * s + v * t
+    excess /= wavelength
+    return z * z / distance2, excess
+
+
+def _along(
+    path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return amplitude and phase [waves] of `axis_factor`."""
+    none, elsewhere = np.zeros((1,) * max(sines.ndim, places.ndim)), samples.elsewhere
+    other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
+    directions, window = ((sines, other), (places, none)) if axis == 0 else ((other, sines), (none, places))
+    points = samples.points_at(*directions)
+    size, waves = _slow(path, points, directions, window)
+    middle = _slow(path, points, directions, (none, none))
+    size /= middle[0]
+    waves -= middle[1]
+    return size, waves
 
 
 def cross_term(
@@ -169,17 +200,31 @@ def cross_term(
 def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, dtype: str) -> np.ndarray:
     """Return the Fourier kernel times `axis_factor`, (stack, place, sample), complex.
 
-    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window.
+    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window. Its phase is smooth,
+    and is interpolated from a few sines and positions.
 
     places: positions [m] along the axis, relative to the middle of the window, (stack, place).
     dtype: "float32" or "float64".
     """
-    none, at, place = np.zeros((1, 1, 1)), samples.at[:, None, :], places[:, :, None]
-    other = samples.elsewhere[:, None, None]
-    directions, window = ((at, other), (place, none)) if axis == 0 else ((other, at), (none, place))
-    points = samples.points_at(*directions)
-    moved = slow_factor(path, points, (none, none), window, dtype)
-    return moved / slow_factor(path, points, (none, none), (none, none)).astype(moved.dtype)
+    at = samples.at
+    if len(places) > 1 or min(places.shape[1], at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
+        return np.asarray(turned(*_whole(path, samples, axis, at, places), dtype))
+    nodes = chebyshev_points(SMOOTH)
+    sides = [part[:, [0, -1]] for part in (at, places)]
+    sines, few = (side.mean(axis=1)[:, None] + np.diff(side) / 2 * nodes for side in sides)
+    to_sines, to_places = (even_weights(part.shape[1], SMOOTH) for part in (at, places))
+    parts = (to_places @ part @ to_sines.T for part in _whole(path, samples, axis, sines, few))
+    return np.asarray(turned(*parts, dtype))
+
+
+def _whole(
+    path: Path, samples: SineStack, axis: int, sines: np.ndarray, places: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return amplitude and phase [waves] of `axis_kernel`, (stack, place, sine)."""
+    sines, places = sines[:, None, :], places[:, :, None]
+    size, waves = _along(path, samples, axis, sines, places)
+    wavelength, _ = path.numbers(3)
+    return size, waves - places * sines / wavelength
 
 
 def fourier_kernel(

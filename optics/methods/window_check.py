@@ -13,7 +13,7 @@ from bisect import bisect
 import numpy as np
 
 from optics.methods.sine_stack import SineStack
-from optics.methods.slow_factor import Path, axis_kernel, remaining_factor, slow_factor
+from optics.methods.slow_factor import Path, axis_kernel, remaining_factor
 from optics.methods.window_sums import intensity_of
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
@@ -91,9 +91,7 @@ def _ratios(
         s, t = (part[:, None, None] for part in directions)
         more = (1,) * (s.ndim - 3)
         place = u.reshape(len(u), 1, -1, *more), v.reshape(len(v), -1, 1, *more)
-        middle = slow_factor(path, samples.points_at(s, t), (s, t), (none := np.zeros((1,) * s.ndim), none))
-        found = remaining_factor(path, samples, (s, t), place) / middle
-        return np.asarray(found, np.result_type(dtype, np.complex64))
+        return remaining_factor(path, samples, (s, t), place, dtype)
 
     angle, outermost = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None]
     rim = samples.directions(outermost * np.cos(angle), outermost * np.sin(angle))

@@ -6,12 +6,11 @@ import numpy as np
 
 from optics.elements.light_stack import LightStack
 from optics.methods.sine_stack import SineStack
-from optics.methods.slow_factor import Path, axis_kernel, cross_term, remaining_factor, slow_factor
+from optics.methods.slow_factor import Path, axis_kernel, cross_term, remaining_factor
 from optics.methods.window_check import window_errors
 from optics.methods.window_sums import intensity_of, window_field
 from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
-from optics.numerics.precision import precision
 
 __all__ = ["window_image_errors", "window_images"]
 
@@ -71,7 +70,4 @@ def _node_factors(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str)
     """
     s, t = samples.at[:, None, None, None, :], samples.at[:, None, None, :, None]
     u, v = nodes[None, None, :, None, None], nodes[None, :, None, None, None]
-    none = np.zeros((1,) * 5)
-    middle = slow_factor(path, samples.points_at(s, t), (s, t), (none, none))
-    factors = remaining_factor(path, samples, (s, t), (u, v)) / middle
-    return factors.astype(precision(dtype).complex_dtype)
+    return remaining_factor(path, samples, (s, t), (u, v), dtype)

@@ -27,13 +27,13 @@ __all__ = ["TIGHTEST", "WindowPlan"]
 
 TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
 # Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check.
-RIPPLES = (0.03, 0.0075)
+RIPPLES = (0.015, 0.004)
 # Choices for the passband of the soft edge, in cycles per radius, at a tolerance of 0.01: of light along the axis, and
 # relative to the cycles of the rays at the edge; exponent of the tolerance; and passband of the check, relative to it.
-EDGE_CYCLES, RIM_CYCLES, EXPONENT, SHARPER = 4.0, 1.2, -0.4, 1.4
+EDGE_CYCLES, RIM_CYCLES, EXPONENT, SHARPER = 2.0, 1.0, -0.4, 1.6
 # Choices: light that is neglected, as a share of all light; part of the stopband that may not be aliased.
-NEGLECTED, ALIASED = 3e-4, 1.0
-QUANT=.9
+NEGLECTED, ALIASED = 3e-4, 0.97
+QUANT=1.
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
 CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
 DERIVATIVE_PART = 0.2  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF

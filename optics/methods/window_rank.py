@@ -16,7 +16,9 @@ from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 __all__ = ["DERIVATIVE_ERROR", "Derivatives", "WindowRays", "window_ranks"]
 
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
-RANK_SHARE = 0.6  # choice: part of these errors that the rank may take
+# Choices: parts of these errors that the rank may take, and with `cross_term`, whose remaining phase depends mostly on
+# the position in the window alone.
+RANK_SHARE, CROSSED_SHARE = 0.3, 0.8
 RAYS, PLACES = 100, 6  # choices: numbers of rays, and of places along a side of the window, that determine the rank
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
 OUTSIDE = 1e-3  # choice: weight of rays that miss the window
@@ -119,8 +121,7 @@ def window_ranks(
         found[(found == 0) & np.all(fits, axis=0)] = rank
         if rank == 1 and derivatives is None and not found.all():
             a, b = cross_term(path, geometry, rays.directions, rays.window)
-            middle = remaining_factor(path, geometry, rays.directions, (np.zeros((1, 1)), np.zeros((1, 1))))
-            crossed = (found == 0) & (_rms(exact[0] - middle * (1 + a * b), rays.weight) < tests[0][3])
+            crossed = (found == 0) & (_rms(exact[0] - 1 - a * b, rays.weight) < tests[0][3] * (CROSSED_SHARE / RANK_SHARE))
             found[crossed] = 1
     return found, crossed
 
