@@ -33,7 +33,7 @@ class StackSlopes:
     along_x: np.ndarray
     along_y: np.ndarray
 
-    @property
+    @cached_property
     def steepest(self) -> np.ndarray:
         """Largest slope over the disk, (beam,)."""
         found: np.ndarray = np.sqrt((np.square(self.along_x) + np.square(self.along_y)).max(axis=1))
@@ -51,7 +51,12 @@ class LightStack:
 
     def part(self, places: Sequence[int] | np.ndarray) -> LightStack:
         """Return some of the beams."""
-        return LightStack(tuple(self.beams[place] for place in places))
+        found = LightStack(tuple(self.beams[place] for place in places))
+        chosen = set(map(int, places))
+        coefficients, others = self._polynomials
+        mine = [k for k, place in enumerate(places) if int(place) in chosen.intersection(others)]
+        found.__dict__["_polynomials"] = coefficients[np.asarray(places, int)], mine
+        return found
 
     @cached_property
     def radius(self) -> np.ndarray:

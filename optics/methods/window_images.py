@@ -45,11 +45,11 @@ def window_images(
 
 
 def window_image_errors(
-    stack: LightStack, finer: SineStack, images: np.ndarray, window: Grid, dtype: str
+    stack: LightStack, finer: SineStack, images: np.ndarray, window: Grid, tolerance: float
 ) -> np.ndarray:
     """Return the relative L2 errors of the results of `window_images`, (beam,), see `window_errors`."""
     path = Path(stack.wavelength, stack.distance, window)
-    return window_errors(finer, path, finer.arriving(stack, dtype), images)
+    return window_errors(finer, path, finer.arriving(stack, str(images.dtype)), images, tolerance)
 
 
 def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: str) -> np.ndarray:

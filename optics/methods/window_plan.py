@@ -41,7 +41,7 @@ DERIVATIVE_PART = 0.2  # choice: tolerance of the edge if the PSF carries deriva
 STEPS, EDGES = 4, 8
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
-PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 8e-4, 4e-8, 3e-8, 2.5e-10
+PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 4e-4, 1.5e-8, 3e-8, 1.5e-10
 MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of the slow factor
 
 

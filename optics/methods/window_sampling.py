@@ -96,9 +96,9 @@ class WindowSampling:
 
         image: |U|² over the window, divided by the area of the pupil, flat.
         """
-        seen = image.reshape(1, *problem.window.shape) * beam.pupil.area
+        seen = image.reshape(1, *problem.window.shape) * image.dtype.type(beam.pupil.area)
         own, finer = LightStack((problem.light,)), single_stack(self.finer)
-        [error] = window_image_errors(own, finer, seen, problem.window, problem.dtype)
+        [error] = window_image_errors(own, finer, seen, problem.window, problem.tolerance)
         return float(error) if error >= 0 else None
 
 

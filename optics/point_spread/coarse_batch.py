@@ -26,7 +26,7 @@ __all__ = ["coarse_psfs"]
 MOST_SECONDS = 4e-3  # choice: predicted time of a PSF [s] above which another method may be faster
 TRIES = 2  # choice: number of attempts to meet a tolerance
 NEXT_TOLERANCE = 0.3  # choice: if an error is f times too large, the next tolerance is f / 0.3 times smaller
-STACK = 60_000  # choice, limited by memory: samples of pupils, or of windows, in a stack
+STACK = 200_000  # choice, limited by memory: samples of pupils, or of windows, in a stack
 
 
 def coarse_psfs(
@@ -69,7 +69,7 @@ def _computed(plan: WindowPlan, dtype: str) -> Iterator[tuple[np.ndarray, np.nda
             samples, finer = plan.samples(part)
             own = plan.stack.part(part)
             images = window_images(own, samples, rank, crossed, plan.window, dtype)
-            errors = window_image_errors(own, finer, images, plan.window, dtype)
+            errors = window_image_errors(own, finer, images, plan.window, float(plan.tolerance.max()))
             areas = np.array([beam.pupil.area for beam in own.beams])
             yield part, images / areas[:, None, None].astype(images.dtype), errors
 
