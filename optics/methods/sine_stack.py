@@ -93,16 +93,19 @@ class SineStack(SineGeometry):
         found: np.ndarray = (1 + np.array([edge.reach for edge in self.edges])) * self.radius
         return found
 
-    @cached_property
-    def _cosine2(self) -> np.ndarray:
-        """Squared cosines of the angles between rays and axis, (pupil, y, x)."""
-        sx, sy = (part[:, None] for part in self._middle)
-        return self._squared_cosine((self.at + sx)[:, None, :], (self.at + sy)[:, :, None])
+    def _cosine2(self, dtype: str = "float64") -> np.ndarray:
+        """Return the squared cosines of the angles between rays and axis, (pupil, y, x)."""
+        across, down = (np.square(self.at + part[:, None]).astype(dtype) for part in self._middle)
+        found: np.ndarray = (1 - across)[:, None, :] - down[:, :, None]
+        least = 1 - np.maximum(np.square(self.steepest), MOST_SQUARE)
+        if (found[:, [0, 0, -1, -1], [0, -1, 0, -1]].min(axis=1) < least).any():
+            np.maximum(found, least[:, None, None], out=found)
+        return found
 
     @cached_property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
         """Points (x, y) [m] of all samples, (pupil, y, x)."""
-        slant = self.distance[:, None, None] / np.sqrt(self._cosine2)
+        slant = self.distance[:, None, None] / np.sqrt(self._cosine2())
         sx, sy = (part[:, None] for part in self._middle)
         return (self.at + sx)[:, None, :] * slant + self.centre[0], (self.at + sy)[:, :, None] * slant + self.centre[1]
 
@@ -123,7 +126,7 @@ class SineStack(SineGeometry):
         size = size if amplitude is None else size * amplitude
         waves = self._waves(stack)
         if near:
-            there = (self.distance[:, None, None] / np.sqrt(self._cosine2)) / stack.wavelength[:, None, None]
+            there = (self.distance[:, None, None] / np.sqrt(self._cosine2())) / stack.wavelength[:, None, None]
             size = size * np.sqrt(1 + 1 / np.square(2 * np.pi * there))
             waves = waves + np.arctan(1 / (2 * np.pi * there)) / (2 * np.pi)
         return np.asarray(turned(size, waves, dtype))
@@ -140,7 +143,7 @@ class SineStack(SineGeometry):
         return {}
 
     def _new_sizes(self, dtype: str) -> np.ndarray:
-        cosine2 = self._cosine2.astype(dtype)
+        cosine2 = self._cosine2(dtype)
         size = (self.distance * np.square(self.pitch))[:, None, None].astype(dtype) / cosine2
         first: dict[int, int] = {}
         same = np.array([first.setdefault(id(edge), place) for place, edge in enumerate(self.edges)])

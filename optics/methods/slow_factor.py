@@ -15,15 +15,16 @@ from optics.methods.pupil_sampling import PupilSamples
 from optics.methods.sine_samples import SineSamples
 from optics.methods.sine_stack import SineGeometry, SineStack, even_weights
 from optics.numerics.array_library import turned
-from optics.numerics.grid import Grid
+from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
-__all__ = ["RANKS", "Path", "axis_factor", "axis_kernel", "cross_term", "fourier_kernel", "remaining_factor", "slow_factor", "uniform_rank"]
+__all__ = ["RANKS", "Path", "axis_factor", "axis_kernel", "cross_term", "fourier_kernel", "remaining_factor", "slow_factor", "uniform_rank", "window_kernel"]
 
 # Choice: ranks to try, in ascending order.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 # Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; see test_low_rank.py.
 RANK_RIPPLE = 0.4
+FEW_WAVES = 1000.0  # choice: number of waves of a path up to which float32 is sufficient
 SMOOTH = 12  # choice: number of sines, and of positions, from which smooth phases are interpolated
 TRIED = 41  # choice: number of test positions along a line through the window
 
@@ -42,6 +43,15 @@ class Path:
     @classmethod
     def from_problem(cls, problem: Problem) -> Path:
         return cls(problem.wavelength, problem.distance, problem.window)
+
+    def short(self, steepest: float | np.ndarray) -> bool:
+        """Return whether paths differ by few enough waves for float32, for pupils with sines up to `steepest`."""
+        reach = steepest + np.hypot(*self.window.centre) / self.distance + self.window.half_diagonal / self.distance
+        return bool(np.max(np.square(reach) * self.distance / self.wavelength) < FEW_WAVES)
+
+    def rounded(self, dtype: str) -> Path:
+        """Return the same path with numbers of another type."""
+        return Path(*(np.asarray(part, dtype) for part in (self.wavelength, self.distance)), self.window)
 
     def numbers(self, axes: int) -> tuple[float | np.ndarray, float | np.ndarray]:
         """Return wavelength and distance, with as many axes as the arrays with which they broadcast."""
@@ -131,9 +141,14 @@ def remaining_factor(
 ) -> np.ndarray:
     """Return the slow factor, relative to the middle of the window, divided by both axis factors.
 
-    It varies even more slowly over the window. Arguments: see `slow_factor`.
+    It varies even more slowly over the window. Arguments: see `slow_factor`. With dtype="float32", short paths are
+    computed in float32, too.
     """
     none, points = np.zeros((1,) * directions[0].ndim), samples.points_at(*directions)
+    if dtype == "float32" and path.short(samples.steepest):
+        path = path.rounded(dtype)
+        points, directions, window = (tuple(part.astype(dtype) for part in pair) for pair in (points, directions, window))
+        none = none.astype(dtype)
     size, waves = _slow(path, points, directions, window)
     middle = _slow(path, points, directions, (none, none))
     size, waves = size / middle[0], waves - middle[1]
@@ -167,10 +182,11 @@ def _along(
     path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return amplitude and phase [waves] of `axis_factor`."""
-    none, elsewhere = np.zeros((1,) * max(sines.ndim, places.ndim)), samples.elsewhere
+    none, elsewhere = np.zeros((1,) * max(sines.ndim, places.ndim), places.dtype), samples.elsewhere
     other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
+    other = other.astype(places.dtype)
     directions, window = ((sines, other), (places, none)) if axis == 0 else ((other, sines), (none, places))
-    points = samples.points_at(*directions)
+    points = tuple(part.astype(places.dtype) for part in samples.points_at(*directions))
     size, waves = _slow(path, points, directions, window)
     middle = _slow(path, points, directions, (none, none))
     size /= middle[0]
@@ -200,19 +216,26 @@ def cross_term(
 def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, dtype: str) -> np.ndarray:
     """Return the Fourier kernel times `axis_factor`, (stack, place, sample), complex.
 
-    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window. Its phase is smooth,
-    and is interpolated from a few sines and positions.
+    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window.
 
     places: positions [m] along the axis, relative to the middle of the window, (stack, place).
     dtype: "float32" or "float64".
     """
-    at = samples.at
-    if len(places) > 1 or min(places.shape[1], at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
-        return np.asarray(turned(*_whole(path, samples, axis, at, places), dtype))
+    return np.asarray(turned(*_whole(path, samples, axis, samples.at, places), dtype))
+
+
+def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
+    """Return `axis_kernel` for all columns (0) or rows (1) of the window, (stack, place, sample).
+
+    The phase is smooth, and is interpolated from a few sines and positions.
+    """
+    at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
+    if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
+        return axis_kernel(path, samples, axis, place[None, :], dtype)
     nodes = chebyshev_points(SMOOTH)
-    sides = [part[:, [0, -1]] for part in (at, places)]
+    sides = [part[:, [0, -1]] for part in (at, place[None, :])]
     sines, few = (side.mean(axis=1)[:, None] + np.diff(side) / 2 * nodes for side in sides)
-    to_sines, to_places = (even_weights(part.shape[1], SMOOTH) for part in (at, places))
+    to_sines, to_places = (even_weights(count, SMOOTH) for count in (at.shape[1], len(place)))
     parts = (to_places @ part @ to_sines.T for part in _whole(path, samples, axis, sines, few))
     return np.asarray(turned(*parts, dtype))
 

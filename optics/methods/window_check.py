@@ -23,7 +23,7 @@ CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_s
 UNSEEN = 0.05  # choice: error that both sums may share, relative to the tolerance
 ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
 SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities with which these are drawn, see `_drawn`
-INTERPOLATED = 0.3  # choice: largest error of the interpolated kernel of the check, relative to the tolerance
+INTERPOLATED = 0.5  # choice: largest error of the interpolated kernel of the check, relative to the tolerance
 # Choices: numbers of interpolation points across the pupil, and phases [rad] up to which the earlier ones may suffice.
 ORDERS, PHASES = (2, 3, 5, 7, 9, 12, 16), (0.02, 0.3, 0.8, 1.5, 3.0, 6.0)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from optics.elements.light_stack import LightStack
 from optics.methods.sine_stack import SineStack
-from optics.methods.slow_factor import Path, axis_kernel, cross_term, remaining_factor
+from optics.methods.slow_factor import Path, cross_term, remaining_factor, window_kernel
 from optics.methods.window_check import window_errors
 from optics.methods.window_sums import intensity_of, window_field
 from optics.numerics.grid import Grid, sample_positions
@@ -54,10 +54,10 @@ def window_image_errors(
 
 def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: str) -> np.ndarray:
     """Return the kernel along x (0) or y (1) times interpolation weights of the nodes, (pupil, place, a · sample)."""
-    place = sample_positions(path.window.shape[1 - axis], path.window.dx)
-    kernel = axis_kernel(path, samples, axis, place[None, :], dtype)
+    kernel = window_kernel(path, samples, axis, dtype)
     if len(nodes) == 1:
         return kernel
+    place = sample_positions(path.window.shape[1 - axis], path.window.dx)
     weight = lagrange_basis(place, nodes).T.astype(dtype)
     found: np.ndarray = weight[None, :, :, None] * kernel[:, :, None, :]
     return found.reshape(len(kernel), len(place), -1)

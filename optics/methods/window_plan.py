@@ -33,7 +33,9 @@ RIPPLES = (0.015, 0.004)
 EDGE_CYCLES, RIM_CYCLES, EXPONENT, SHARPER = 2.0, 1.0, -0.4, 1.6
 # Choices: light that is neglected, as a share of all light; part of the stopband that may not be aliased.
 NEGLECTED, ALIASED = 3e-4, 0.97
-QUANT=1.
+# Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
+# diffraction spreads the light of a ray.
+NEAR_CYCLES, SPREAD_CYCLES = 3.5, 2.0
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
 CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
 DERIVATIVE_PART = 0.2  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
@@ -147,6 +149,11 @@ class WindowPlan:
         found: np.ndarray = self.half * stack.radius / (stack.wavelength * stack.distance)
         return found
 
+    @property
+    def _near_cycles(self) -> np.ndarray:
+        """The same in the part of the window where light from the edge is bright enough to matter."""
+        return np.minimum(self._window_cycles, NEAR_CYCLES)
+
     @cached_property
     def _density(self) -> np.ndarray:
         """Numbers of samples per radius, which are also the numbers of cycles per radius that they resolve."""
@@ -159,7 +166,9 @@ class WindowPlan:
             0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(min(tolerance, 0.1), radius) * radius
             for beam, radius, tolerance in zip(stack.beams, stack.radius, self.tolerance, strict=True)
         ]
-        found: np.ndarray = self._window_cycles + masks + np.maximum(reach, self._rim + ALIASED * edge)
+        found: np.ndarray = masks + np.maximum(
+            self._window_cycles + reach + SPREAD_CYCLES, self._near_cycles + self._rim + ALIASED * edge
+        )
         return found
 
     @cached_property
@@ -175,15 +184,15 @@ class WindowPlan:
 
     @cached_property
     def _rim(self) -> np.ndarray:
-        """Cycles per radius of nearly all rays at the edge, (beam,)."""
+        """Largest cycles per radius of the rays at the edge, (beam,)."""
         slopes = self.stack.slopes
-        found: np.ndarray = np.quantile(self._to_middle[:, np.hypot(slopes.x, slopes.y) > RIM], QUANT, axis=1)
+        found: np.ndarray = self._to_middle[:, np.hypot(slopes.x, slopes.y) > RIM].max(axis=1)
         return found
 
     @cached_property
     def _passband(self) -> np.ndarray:
         """Cycles per radius that the soft edge leaves unchanged, (beam,)."""
-        sharp, cells = EDGE_CYCLES + RIM_CYCLES * (self._rim + self._window_cycles), 0.0
+        sharp, cells = EDGE_CYCLES + RIM_CYCLES * (self._rim + self._near_cycles), 0.0
         if self.derivatives is not None:
             # High modes grow outside the circle, so that their derivatives need a sharper edge.
             fronts = [beam.pupil.wavefront for beam in self.stack.beams]
