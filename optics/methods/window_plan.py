@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -27,20 +27,22 @@ __all__ = ["TIGHTEST", "WindowPlan"]
 
 TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
 # Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check.
-RIPPLES = (0.015, 0.004)
-# Choices for the passband of the soft edge, in cycles per radius, at a tolerance of 0.01: of light along the axis, and
-# relative to the cycles of the rays at the edge; exponent of the tolerance; and passband of the check, relative to it.
-EDGE_CYCLES, RIM_CYCLES, EXPONENT, SHARPER = 2.0, 1.0, -0.4, 1.6
+RIPPLES, RIPPLE_EXPONENT = (0.015, 0.004), 0.5
+# Choices for the passband of the soft edge, in cycles per radius: margin at a tolerance of 0.01, exponent of the
+# tolerance, and the largest passband of the check, relative to that of the samples.
+EDGE_CYCLES, EXPONENT, SHARPER = 2.5, -0.6, 2.0
 # Choices: light that is neglected, as a share of all light; part of the stopband that may not be aliased.
 NEGLECTED, ALIASED = 3e-4, 0.97
 # Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
 # diffraction spreads the light of a ray.
 NEAR_CYCLES, SPREAD_CYCLES = 3.5, 2.0
-RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
+# Choices: distance from the axis [radii] beyond which rays count as rays of the edge, and cycles of most of these rays,
+# relative to their median.
+RIM, RIM_CYCLES = 0.85, 1.2
 CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
-DERIVATIVE_PART = 0.2  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
+DERIVATIVES = 1.9  # choice: passband of the soft edge if the PSF carries derivatives, relative to that of other PSFs
 # Choices: numbers of samples and sharpnesses of the edge per octave; equal ones share arrays and tables.
-STEPS, EDGES = 4, 8
+STEPS, EDGES = 4, 4
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
 PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 4e-4, 1.5e-8, 3e-8, 1.5e-10
@@ -161,7 +163,7 @@ class WindowPlan:
         share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
         last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
         reach = np.take_along_axis(np.sort(along, axis=1), last[:, None], axis=1)[:, 0]
-        edge = self._passband + _transition(RIPPLES[0])
+        edge = self._passband + _transitions(self._ripples[0])
         masks = [
             0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(min(tolerance, 0.1), radius) * radius
             for beam, radius, tolerance in zip(stack.beams, stack.radius, self.tolerance, strict=True)
@@ -184,22 +186,21 @@ class WindowPlan:
 
     @cached_property
     def _rim(self) -> np.ndarray:
-        """Largest cycles per radius of the rays at the edge, (beam,)."""
+        """Cycles per radius of most rays at the edge, (beam,)."""
         slopes = self.stack.slopes
-        found: np.ndarray = self._to_middle[:, np.hypot(slopes.x, slopes.y) > RIM].max(axis=1)
-        return found
+        found: np.ndarray = np.median(self._to_middle[:, np.hypot(slopes.x, slopes.y) > RIM], axis=1)
+        return RIM_CYCLES * found
 
     @cached_property
     def _passband(self) -> np.ndarray:
         """Cycles per radius that the soft edge leaves unchanged, (beam,)."""
-        sharp, cells = EDGE_CYCLES + RIM_CYCLES * (self._rim + self._near_cycles), 0.0
+        margin = EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
+        found: np.ndarray = self._rim + self._near_cycles + margin
         if self.derivatives is not None:
             # High modes grow outside the circle, so that their derivatives need a sharper edge.
             fronts = [beam.pupil.wavefront for beam in self.stack.beams]
             orders = np.array([front.order if isinstance(front, Zernike) else 0 for front in fronts])
-            sharp = sharp * DERIVATIVE_PART**EXPONENT + orders
-            cells = self.derivatives.cells * CELL_CYCLES
-        found: np.ndarray = (sharp + cells) * (self.tolerance / 0.01) ** EXPONENT
+            found = found * DERIVATIVES + orders + self.derivatives.cells * CELL_CYCLES
         return found
 
     def _pitch(self, density: np.ndarray) -> np.ndarray:
@@ -212,19 +213,29 @@ class WindowPlan:
         return found
 
     @cached_property
+    def _ripples(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ripples of the soft edges of the samples and of the finer samples, which fall in steps, (beam,)."""
+        share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0) ** RIPPLE_EXPONENT
+        return RIPPLES[0] * share, RIPPLES[1] * share
+
+    @cached_property
     def _edges(self) -> list[SoftAperture]:
-        return self._soft(self._passband, RIPPLES[0])
+        return self._soft(self._passband, self._ripples[0])
 
     @cached_property
     def _finer_edges(self) -> list[SoftAperture]:
-        return self._soft(SHARPER * self._passband, RIPPLES[1])
+        """Soft apertures that are as sharp as the finer samples allow."""
+        stopband = (FINER * self._density - self._near_cycles - self._rim) / ALIASED
+        passband = np.maximum(stopband - _transitions(self._ripples[1]), self._passband)
+        return self._soft(np.minimum(passband, SHARPER * self._passband), self._ripples[1])
 
-    def _soft(self, passband: np.ndarray, ripple: float) -> list[SoftAperture]:
+    def _soft(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
         """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""
-        passband = 2.0 ** (np.ceil(EDGES * np.log2(passband)) / EDGES)
+        passband = 2.0 ** (np.ceil(EDGES * np.log2(passband) - 1e-9) / EDGES)
+        stopband = passband + _transitions(ripples)
         return [
-            beam.pupil.aperture.with_edge(cycles, cycles + _transition(ripple), ripple)
-            for beam, cycles in zip(self.stack.beams, map(float, passband), strict=True)
+            beam.pupil.aperture.with_edge(*edge)
+            for beam, *edge in zip(self.stack.beams, *(part.tolist() for part in (passband, stopband, ripples)), strict=True)
         ]
 
     @cached_property
@@ -240,9 +251,14 @@ class WindowPlan:
         return rim_sines(outermost, self.window.centre, self.stack.distance)
 
 
-def _transition(ripple: float) -> float:
-    """Return the smallest width of the transition from passband to stopband, in cycles per radius.
+def _transitions(ripples: np.ndarray) -> np.ndarray:
+    """Return the smallest widths of the transition from passband to stopband, in cycles per radius.
 
     The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to this one.
     """
+    return np.array([_transition(ripple) for ripple in ripples.tolist()])
+
+
+@lru_cache(maxsize=64)
+def _transition(ripple: float) -> float:
     return SoftEdge(0.0, 1.0, ripple).reach / EDGE_REACH
