@@ -13,6 +13,7 @@ from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.elements.derivative_knots import DerivativeKnots, carries_derivatives, derivative_knots
+from optics.elements.light_stack import LightStack
 from optics.elements.torch_numbers import refuse_torch
 from optics.elements.wavefront_slopes import Slopes
 from optics.methods.derivative_cells import derivative_cells
@@ -123,6 +124,11 @@ class Problem:
         symmetric = found.symmetric and still and beam.pupil.rotationally_symmetric(beam.wavelength)
         even = found.even and still and beam.pupil.mirror_symmetric(beam.wavelength)
         return replace(found, moves=carries_derivative(beam.distance), symmetric=symmetric, even=even)
+
+    @cached_property
+    def stack(self) -> LightStack:
+        """The light as a stack of one beam."""
+        return LightStack((self.light,))
 
     @cached_property
     def slopes(self) -> Slopes:

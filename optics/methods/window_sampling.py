@@ -13,7 +13,6 @@ from functools import lru_cache
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.elements.light_stack import LightStack
 from optics.methods.carrier import on_window
 from optics.methods.problem import Problem
 from optics.methods.pupil_edge import PupilEdge
@@ -61,7 +60,7 @@ class WindowSampling:
     def plain_intensity(self, beam: Beam, problem: Problem) -> np.ndarray:
         """Return the result of `intensity` as a NumPy array without derivatives."""
         samples = single_stack(self.pupil)
-        return window_images(LightStack((problem.light,)), samples, self.rank, self.crossed, problem.window, problem.dtype).ravel()
+        return window_images(problem.stack, samples, self.rank, self.crossed, problem.window, problem.dtype).ravel()
 
     def field(self, beam: Beam, problem: Problem) -> Field:
         """Return U over the window, without the carrier e^{ikz}."""
@@ -97,8 +96,7 @@ class WindowSampling:
         image: |U|² over the window, divided by the area of the pupil, flat.
         """
         seen = image.reshape(1, *problem.window.shape) * image.dtype.type(beam.pupil.area)
-        own, finer = LightStack((problem.light,)), single_stack(self.finer)
-        [error] = window_image_errors(own, finer, seen, problem.window, problem.tolerance)
+        [error] = window_image_errors(problem.stack, single_stack(self.finer), seen, problem.window, problem.tolerance)
         return float(error) if error >= 0 else None
 
 
@@ -110,8 +108,7 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
     needs = None
     if problem.differentiated:
         needs = Derivatives(problem.moves, 0 if problem.knots is None else len(problem.knots.borders) - 1)
-    stack = LightStack((problem.light,))
-    plan = WindowPlan(stack, problem.window, np.array([problem.tolerance]), needs)
+    plan = WindowPlan(problem.stack, problem.window, np.array([problem.tolerance]), needs)
     if not plan.counts[0]:
         return None
     pupil, finer = (_single(samples) for samples in plan.samples(np.array([0])))
