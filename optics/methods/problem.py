@@ -253,11 +253,12 @@ class Problem:
     @property
     def steepest_sine(self) -> float:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
-        straight, per_slope = self.radius / math.hypot(self.radius, self.distance), SLOPE_MARGIN / self.medium_n
-        if per_slope * self.sampled_slopes.steepest_inside >= straight:
+        straight = self.radius / math.hypot(self.radius, self.distance)
+        slopes = self.sampled_slopes.steepest_inside if self.pixelated is not None else float(self.stack.slopes.steepest[0])
+        if SLOPE_MARGIN * slopes >= straight * self.medium_n:
             return straight  # all slopes and finer detail can only increase the sine of light that leaves the pupil
-        leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius
-        return steepest_sine(self.radius, self.distance, leaving)
+        band = SLOPE_MARGIN * slopes / self.light.wavelength + self.detail
+        return steepest_sine(self.radius, self.distance, (band + 1 / self.radius) * self.wavelength)
 
     @property
     def scalar_error(self) -> float:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -131,16 +132,16 @@ class SineStack(SineGeometry):
             waves = waves + np.arctan(1 / (2 * np.pi * there)) / (2 * np.pi)
         return np.asarray(turned(size, waves, dtype))
 
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """Arrays that do not depend on the light, for further PSFs with the same samples."""
+        return {}
+
     def _sizes(self, dtype: str) -> np.ndarray:
         """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x)."""
-        known = self._known_sizes
-        if dtype not in known:
-            known[dtype] = self._new_sizes(dtype)
-        return known[dtype]
-
-    @cached_property
-    def _known_sizes(self) -> dict[str, np.ndarray]:
-        return {}
+        if dtype not in self.known:
+            self.known[dtype] = self._new_sizes(dtype)
+        return np.asarray(self.known[dtype])
 
     def _new_sizes(self, dtype: str) -> np.ndarray:
         cosine2 = self._cosine2(dtype)

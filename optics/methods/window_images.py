@@ -28,11 +28,11 @@ def window_images(
     path = Path(stack.wavelength, stack.distance, window)
     nodes = max(window.own_half_width, window.dx) * chebyshev_points(rank)
     field = samples.arriving(stack, dtype)
-    kernel = np.ones((1, 1, 1, 1)) if rank == 1 else _node_factors(path, samples, nodes, dtype)
-    down = _along(path, samples, 1, nodes, dtype)
-    same = window.shape[0] == window.shape[1] and window.centre[0] == window.centre[1]
-    across = down if same else _along(path, samples, 0, nodes, dtype)
+    down, across = _fourier(path, samples, nodes, dtype)
     if not crossed:
+        if rank == 1:
+            return np.asarray(intensity_of(down @ field @ across.swapaxes(1, 2)))
+        kernel = _node_factors(path, samples, nodes, dtype)
         return np.asarray(intensity_of(window_field(field, kernel, down, across)))
     at, (u, v) = samples.at[:, None, :], (
         sample_positions(n, window.dx)[None, :, None] for n in window.shape[::-1]
@@ -50,6 +50,17 @@ def window_image_errors(
     """Return the relative L2 errors of the results of `window_images`, (beam,), see `window_errors`."""
     path = Path(stack.wavelength, stack.distance, window)
     return window_errors(finer, path, finer.arriving(stack, str(images.dtype)), images, tolerance)
+
+
+def _fourier(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return `_along` for rows and columns. Further PSFs with the same samples share them."""
+    window, key = path.window, ("fourier", path.window, len(nodes), np.asarray(path.wavelength).tobytes(), dtype)
+    if key not in samples.known:
+        down = _along(path, samples, 1, nodes, dtype)
+        same = window.shape[0] == window.shape[1] and window.centre[0] == window.centre[1]
+        samples.known[key] = down, down if same else _along(path, samples, 0, nodes, dtype)
+    found: tuple[np.ndarray, np.ndarray] = samples.known[key]
+    return found
 
 
 def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: str) -> np.ndarray:

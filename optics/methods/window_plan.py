@@ -43,6 +43,7 @@ CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives wi
 DERIVATIVES = 1.9  # choice: passband of the soft edge if the PSF carries derivatives, relative to that of other PSFs
 # Choices: numbers of samples and sharpnesses of the edge per octave; equal ones share arrays and tables.
 STEPS, EDGES = 4, 4
+ELSEWHERE = 8  # choice: number of steps between 0 and the largest sine
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
 PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 4e-4, 1.5e-8, 3e-8, 1.5e-10
@@ -103,9 +104,15 @@ class WindowPlan:
         return WindowRays.from_stack(self.stack, self.window)
 
     @cached_property
+    def _elsewhere(self) -> np.ndarray:
+        """Sines for `SineGeometry`, in steps of a share of the largest sine, so that PSFs can share arrays, (beam,)."""
+        step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
+        return np.asarray(np.rint(self._rays.mean_sine / step) * step)
+
+    @cached_property
     def _ranks(self) -> tuple[np.ndarray, np.ndarray]:
         steepest = np.minimum(self._rims[1], 1.0)
-        geometry = SineGeometry(self.stack.distance, self.window.centre, steepest, self._rays.mean_sine)
+        geometry = SineGeometry(self.stack.distance, self.window.centre, steepest, self._elsewhere)
         return window_ranks(self.stack, geometry, self._rays, self.window, self.tolerance, self.derivatives)
 
     def samples(self, places: np.ndarray) -> tuple[SineStack, SineStack]:
@@ -120,7 +127,7 @@ class WindowPlan:
         found = []
         for many, shift, (half, steepest, _), edges in sets:
             at = (half[places] / (many - shift))[:, None] * (np.arange(-many, many + 1) + shift)
-            geometry = self.stack.distance[places], self.window.centre, steepest[places], self._rays.mean_sine[places]
+            geometry = self.stack.distance[places], self.window.centre, steepest[places], self._elsewhere[places]
             found.append(SineStack(*geometry, at, tuple(edges[k] for k in places), self.stack.radius[places]))
         return found[0], found[1]
 

@@ -15,6 +15,7 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.elements.derivative_knots import carries_derivatives
 from optics.elements.light_stack import LightStack
+from optics.methods.problem import DETAIL_PART, SLOPE_MARGIN
 from optics.methods.scalar_theory import light_spread, scalar_theory_error, steepest_sine
 from optics.methods.window_images import window_image_errors, window_images
 from optics.methods.window_plan import TIGHTEST, WindowPlan
@@ -77,8 +78,9 @@ def _computed(plan: WindowPlan, dtype: str) -> Iterator[tuple[np.ndarray, np.nda
 def _plan(plan: WindowPlan, place: int, dtype: str, error: float) -> Plan:
     stack, across = plan.stack, 2 * int(plan.counts[place]) + 1
     pupil, wavelength = stack.beams[place].pupil, stack.wavelength[place]
-    leaving = stack.slopes.steepest[place] / stack.index[place] + wavelength / pupil.radius
-    sine = steepest_sine(pupil.radius, float(stack.distance[place]), leaving)
+    band = SLOPE_MARGIN * stack.slopes.steepest[place] / stack.vacuum_wavelength[place] + 1 / pupil.radius
+    band += pupil.bandwidth(stack.beams[place].wavelength, DETAIL_PART * plan.tolerance[place])
+    sine = steepest_sine(pupil.radius, float(stack.distance[place]), band * wavelength)
     scalar = scalar_theory_error(sine, light_spread(pupil))
     why = "as few samples as the light in the window needs"
     return Plan("low_rank", (across, across), dtype, error, why, float(plan.seconds[place]), scalar_error=scalar)
