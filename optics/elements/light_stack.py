@@ -124,7 +124,7 @@ class LightStack:
         """
         per_radius, per_wave = (part[:, None, None] for part in (1 / self.radius, 1 / self.vacuum_wavelength))
         coefficients, others = self._polynomials
-        total = np.zeros(x.shape)
+        total = np.zeros((len(self.beams), *x.shape[1:]))
         if coefficients.any():
             total += power_sum(coefficients, x * per_radius, y * per_radius)
         if self._spheres:

@@ -182,14 +182,35 @@ class SineStack(SineGeometry):
 
     def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the paths through points (x, y) [m], in waves up to a constant."""
-        z, middle = stack.distance[:, None, None], math.hypot(*self.centre)
+        found = stack.waves(x, y)
+        found += self._behind(x, y) / stack.wavelength[:, None, None]
+        return found
+
+    def _behind(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the path D - ρ [m] from points (x, y) [m] to the middle of the window."""
+        z, middle = self.distance[:, None, None], math.hypot(*self.centre)
         # D - ρ = (ξ² - 2 c·ξ) / (D + ρ), without a difference of nearly equal numbers
         excess, rho = x * x + y * y, np.hypot(z, middle)
         if middle:
             excess -= 2 * (self.centre[0] * x + self.centre[1] * y)
-        excess /= (np.sqrt(excess + rho * rho) + rho) * stack.wavelength[:, None, None]
-        excess += stack.waves(x, y)
-        return excess
+        excess /= np.sqrt(excess + rho * rho) + rho
+        return np.asarray(excess)
+
+    def to_middle(self, wavelength: float, dtype: str) -> np.ndarray:
+        """Return the factor between the light of samples and their contribution to the middle, (pupil, y, x), complex.
+
+        It is the factor in `arriving`, for light whose amplitude includes the areas of the samples.
+
+        wavelength: wavelength [m] in the medium.
+        """
+        key = "to_middle", wavelength, dtype
+        if key not in self.known:
+            z, cosine2 = self.distance[:, None, None], self._cosine2()
+            near = wavelength * np.sqrt(cosine2) / (2 * np.pi * z)
+            size = cosine2 / (z * wavelength) * np.sqrt(1 + near * near)
+            waves = self._behind(*self.points) / wavelength + np.arctan(near) / (2 * np.pi)
+            self.known[key] = turned(size, waves, dtype)
+        return np.asarray(self.known[key])
 
 
 @lru_cache(maxsize=64)

@@ -31,12 +31,14 @@ from optics.numerics.precision import padded_for_packets, precision
 
 __all__ = ["WindowSampling", "window_sampling"]
 
+CROSSED_RANK = 3  # Rank 2 is less accurate than `cross_term`.
+
 
 @dataclass(frozen=True)
 class WindowSampling:
     """Samples of the pupil, finer samples for the check, and the rank of the slow factor over the window.
 
-    crossed: whether sums without derivatives include `cross_term`. Other sums have a rank of at least 2 instead.
+    crossed: whether sums without derivatives include `cross_term`. Other sums have at least the rank CROSSED_RANK instead.
     half_width: distance [m] from the middle of the window within which the interpolation points lie.
     """
 
@@ -80,7 +82,7 @@ class WindowSampling:
 
     def sums(self, path: Path, dtype: str) -> WindowSums:
         """Return the arrays of the sums. The wavelength may be longer than that for which the samples are made."""
-        return _window_sums(self.pupil, max(self.rank, 2) if self.crossed else self.rank, self.half_width, path, dtype)
+        return _window_sums(self.pupil, max(self.rank, CROSSED_RANK) if self.crossed else self.rank, self.half_width, path, dtype)
 
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the plane over which rounding errors spread light."""

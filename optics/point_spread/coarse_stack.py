@@ -42,7 +42,7 @@ def coarse_stack(
     if sampling is None:
         return None
     images = stack.intensity(sampling)
-    met: np.ndarray = without.errors(sampling, plain(images)) <= tolerance
+    met: np.ndarray = without.errors(sampling, plain(images), tolerance) <= tolerance
     return images, met  # a dark window has no error, and is left to other methods
 
 
@@ -66,7 +66,7 @@ def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method
         found.append(sampling)
     pupil = max((each.pupil for each in found), key=_across)
     finer = max((each.finer for each in found), key=_across)
-    return replace(found[0], pupil=pupil, finer=finer, rank=max(each.rank for each in found))
+    return replace(found[0], pupil=pupil, finer=finer, rank=max(each.rank for each in found), crossed=any(each.crossed for each in found))
 
 
 def _across(samples: SineSamples) -> int:
