@@ -30,9 +30,9 @@ TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling save
 RIPPLES, RIPPLE_EXPONENT = (0.015, 0.004), 0.5
 # Choices for the passband of the soft edge, in cycles per radius: margin at a tolerance of 0.01, exponent of the
 # tolerance, and the largest passband of the check, relative to that of the samples.
-EDGE_CYCLES, EXPONENT, SHARPER = 2.5, -0.6, 2.0
+EDGE_CYCLES, EXPONENT, SHARPER = 3.0, -0.6, 2.0
 # Choices: light that is neglected, as a share of all light; part of the stopband that may not be aliased.
-NEGLECTED, ALIASED = 3e-4, 0.97
+NEGLECTED, ALIASED = 3e-4, 1.0
 # Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
 # diffraction spreads the light of a ray.
 NEAR_CYCLES, SPREAD_CYCLES = 3.5, 2.0
@@ -42,7 +42,7 @@ RIM, RIM_CYCLES = 0.85, 1.2
 CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
 DERIVATIVES = 1.9  # choice: passband of the soft edge if the PSF carries derivatives, relative to that of other PSFs
 # Choices: numbers of samples and sharpnesses of the edge per octave; equal ones share arrays and tables.
-STEPS, EDGES = 4, 4
+STEPS, EDGES = 8, 4
 ELSEWHERE = 8  # choice: number of steps between 0 and the largest sine
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.

@@ -18,7 +18,7 @@ __all__ = ["DERIVATIVE_ERROR", "Derivatives", "WindowRays", "window_ranks"]
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
 # Choices: parts of these errors that the rank may take, and with `cross_term`, whose remaining phase depends mostly on
 # the position in the window alone.
-RANK_SHARE, CROSSED_SHARE = 0.15, 0.9
+RANK_SHARE, CROSSED_SHARE = 0.25, 0.9
 RAYS, PLACES = 100, 6  # choices: numbers of rays, and of places along a side of the window, that determine the rank
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
 OUTSIDE = 1e-3  # choice: weight of rays that miss the window

@@ -24,10 +24,10 @@ from optics.numerics.grid import Grid
 
 __all__ = ["coarse_psfs"]
 
-MOST_SECONDS = 4e-3  # choice: predicted time of a PSF [s] above which another method may be faster
+MOST_SECONDS = 8e-3  # choice: predicted time of a PSF [s] above which another method may be faster
 TRIES = 3  # choice: number of attempts to meet a tolerance
-NEXT_TOLERANCE = 0.3  # choice: if an error is f times too large, the next tolerance is f / 0.3 times smaller
-STACK = 200_000  # choice, limited by memory: samples of pupils, or of windows, in a stack
+NEXT_TOLERANCE = 0.6  # choice: if an error is f times too large, the next tolerance is f / 0.6 times smaller
+STACK = 300_000  # choice, limited by memory: samples of pupils, or of windows, in a stack
 
 
 def coarse_psfs(
