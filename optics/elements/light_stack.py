@@ -16,7 +16,9 @@ from optics.numerics.autodiff import number
 
 __all__ = ["LightStack", "StackSlopes"]
 
-SPHERE_POINTS = 8  # choice: number of Chebyshev points across the pupil for spheres, in addition to those of polynomials
+SPHERE_POINTS = (
+    8  # choice: number of Chebyshev points across the pupil for spheres, in addition to those of polynomials
+)
 FEW, MANY = 27, 53  # choices: points across the pupil at which slopes are evaluated, without and with fine detail
 
 

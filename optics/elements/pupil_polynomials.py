@@ -34,7 +34,8 @@ def powers_of(pupil: Pupil, wavelength: float) -> np.ndarray | None:
 
     wavelength: wavelength [m] in vacuum.
     """
-    relief, wavefront, found = pupil.height, pupil.wavefront, np.zeros((1, 1))
+    relief = pupil.height if pupil.bends(wavelength) else None
+    wavefront, found = pupil.wavefront, np.zeros((1, 1))
     if relief is not None and not isinstance(relief, BSplineRelief):
         return None
     if wavefront is not None and not (isinstance(wavefront, Zernike) and wavefront.order <= HIGHEST_ORDER):

@@ -18,7 +18,18 @@ from optics.numerics.array_library import turned
 from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
-__all__ = ["RANKS", "Path", "axis_factor", "axis_kernel", "cross_term", "fourier_kernel", "remaining_factor", "slow_factor", "uniform_rank", "window_kernel"]
+__all__ = [
+    "RANKS",
+    "Path",
+    "axis_factor",
+    "axis_kernel",
+    "cross_term",
+    "fourier_kernel",
+    "remaining_factor",
+    "slow_factor",
+    "uniform_rank",
+    "window_kernel",
+]
 
 # Choice: ranks to try, in ascending order.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
@@ -147,7 +158,9 @@ def remaining_factor(
     none, points = np.zeros((1,) * directions[0].ndim), samples.points_at(*directions)
     if dtype == "float32" and path.short(samples.steepest):
         path = path.rounded(dtype)
-        points, directions, window = (tuple(part.astype(dtype) for part in pair) for pair in (points, directions, window))
+        points, directions, window = (
+            tuple(part.astype(dtype) for part in pair) for pair in (points, directions, window)
+        )
         none = none.astype(dtype)
     size, waves = _slow(path, points, directions, window)
     middle = _slow(path, points, directions, (none, none))

@@ -68,15 +68,15 @@ def _at_points(
     nodes, ratio = _ratios(samples, path, place, dtype, INTERPOLATED * tolerance)
     # The nodes and the samples of all pupils are alike, apart from their scale.
     weight = lagrange_basis(samples.at[0], nodes[0]).astype(dtype)
-    across, down = (
-        _interpolated_kernel(path, samples, axis, part, weight) for axis, part in enumerate((u, v))
-    )
+    across, down = (_interpolated_kernel(path, samples, axis, part, weight) for axis, part in enumerate((u, v)))
     sums = down @ field @ across.swapaxes(1, 2)
     split = sums.reshape(len(v), v.shape[1], len(weight), u.shape[1], len(weight))
     return np.asarray(intensity_of(np.einsum("nvuba,nvbua->nvu", ratio, split)))
 
 
-def _interpolated_kernel(path: Path, samples: SineStack, axis: int, place: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _interpolated_kernel(
+    path: Path, samples: SineStack, axis: int, place: np.ndarray, weight: np.ndarray
+) -> np.ndarray:
     """Return L_a A e^{-ik u s}, (stack, place · a, sine)."""
     kernel = axis_kernel(path, samples, axis, place, str(weight.dtype))
     return np.asarray((kernel[:, :, None, :] * weight).reshape(len(place), -1, weight.shape[1]))

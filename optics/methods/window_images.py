@@ -34,9 +34,7 @@ def window_images(
             return np.asarray(intensity_of(down @ field @ across.swapaxes(1, 2)))
         kernel = _node_factors(path, samples, nodes, dtype)
         return np.asarray(intensity_of(window_field(field, kernel, down, across)))
-    at, (u, v) = samples.at[:, None, :], (
-        sample_positions(n, window.dx)[None, :, None] for n in window.shape[::-1]
-    )
+    at, (u, v) = samples.at[:, None, :], (sample_positions(n, window.dx)[None, :, None] for n in window.shape[::-1])
     a, b = (part.astype(field.dtype) for part in cross_term(path, samples, (at, at), (u, v)))
     both = field @ np.concatenate([across, across * a], axis=1).swapaxes(1, 2)
     first, second = both[..., : window.shape[1]], both[..., window.shape[1] :]

@@ -39,8 +39,11 @@ NEAR_CYCLES, SPREAD_CYCLES = 5.0, 2.0
 # Choices: distance from the axis [radii] beyond which rays count as rays of the edge, and cycles of most of these rays,
 # relative to their median.
 RIM, RIM_CYCLES = 0.85, 1.2
-CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
-DERIVATIVES = 1.9  # choice: passband of the soft edge if the PSF carries derivatives, relative to that of other PSFs
+# Choices for PSFs that carry derivatives, to which points near the edge contribute as much as others. The soft edge is
+# then narrow: ripples as above, width of the passband relative to the stopband, cycles per radius at a tolerance of
+# 0.01, the same relative to those of the rays at the edge, exponent of the tolerance, and cycles per cell between knots.
+CARRIED_RIPPLES, CARRIED_PASSBAND = (0.03, 0.0075), 0.35
+CARRIED_CYCLES, CARRIED_RIM_CYCLES, CARRIED_EXPONENT, CELL_CYCLES = 7.6, 5.7, -0.4, 0.375
 # Choices: numbers of samples and sharpnesses of the edge per octave; equal ones share arrays and tables.
 STEPS, EDGES = 8, 4
 ELSEWHERE = 8  # choice: number of steps between 0 and the largest sine
@@ -170,15 +173,23 @@ class WindowPlan:
         share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
         last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
         reach = np.take_along_axis(np.sort(along, axis=1), last[:, None], axis=1)[:, 0]
-        edge = self._passband + _transitions(self._ripples[0])
         masks = [
             0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(min(tolerance, 0.1), radius) * radius
             for beam, radius, tolerance in zip(stack.beams, stack.radius, self.tolerance, strict=True)
         ]
-        found: np.ndarray = masks + np.maximum(
-            self._window_cycles + reach + SPREAD_CYCLES, self._near_cycles + self._rim + ALIASED * edge
-        )
-        return found
+        direct = self._window_cycles + reach
+        if self.derivatives is not None:
+            # High modes grow outside the circle, so that their derivatives need a sharper edge.
+            fronts = [beam.pupil.wavefront for beam in stack.beams]
+            orders = np.array([front.order if isinstance(front, Zernike) else 0 for front in fronts])
+            rim = self._rim / RIM_CYCLES
+            sharp = CARRIED_CYCLES + CARRIED_RIM_CYCLES * rim + orders + self.derivatives.cells * CELL_CYCLES
+            widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
+            sharp = sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT
+            return np.asarray(np.maximum(direct + sharp + masks, widest + self._window_cycles / 2))
+        edge = self._passband + _transitions(self._ripples[0])
+        edges = self._near_cycles + self._rim + ALIASED * edge
+        return np.asarray(masks + np.maximum(direct + SPREAD_CYCLES, edges))
 
     @cached_property
     def _to_middle(self) -> np.ndarray:
@@ -201,13 +212,7 @@ class WindowPlan:
     @cached_property
     def _passband(self) -> np.ndarray:
         """Cycles per radius that the soft edge leaves unchanged, (beam,)."""
-        margin = EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
-        found: np.ndarray = self._rim + self._near_cycles + margin
-        if self.derivatives is not None:
-            # High modes grow outside the circle, so that their derivatives need a sharper edge.
-            fronts = [beam.pupil.wavefront for beam in self.stack.beams]
-            orders = np.array([front.order if isinstance(front, Zernike) else 0 for front in fronts])
-            found = found * DERIVATIVES + orders + self.derivatives.cells * CELL_CYCLES
+        found: np.ndarray = self._rim + self._near_cycles + EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
         return found
 
     def _pitch(self, density: np.ndarray) -> np.ndarray:
@@ -227,23 +232,34 @@ class WindowPlan:
 
     @cached_property
     def _edges(self) -> list[SoftAperture]:
-        return self._soft(self._passband, self._ripples[0])
+        if self.derivatives is not None:
+            return self._narrow(self._density, CARRIED_RIPPLES[0])
+        return self._wide(self._passband, self._ripples[0])
 
     @cached_property
     def _finer_edges(self) -> list[SoftAperture]:
         """Soft apertures that are as sharp as the finer samples allow."""
+        if self.derivatives is not None:
+            return self._narrow(FINER * self._density, CARRIED_RIPPLES[1])
         stopband = (FINER * self._density - self._near_cycles - self._rim) / ALIASED
         passband = np.maximum(stopband - _transitions(self._ripples[1]), self._passband)
-        return self._soft(np.minimum(passband, SHARPER * self._passband), self._ripples[1])
+        return self._wide(np.minimum(passband, SHARPER * self._passband), self._ripples[1])
 
-    def _soft(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
+    def _wide(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
         """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""
         passband = 2.0 ** (np.ceil(EDGES * np.log2(passband) - 1e-9) / EDGES)
-        stopband = passband + _transitions(ripples)
-        return [
-            beam.pupil.aperture.with_edge(*edge)
-            for beam, *edge in zip(self.stack.beams, *(part.tolist() for part in (passband, stopband, ripples)), strict=True)
-        ]
+        return self._soft(passband, passband + _transitions(ripples), ripples)
+
+    def _narrow(self, density: np.ndarray, ripple: float) -> list[SoftAperture]:
+        """Return soft apertures that are as narrow as a density of samples allows."""
+        stopband = np.maximum(density - self._window_cycles / 2, density / 2)
+        stopband = 2.0 ** (np.floor(EDGES * np.log2(stopband)) / EDGES)
+        return self._soft(CARRIED_PASSBAND * stopband, stopband, np.full(len(stopband), ripple))
+
+    def _soft(self, passband: np.ndarray, stopband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
+        columns = (part.tolist() for part in (passband, stopband, ripples))
+        beams = zip(self.stack.beams, *columns, strict=True)
+        return [beam.pupil.aperture.with_edge(*edge) for beam, *edge in beams]
 
     @cached_property
     def _rims(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -114,14 +114,13 @@ def window_ranks(
         if rank < least:
             continue
         nodes = half * chebyshev_points(rank)
-        fits = [
-            _errors(path, geometry, nodes, test, whole) < test[3]
-            for test, whole in zip(tests, exact, strict=True)
-        ]
+        fits = [_errors(path, geometry, nodes, test, whole) < test[3] for test, whole in zip(tests, exact, strict=True)]
         found[(found == 0) & np.all(fits, axis=0)] = rank
         if rank == 1 and derivatives is None and not found.all():
             a, b = cross_term(path, geometry, rays.directions, rays.window)
-            crossed = (found == 0) & (_rms(exact[0] - 1 - a * b, rays.weight) < tests[0][3] * (CROSSED_SHARE / RANK_SHARE))
+            crossed = (found == 0) & (
+                _rms(exact[0] - 1 - a * b, rays.weight) < tests[0][3] * (CROSSED_SHARE / RANK_SHARE)
+            )
             found[crossed] = 1
     return found, crossed
 

@@ -82,7 +82,9 @@ class WindowSampling:
 
     def sums(self, path: Path, dtype: str) -> WindowSums:
         """Return the arrays of the sums. The wavelength may be longer than that for which the samples are made."""
-        return _window_sums(self.pupil, max(self.rank, CROSSED_RANK) if self.crossed else self.rank, self.half_width, path, dtype)
+        return _window_sums(
+            self.pupil, max(self.rank, CROSSED_RANK) if self.crossed else self.rank, self.half_width, path, dtype
+        )
 
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the plane over which rounding errors spread light."""
@@ -125,7 +127,9 @@ def _single(stack: SineStack) -> SineSamples:
     count = stack.at.shape[1]
     shift = float(stack.at[0, count // 2])
     grid = Grid((count, count), pitch, (shift, shift))
-    return SineSamples(edge, grid, stack.centre, *(float(part[0]) for part in (stack.distance, stack.steepest, stack.elsewhere)))
+    return SineSamples(
+        edge, grid, stack.centre, *(float(part[0]) for part in (stack.distance, stack.steepest, stack.elsewhere))
+    )
 
 
 @lru_cache(maxsize=64)

@@ -66,7 +66,13 @@ def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method
         found.append(sampling)
     pupil = max((each.pupil for each in found), key=_across)
     finer = max((each.finer for each in found), key=_across)
-    return replace(found[0], pupil=pupil, finer=finer, rank=max(each.rank for each in found), crossed=any(each.crossed for each in found))
+    return replace(
+        found[0],
+        pupil=pupil,
+        finer=finer,
+        rank=max(each.rank for each in found),
+        crossed=any(each.crossed for each in found),
+    )
 
 
 def _across(samples: SineSamples) -> int:
