@@ -22,7 +22,7 @@ from optics.numerics.precision import padded_for_packets, precision
 
 __all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines", "single_stack"]
 
-LEVELS = 8192  # choice: number of values in a table of the transmittance against r²
+LEVELS = 16384  # choice: number of values in a table of the transmittance against r²
 SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a few points
 FAR = 1000.0  # choice: smallest kz for which the near-field term of the kernel is constant over the pupil
 
