@@ -44,7 +44,7 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
 
 
 def page(store: Store) -> Page:
-    """Return the page of stored runs.
+    """Return the page of results, made from stored runs.
 
     Raises:
         ValueError: there are more groups than colours.
@@ -79,7 +79,7 @@ def page(store: Store) -> Page:
 
 
 def joining(store: Store) -> int | None:
-    """Return the first generation of phase II; None if no group has a phase II."""
+    """Return the first generation of phase II, in which relief and index join; None if no group has a phase II."""
     return min((row.generation for row in store.rows if row.phase > 0), default=None)
 
 
@@ -96,7 +96,7 @@ def of_phase(store: Store, group: str, phase: int) -> list[Row]:
 
 
 def table(store: Store, phase: int) -> str:
-    """Return a table with a row per quantity and two columns per variant."""
+    """Return a table of the quantities at the end of a phase, in Markdown: two columns for each group of runs."""
     header = ["", *(f"{group}{what}" for group in store.groups for what in ("", ", null model"))]
     lines = []
     for name, value in QUANTITIES.items():
@@ -125,7 +125,7 @@ def prediction(store: Store) -> str:
 
 
 def draw(store: Store, path: Path) -> None:
-    """Draw a panel per quantity with a line per seed; the last panel is the legend."""
+    """Draw each quantity over the generations, in a panel with a line per seed; the last panel is the legend."""
     figure, axes = new_figure(15, 5.6, columns=(len(QUANTITIES) + 2) // 2, rows=2, sharex=True)
     for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=False):
         for group, color in store.colors.items():
@@ -173,7 +173,7 @@ def searches(store: Store) -> list[tuple[str, int]]:
 
 
 def lenses(store: Store) -> set[str]:
-    """Return the groups in which a lens is possible."""
+    """Return the groups in whose runs relief and index evolve, so that a lens is possible."""
     return {row.group for row in store.rows if row.refractive_index != 1}
 
 

@@ -46,7 +46,13 @@ COLORS = {"hole": "#D55E00", "lens": "#0072B2"}
 
 @dataclass(frozen=True)
 class Row:
-    """Measures of an eye at one noise, which docs/results/best_pupil.md defines."""
+    """Measures of an eye at one level of noise.
+
+    pupil: "hole" (pinhole) or "lens" (ideal lens in focus)
+    noise_sigma: standard deviation of a receptor's noise
+    image_quality, contrast, bits: see `measures`
+    stripes_1, stripes_2, stripes_4: amplitude of stripes 1, 2 and 4 receptors wide, see `stripes`
+    """
 
     pupil: str
     relative_aperture: float
@@ -137,7 +143,10 @@ def best(rows: Iterable[Row], pupil: str, noise_sigma: float, measure: str) -> f
 
 
 def predicted(noise_sigma: float, measures: Sequence[str]) -> list[str]:
-    """Return the stored best pinhole by each measure as text; "-" if this noise was not computed."""
+    """Return as text, for each measure, the relative aperture of the pinhole that is best by it.
+
+    The numbers come from the stored rows. The text is "-" if there are none for this noise.
+    """
     rows = read_rows(Row, STORED)
     known = any(math.isclose(row.noise_sigma, noise_sigma) for row in rows)
     return [_shown(best(rows, "hole", noise_sigma, measure)) if known else "-" for measure in measures]
@@ -198,7 +207,7 @@ def _range(apertures: Sequence[float]) -> str:
 
 
 def shades(noises: Sequence[float]) -> tuple[float, float, float]:
-    """Return the three noises in the figure."""
+    """Return the smallest, the middle and the largest noise, which the figure shows."""
     return noises[1], noises[len(noises) // 2], noises[-2]
 
 

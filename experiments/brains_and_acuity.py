@@ -37,10 +37,11 @@ FACTORS: dict[str, Size] = {
 
 
 def error(row: Row) -> float:
-    """Return the share of episodes in which the goal did not come first, as (k + 1/2) / (n + 1) (Jeffreys' mean).
+    """Return the share of episodes in which the goal was not reached first.
 
-    This mean is never 0, so its logarithm exists. In a maze, no animal reaches the goal. The error is then 1 minus the
-    fitness divided by the full return.
+    If these are k of n episodes, the share is estimated as (k + 1/2) / (n + 1) (Jeffreys' mean), which is never 0, so
+    that its logarithm exists. In a maze, no animal reaches the goal. The error is then 1 minus the ratio of the fitness
+    to the full return.
     """
     if math.isfinite(row.full_return):
         return 1 - row.fitness / row.full_return
@@ -61,12 +62,12 @@ def fitted(rows: Sequence[Row], *sizes: Size) -> PowerLaw | None:
 
 
 def trained(store: Store, group: str) -> list[Row]:
-    """Return the candidates with a policy."""
+    """Return the candidates of a group that have a trained policy."""
     return [row for row in store.group(group) if not row.failed and row.parameters]
 
 
 def page(store: Store) -> Page:
-    """Return the page of stored runs."""
+    """Return the page of results, made from stored runs."""
     return Page(
         name=NAME,
         command=(
@@ -89,7 +90,7 @@ def page(store: Store) -> Page:
 
 
 def exponents(store: Store) -> str:
-    """Return a table of exponents of the product, with a row per task."""
+    """Return a table of the exponents with which error falls over `size`, with a row per task."""
     lines = []
     for group in store.groups:
         rows = trained(store, group)
@@ -100,7 +101,7 @@ def exponents(store: Store) -> str:
 
 
 def factors(store: Store) -> str:
-    """Return a table of exponents of the three factors, fitted together, with a row per task."""
+    """Return a table of the exponents of acuity, parameters and memory, fitted together, with a row per task."""
     header = ["task", *(f"exponent of {name}" for name in FACTORS), "variance explained"]
     lines = []
     for group in store.groups:
@@ -113,14 +114,14 @@ def factors(store: Store) -> str:
 
 
 def classes(rows: Sequence[Row]) -> list[list[Row]]:
-    """Return candidates in CLASSES parts of equal size, from coarse to fine acuity, without empty parts."""
+    """Return the candidates in CLASSES classes of equal size, from coarse to fine acuity; empty classes are omitted."""
     ordered = sorted(rows, key=lambda row: row.cpd)
     parts = [[ordered[i] for i in part] for part in np.array_split(np.arange(len(ordered)), CLASSES)]
     return [part for part in parts if part]
 
 
 def best_quarter(rows: Sequence[Row]) -> float:
-    """Return the mean error of the best quarter."""
+    """Return the mean error of the quarter of candidates with the lowest errors."""
     errors = np.sort([error(row) for row in rows])
     return float(errors[: max(1, len(errors) // 4)].mean())
 
@@ -137,7 +138,7 @@ def ceilings(store: Store) -> str:
 
 
 def draw(store: Store, path: Path) -> None:
-    """Draw a column per task: error over the product, and over acuity alone."""
+    """Draw two panels per task: error over `size`, and error over acuity alone."""
     count = len(store.groups)
     figure, axes = new_figure(3.4 * count + 0.5, 6.2, columns=count, rows=2, sharey=True)
     for column, group in zip(axes.T, store.groups, strict=True):
@@ -188,7 +189,7 @@ def label(axis: Any, ends: tuple[float, float]) -> None:
 
 
 def brain(row: Row) -> float:
-    """Return parameters x memory."""
+    """Return the number of parameters times the number of frames in memory."""
     return row.parameters * row.memory_frames
 
 

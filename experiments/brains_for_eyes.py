@@ -88,16 +88,16 @@ def _lives(rows: Iterable[Trained], value: Callable[[Trained], float]) -> dict[t
 
 
 def missed(rows: Sequence[Trained]) -> Errors:
-    """Return the share of episodes in which the goal did not come first, (k + 1/2) / (n + 1) (Jeffreys), never 0."""
+    """Return the share of episodes in which the goal was missed, by width and brain; see `brains_and_acuity.error`."""
     shares = _lives(rows, lambda row: ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1))
     return {animal: float(np.mean(values)) for animal, values in shares.items()}
 
 
 def shortfall(rows: Sequence[Trained]) -> Errors:
-    """Return each animal's distance from the best training run, relative to the distance from the best to the worst.
+    """Return the shortfall in fitness of each animal, by width and brain.
 
-    The value of an animal is a mean over its n training runs. As in `missed`, half a run is added to their sum, and
-    n + 1 replaces n.
+    The shortfall of a training run is 0 for the best of all runs and 1 for the worst. The shortfall of an animal is the
+    mean over its training runs and, so that it is never 0, one additional run with the shortfall 1/2.
     """
     fitness = [row.fitness for row in rows if not row.failed]
     high = max(fitness, default=0.0)
@@ -119,7 +119,7 @@ def best_brains(errors: Errors) -> dict[int, tuple[int, float]]:
 
 
 def frontier(rows: Sequence[Trained], definition: Definition) -> PowerLaw | None:
-    """Return the power law of the least error over acuity; None if it cannot be fitted."""
+    """Return the power law of the best brains' error over acuity; None if it cannot be fitted."""
     least = best_brains(definition(rows))
     return _law([error for _, error in least.values()], [_acuities(rows)[width] for width in least])
 
@@ -143,7 +143,7 @@ def _acuities(rows: Iterable[Trained]) -> dict[int, float]:
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
-    """Return the page of stored rows."""
+    """Return the page of results, made from stored rows."""
     return Page(
         name=NAME,
         command=f"python -m experiments.{NAME} --compute",
@@ -175,7 +175,7 @@ def _tasks(rows: Iterable[Trained]) -> list[str]:
 
 
 def _errors_table(rows: Sequence[Trained]) -> str:
-    """Return a table with a row per task and brain and a column per width."""
+    """Return a table of errors, with a row per task and brain and a column per width of the eyes."""
     lines = []
     for task in _tasks(rows):
         errors = missed(designed_for(rows, task))
@@ -189,7 +189,7 @@ def _errors_table(rows: Sequence[Trained]) -> str:
 
 
 def _exponents(rows: Sequence[Trained]) -> str:
-    """Return a table with a row per task and definition of the error."""
+    """Return a table of the exponents of power laws, with a row per task and definition of the error."""
     lines = []
     for task in _tasks(rows):
         for name, definition in DEFINITIONS.items():
@@ -205,7 +205,7 @@ def _exponents(rows: Sequence[Trained]) -> str:
 
 
 def _over_runs(rows: Sequence[Trained], definition: Definition) -> str:
-    """Return the best brains' exponent of acuity, fitted to each seed separately: mean and Student's interval."""
+    """Return as text the best brains' exponent of acuity: mean and Student's interval of fits to single seeds."""
     laws = [frontier([row for row in rows if row.seed == seed], definition) for seed in sorted({r.seed for r in rows})]
     found = np.array([law.exponents[0].mean for law in laws if law is not None])
     return str(mean_of(found)) if found.size > 1 else "-"

@@ -40,7 +40,7 @@ class Row:
     group: task, or variant of an experiment, that the run belongs to
     phase: number of times that genes have opened since the first generation
     fitness: task fitness, which contains no costs
-    episodes: number of evaluation episodes; fitness and success rate are means over them
+    episodes: number of evaluation episodes, over which fitness and success rate are means
     cpd: acuity [cycles/degree]
     parameters: number of parameters of the trained policy, including the critic
     full_return: return of an episode straight to the goal without any contact; NaN if a new goal follows each goal

@@ -99,7 +99,7 @@ def _ahead(compound: Floats, camera: Floats) -> Floats:
 
 
 def by_light(rows: Sequence[Trained]) -> dict[float, Crossing]:
-    """Return the comparison for each noise σ (light) that has a sufficient number of training runs."""
+    """Return the comparison for each light, given by the noise σ, that has enough training runs."""
     found = {}
     for sigma in lights(rows):
         with suppress(ValueError):

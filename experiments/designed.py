@@ -162,7 +162,7 @@ def train_all(
 
     settings: "section.name=value" for all designs, in addition to the tasks' settings
     workers: number of processes; 0: one per core
-    tested: whether each trained animal also plays in the test set of layouts
+    tested: True if each trained animal also plays in the test set of layouts
     """
     designs = list(designs)
     known = {row.design: row for row in read_rows(Trained, path)}
@@ -201,11 +201,11 @@ class Experiment:
     """A designed experiment.
 
     name: name of page and data
-    text: help text
+    text: description of the program for `--help`
     designs: all training runs
-    settings: settings of all training runs
-    page: function of the stored rows, their origin and the written answer
-    tested: whether each trained animal also plays in the test set of layouts
+    settings: settings of all training runs, "section.name=value"
+    page: function that returns the page, from the stored rows, their origin and the written answer
+    tested: True if each trained animal also plays in the test set of layouts
     """
 
     name: str

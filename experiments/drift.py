@@ -59,9 +59,12 @@ def drifted(
     generations: int,
     spread: Sequence[float] = (),
 ) -> list[Drift]:
-    """Return the null model of SEEDS searches with these settings and this number of generations.
+    """Return the null model of quantities, from SEEDS searches with these settings and this number of generations.
 
     Quantities that need a training run are omitted.
+
+    group: group of runs with which the null model is compared
+    quantities: functions of a candidate's row, by name
 
     spread: see `evolve.search.null_model.null_model`
     """

@@ -65,7 +65,7 @@ class RunMetadata:
 
 @dataclass(frozen=True)
 class Store:
-    """Contents of a page: rows, conditions of their runs, null model (drift), origin, and the written answer."""
+    """Data of a page: rows, conditions of their runs, null model (drift), origin, and the written answer."""
 
     rows: list[Row]
     run_metadata: list[RunMetadata]
@@ -95,7 +95,7 @@ class Store:
 
     @property
     def legend(self) -> str:
-        """Colours of the groups as text."""
+        """Colour of each group as text, such as "navigation blue, detection orange"."""
         names = {value: name for name, value in COLORS.items()}
         return ", ".join(f"{group} {names[color]}" for group, color in self.colors.items())
 
@@ -109,8 +109,8 @@ class Store:
 
 
 def conduct_table(store: Store) -> str:
-    """Return a table with a row per run."""
-    header = ["run", "candidates", "generations", "worker hours", "rhabdom at"]
+    """Return a table of the conditions of the runs, with a row per run."""
+    header = ["run", "candidates", "generations", "worker hours", "commits of rhabdom"]
     lines = [
         [
             *(f"{one.group}, seed {one.seed}", str(one.candidates), f"{one.generations} of {one.planned}"),
@@ -135,7 +135,8 @@ def null_table(store: Store, quantities: Quantities, phase: int | None = None) -
         if len(runs) > 1:
             lines.append([f"{group}, {len(runs)} seeds together", *_ps(store, runs, quantities, names)])
     searches = max((len(one.ends.split()) for one in store.drift), default=0)
-    return markdown_table([f"p under the null model (two-sided, at least {2 / (searches + 1):.2g})", *names], lines)
+    label = f"two-sided p under the null model ({2 / (searches + 1):.2g} is the smallest possible)"
+    return markdown_table([label, *names], lines)
 
 
 def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: Sequence[str]) -> list[str]:

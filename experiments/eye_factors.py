@@ -42,7 +42,7 @@ NAMES = {
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
-    """Return the page of stored rows."""
+    """Return the page of results, made from stored rows."""
     counts = sorted({len(runs_of(rows, task, cell)) for task in TASKS for cell in factorial()} - {0})
     return Page(
         name=NAME,
@@ -144,7 +144,10 @@ def _prices_table(rows: Sequence[Trained]) -> str:
 
 
 def _returns(rows: Sequence[Trained], task: str) -> dict[Design, np.ndarray]:
-    """Return the returns of the training runs of animals without controls. Animals with fewer than two are left out."""
+    """Return the returns of the training runs of each animal of the factorial design, by animal.
+
+    Animals with fewer than two training runs are omitted.
+    """
     found = {one: np.array([row.held_out for row in runs_of(rows, task, one)]) for one in (*factorial(), *OTHERS)}
     return {animal: values for animal, values in found.items() if values.size > 1}
 

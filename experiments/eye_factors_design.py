@@ -55,7 +55,7 @@ OTHERS = (_eyes(5, 8, 90.0), _eyes(1, 15, 0.0), _eyes(20, 1, 135.0))
 
 @dataclass(frozen=True)
 class Control:
-    """A comparison of many coarse eyes with few fine eyes in which something else is held constant."""
+    """A comparison of many coarse eyes with few fine eyes in which another difference is removed."""
 
     name: str
     many: Design
@@ -63,7 +63,7 @@ class Control:
 
 
 def controls() -> tuple[Control, ...]:
-    """Return the controls. The first one is the comparison itself."""
+    """Return the controls, preceded by the comparison without any control."""
     coarse, fine = _eyes(10, 4, 45.0), _eyes(2, 15, 135.0)
     blurred, repeated = "wiring.pool_side=4 wiring.repeat_side=15", "wiring.repeat_side=15"
     rays = "eye.rays_per_receptor=16 learning.rays_per_receptor=16"
@@ -128,7 +128,7 @@ def has(task: str, animal: Design) -> bool:
 
 
 def in_task(animal: Design, task: str, seed: int) -> Design:
-    """Return a training run of an animal in a task, in layouts of its own."""
+    """Return the training run of an animal in a task with this seed, which also determines the layouts."""
     layouts = () if task == "detection" else (LAYOUTS.format(seed=seed),)
     return replace(animal, task=task, seed=seed, own=" ".join((*layouts, *filter(None, (animal.own,)))))
 

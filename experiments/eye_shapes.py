@@ -65,7 +65,7 @@ def with_rows(rows: Sequence[Trained]) -> list[Trained]:
 
 
 def with_squares(rows: Sequence[Trained]) -> list[Trained]:
-    """Return the rows in bright light with eyes 45 degrees high in both tasks, which removes the confound."""
+    """Return the rows in bright light with square eyes, which are equally high in both tasks."""
     return [row for row in rows if row.height == row.width and row.noise_sigma == BRIGHT]
 
 

@@ -37,7 +37,7 @@ SETTINGS = ("learning.total_steps=150000", "learning.eval_interval=50000")
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
-    """Return the page of stored rows."""
+    """Return the page of results, made from stored rows."""
     designed_rows = with_rows(rows)
     return Page(
         name=NAME,
@@ -66,7 +66,7 @@ def _lives(rows: Sequence[Trained], sigma: float) -> str:
 
 
 def _table(rows: Sequence[Trained], value: Callable[[Trained], float]) -> str:
-    """Return a table with a row per animal: mean and range over seeds in each task and light."""
+    """Return a table of a value, with a row per animal: mean and range over seeds in each task and light."""
     found_lights = lights(rows)
     header = ["eyes", *(f"{task}, σ = {sigma:g}" for task in TASKS for sigma in found_lights)]
     lines = []
@@ -96,7 +96,11 @@ def _named(n: int, w: int, arc: float) -> str:
 
 
 def crossings_table(rows: Sequence[Trained]) -> str:
-    """Return the table of differences: the primary comparison first, then the confounded ones by light."""
+    """Return the table of differences between camera eyes and compound eyes.
+
+    The first row has square eyes in both tasks. In the other rows, one for each light, navigators' eyes are one row of
+    receptors, so that their fineness and their height differ together.
+    """
     square = by_light(with_squares(rows)).get(BRIGHT)
     lines = [[f"σ = {BRIGHT:g}, square eyes in both tasks", *_cells(square)]]
     crossings = by_light(with_rows(rows))

@@ -32,7 +32,7 @@ MATTERS = 0.1  # smallest difference that a title reports, relative to the fitne
 
 
 def draw(rows: Sequence[Trained], path: Path) -> None:
-    """Draw the original design and the difference in each light above, and the controls below."""
+    """Draw two rows of panels: the original design with the difference in each light, and the controls."""
     figure, axes = new_figure(12, 8.6, columns=3, rows=2, width_ratios=(1.2, 1.2, 1))
     first = with_rows(rows)
     rows_of = {"navigation": lambda w: 1, "detection": lambda w: w}
@@ -112,7 +112,7 @@ def _draw_lights(place: Any, rows: Sequence[Trained]) -> None:
 
 
 def light_message(crossings: Mapping[float, Crossing]) -> str:
-    """Return a title, which states whether the better eyes in bright light are worse in dimmer light beyond chance."""
+    """Return a title that states whether the better eyes in bright light are significantly worse in dimmer light."""
     if len(crossings) < 2:
         return "in dim light"
     bright, *dim = (crossings[sigma].differences for sigma in sorted(crossings))

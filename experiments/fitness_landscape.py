@@ -20,8 +20,8 @@ from experiments.glass import blur
 __all__ = ["SPREAD", "WIDE", "Landscape", "Life", "behind_glass", "fitted", "holes", "lenses", "opening"]
 
 Floats = NDArray[np.float64]
-# Standard deviation of a training run's fitness: its value at an expected fitness of 0, and its slope over the expected
-# fitness. `Landscape.misfit` compares it with the deviations of real training runs.
+# Standard deviation of a training run's fitness: its value at an expected fitness of 0, and its increase per unit of
+# expected fitness. `Landscape.misfit` compares it with the deviations of real training runs.
 SPREAD = 5.0, 0.17
 
 
@@ -62,7 +62,7 @@ class Landscape:
         return np.asarray(self.low + self.high * bright * np.exp(-((np.asarray(blur) / self.width) ** self.fall)))
 
     def lived(self, animals: Sequence[Phenotype], config: EyeConfig, chance: np.random.Generator) -> Floats:
-        """Return a random fitness for one training run of each animal."""
+        """Return the fitness of a simulated training run of each animal, drawn around its expected fitness."""
         apertures = [animal.relative_aperture or math.nan for animal in animals]
         expected = self.fitness(np.array(apertures), np.array([blur(animal, config) for animal in animals]))
         return np.asarray(expected + chance.normal(size=expected.size) * _spread(expected))
@@ -83,12 +83,12 @@ def lenses(rows: Sequence[Trained]) -> list[Life]:
 
 
 def holes(run: Run) -> list[Life]:
-    """Return the training runs of a search for lenses from the generations in which only the pupil may change."""
+    """Return a search's training runs from the generations in which only the pupil may change."""
     return [_life(c, run.config.eye) for c in run.candidates if succeeded(c) and c.generation < opening(run.config)]
 
 
 def behind_glass(run: Run) -> list[Life]:
-    """Return the training runs of the same search from the generations in which glass may change."""
+    """Return a search's training runs from the generations in which glass may change."""
     return [_life(c, run.config.eye) for c in run.candidates if succeeded(c) and c.generation >= opening(run.config)]
 
 

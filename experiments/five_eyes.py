@@ -112,7 +112,7 @@ def view(pupil: optics.Pupil | None, radiance: Floats, seed: int = 0) -> View:
 
 
 def page(views: Sequence[View], perfect: View, origin: Origin) -> Page:
-    """Return the page."""
+    """Return the page of results, made from the views of all eyes and of the perfect lens."""
     rows = [
         [
             s.name,

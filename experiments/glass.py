@@ -22,9 +22,11 @@ def power(animal: Phenotype, config: EyeConfig) -> float:
     """Return the power of an eye's glass relative to the power that focuses distant objects on its retina.
 
     1 is in focus, 0 means no lens, and a negative power diverges light. The power of a perfect lens is NaN.
+
     A relief has the power of the paraboloid nearest to it over the pupil's disk (least squares: Zernike defocus). If
-    the optical path falls by d from the centre to the rim, P = 2 d / R² (paraxial; Goodman, Introduction to Fourier
-    Optics, §5.1). The retina is at f = L / (2 tan(fov/2)), so that P f = d / (a² L tan(fov/2) / 4).
+    the optical path falls by d from the centre to the rim at the radius R, the power is P = 2 d / R² (paraxial;
+    Goodman, Introduction to Fourier Optics, §5.1). The retina of width L is at f = L / (2 tan(fov/2)), so that P f = d
+    / (a² L tan(fov/2) / 4) with the relative aperture a = 2R / L.
     """
     if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
         return math.nan
@@ -39,8 +41,8 @@ def blur(animal: Phenotype, config: EyeConfig) -> float:
     """Return the blur of a distant point in receptors: the root mean square distance of rays from their centroid.
 
     A ray through the pupil at r reaches the retina at r + f (n - 1) grad h (paraxial; Goodman, §5.1), where f is the
-    distance from pupil to retina. Diffraction is ignored. Without glass, the result is the blur of the pinhole. For a
-    perfect lens, it is NaN.
+    distance from pupil to retina, n the refractive index, and h the relief's height. Diffraction is ignored. Without
+    glass, the result is the blur of the pinhole. For a perfect lens, it is NaN.
     """
     if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
         return math.nan

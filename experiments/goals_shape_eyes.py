@@ -61,7 +61,7 @@ PUBLISHED = {
 
 
 def page(store: Store) -> Page:
-    """Return the page of stored runs."""
+    """Return the page of results, made from stored runs."""
     return Page(
         name=NAME,
         command=(
@@ -87,7 +87,7 @@ def page(store: Store) -> Page:
 
 
 def contrast(store: Store, less: str, more: str) -> str:
-    """Return the difference of TOGETHER between two groups, and its distribution under the null model, as text.
+    """Return the difference of ln(width / eyes) between two groups, and its distribution under the null model, as text.
 
     Each draw from the null model has the same number of searches per group as there were runs, and p has the lower
     limit of a single run. The text is "-" if the null model was not computed, or if runs of a group ended in different
@@ -140,7 +140,7 @@ def table(store: Store) -> str:
 
 
 def seeds_table(store: Store) -> str:
-    """Return a table with a row per run."""
+    """Return a table of results, with a row per run."""
     lines = []
     for group in store.groups:
         for seed in sorted({row.seed for row in store.group(group)}):

@@ -40,7 +40,7 @@ from experiments.means import LAST
 from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
 from experiments.store import RECORDS, Origin, read_rows, write_rows
 
-__all__ = ["CASES", "Check", "Searched", "Told", "page", "searched"]
+__all__ = ["CASES", "Check", "Contents", "Searched", "page", "searched"]
 
 Floats = NDArray[np.float64]
 NAME = "imitated_lenses"
@@ -137,11 +137,13 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Told:
-    """Contents of the page.
+class Contents:
+    """Data of the page.
 
+    rows: results of the searches
     lives: training runs to which the surrogate was fitted
-    check: comparison with other training runs
+    landscape: the surrogate
+    check: comparison of the surrogate with other training runs
     """
 
     rows: Sequence[Searched]
@@ -152,27 +154,27 @@ class Told:
     answer: str
 
 
-def page(told_: Told) -> Page:
-    """Return the page of stored searches."""
-    land, check = told_.landscape, told_.check
+def page(contents: Contents) -> Page:
+    """Return the page of results, made from stored searches."""
+    land, check = contents.landscape, contents.check
     return Page(
         name=NAME,
         command=f"python -m experiments.{NAME} --compute",
         values={
-            "answer": told_.answer,
-            "cases": _table(told_.rows),
-            "searches": str(min(len([r for r in told_.rows if r.case == case]) for case in _cases(told_.rows))),
+            "answer": contents.answer,
+            "cases": _table(contents.rows),
+            "searches": str(min(len([r for r in contents.rows if r.case == case]) for case in _cases(contents.rows))),
             "formula": f"{land.low:.1f} + {land.high:.0f} exp(-({land.aperture:.2f}/a)^{land.light:.1f})"
             f" exp(-(b/{land.width:.2f})^{land.fall:.1f})",
-            "lives": str(len(told_.lives)),
-            "spread": f"{SPREAD[0]:g} + {SPREAD[1]:g}",
+            "lives": str(len(contents.lives)),
+            "spread": f"{SPREAD[0]:g} plus {SPREAD[1]:g}",
             "misfit": f"{land.misfit:.2f}",
             "last": str(LAST),
             "check": f"{check.correlation:.2f} over {check.lived.size} animals",
             "agrees": _agrees(check),
         },
-        figures=[Figure(NAME, lambda path: draw(told_, path))],
-        origin=told_.origin,
+        figures=[Figure(NAME, lambda path: draw(contents, path))],
+        origin=contents.origin,
     )
 
 
@@ -181,7 +183,7 @@ def _cases(rows: Sequence[Searched]) -> list[str]:
 
 
 def _table(rows: Sequence[Searched]) -> str:
-    """Return a table with a row per case: medians over searches, with the 10 % and 90 % quantiles."""
+    """Return a table of the searches' results, with a row per case: medians, with the 10 % and 90 % quantiles."""
     quantities = ("closed", "aperture", "power", "blur", "fitness", "strehl")
     lines = []
     for case in _cases(rows):
@@ -203,21 +205,22 @@ def _agrees(check: Check) -> str:
     return markdown_table(["expected fitness", "fitness of training runs"], lines)
 
 
-def draw(told_: Told, path: Path) -> None:
+def draw(contents: Contents, path: Path) -> None:
     """Draw the surrogate with its training runs, and the Strehl ratios at the end of the searches."""
     figure, axes = new_figure(11.0, 4.4, columns=2)
     blurs = np.linspace(0, 2.6, 120)
     for aperture, color in COLORS.items():
-        mine = [life for life in told_.lives if abs(life.aperture - aperture) < 1e-9]
+        mine = [life for life in contents.lives if abs(life.aperture - aperture) < 1e-9]
         axes[0, 0].plot(
             [x.blur for x in mine], [x.fitness for x in mine], "o", color=color, ms=4, alpha=0.5, mec="none"
         )
-        axes[0, 0].plot(blurs, told_.landscape.fitness(aperture, blurs), color=color, lw=1.5, label=f"a = {aperture:g}")
+        expected = contents.landscape.fitness(aperture, blurs)
+        axes[0, 0].plot(blurs, expected, color=color, lw=1.5, label=f"a = {aperture:g}")
     axes[0, 0].set(xlabel="blur [receptors]", ylabel="fitness", title="training runs (dots) and surrogate (lines)")
     axes[0, 0].legend(frameon=False)
-    cases = _cases(told_.rows)
+    cases = _cases(contents.rows)
     for place, case in enumerate(reversed(cases)):
-        strehl = [max(row.strehl, 1e-4) for row in told_.rows if row.case == case]
+        strehl = [max(row.strehl, 1e-4) for row in contents.rows if row.case == case]
         axes[0, 1].semilogx(strehl, [place] * len(strehl), "o", color="#222222", ms=5, alpha=0.4, mec="none")
     axes[0, 1].axvline(sharp_lenses.SHARP, color="#777777", ls=":", lw=1)
     axes[0, 1].set_yticks(range(len(cases)), cases[::-1])
@@ -226,7 +229,7 @@ def draw(told_: Told, path: Path) -> None:
         xlim=(1e-4, 1),
         title="searches with surrogate fitness (dots)",
     )
-    figure.suptitle(_message(told_.rows))
+    figure.suptitle(_message(contents.rows))
     save(figure, path)
 
 
@@ -261,7 +264,7 @@ def _made(chosen: Namespace) -> None:
         write_rows(rows, stored)
         Origin.here((time.process_time() - began) / 3600).write(stored.with_suffix(".json"))
     answer = stored.with_suffix(".txt")
-    told_ = Told(
+    contents = Contents(
         rows=read_rows(Searched, stored),
         lives=lives,
         landscape=landscape,
@@ -269,7 +272,7 @@ def _made(chosen: Namespace) -> None:
         origin=Origin.read(stored.with_suffix(".json")),
         answer=answer.read_text(encoding="utf-8").strip() if answer.exists() else "(not written yet)",
     )
-    page(told_).publish(chosen.docs)
+    page(contents).publish(chosen.docs)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 
 
 def page(store: Store) -> Page:
-    """Return the page of stored runs.
+    """Return the page of results, made from stored runs.
 
     Raises:
         ValueError: there are more groups than colours.
@@ -84,8 +84,8 @@ def smoothed(place: Floats, value: Floats, at: Floats) -> Floats:
 def best_width(rows: Sequence[Row], seed: int = 0) -> tuple[Interval, float]:
     """Return the peak of the smooth curve of success, with a bootstrap over animals, and a p-value.
 
-    p is the probability of a curve that explains the same variance or more if success does not depend on the width,
-    from permutations.
+    p is estimated by permutations. It is the probability that a curve explains at least as much of the variance if
+    success does not depend on the width.
 
     Raises:
         ValueError: there are fewer than three animals.
@@ -139,7 +139,7 @@ def by_width(store: Store) -> str:
 
 
 def draw(store: Store, path: Path) -> None:
-    """Draw success over the pupil's width."""
+    """Draw the success rate over the pupil's width, for each noise."""
     from matplotlib.lines import Line2D
 
     figure, axes = new_figure(6.4, 4.3)

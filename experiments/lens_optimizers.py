@@ -49,7 +49,12 @@ GENE_NAMES = (*(f"doe_{i}{j}" for i in range(4) for j in range(4)), "refractive_
 
 @dataclass(frozen=True)
 class Row:
-    """Strehl ratio of the best lens after a number of PSFs and a time of one thread; a gradient counts as one PSF."""
+    """State of a search: the best lens after a number of PSFs.
+
+    evaluations: number of PSFs; a PSF with its gradient counts as one
+    cpu_seconds: time of one thread [s]
+    strehl: Strehl ratio of the best lens
+    """
 
     method: str
     seed: int
@@ -70,7 +75,12 @@ def lens(genome: Any) -> optics.Pupil:
 
 
 def loss(genome: Any, spot: float | None) -> Any:
-    """Return -log of the light in a Gaussian spot on the axis, or of the Strehl ratio near the axis (spot None)."""
+    """Return the loss of a lens, which searches minimise.
+
+    It is -log of the light in a Gaussian spot on the axis, or of the Strehl ratio near the axis.
+
+    spot: standard deviation of the spot [m]; None: the Strehl ratio is used
+    """
     import drjit as dr
     from drjit.llvm.ad import Float64
 
@@ -126,7 +136,7 @@ class Watch:
     _since: float = field(default_factory=time.process_time)
 
     def begin_stage(self) -> None:
-        """Start a stage, whose losses are not comparable with earlier losses."""
+        """Start a stage of the search; losses of different stages are not comparable."""
         self.best = math.inf
 
     def saw(self, genome: Floats, value: float) -> None:

@@ -43,7 +43,7 @@ def searches(rows: Sequence[Row], method: str) -> list[list[Row]]:
 
 
 def found_after(search: Sequence[Row]) -> Row | None:
-    """Return the row from which a search has a good lens until its end; None if its last lens is not good."""
+    """Return the first row from which a search has a good lens up to its end; None if its last lens is not good."""
     kept = None
     for row in reversed(search):
         if row.strehl < GOOD:
@@ -53,7 +53,7 @@ def found_after(search: Sequence[Row]) -> Row | None:
 
 
 def page(rows: Sequence[Row], origin: Origin) -> Page:
-    """Return the page of stored searches."""
+    """Return the page of results, made from stored searches."""
     paraboloid, refined = (next(row.strehl for row in rows if row.method == bound) for bound in BOUNDS)
     ours, direct, theirs = (searches(rows, method) for method in COMPARED)
     (pictures, seconds), (their_pictures, their_seconds) = (_medians(runs) for runs in (ours, theirs))
@@ -92,7 +92,7 @@ def _medians(runs: Sequence[Sequence[Row]]) -> tuple[float, float]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Return a table with a row per method."""
+    """Return a table of the searches' results, with a row per method."""
     lines = []
     for method in METHODS:
         runs = searches(rows, method)

@@ -56,7 +56,10 @@ def difference(of: Floats, less: Floats) -> Interval:
 
 
 def of_generation(rows: Iterable[Row], value: Callable[[Row], float]) -> tuple[Floats, Floats]:
-    """Return generations, and the mean of finite values over the candidates of each generation that did not fail."""
+    """Return the generations, and the mean of a quantity over the candidates of each generation, (generation,) each.
+
+    Failed candidates and values that are not finite are ignored.
+    """
     found: dict[int, list[float]] = {}
     for row in rows:
         if not row.failed and math.isfinite(value(row)):
@@ -66,7 +69,9 @@ def of_generation(rows: Iterable[Row], value: Callable[[Row], float]) -> tuple[F
 
 
 def last_mean(rows: Sequence[Row], value: Callable[[Row], float]) -> Interval | None:
-    """Return the mean over seeds of the mean over each seed's last LAST generations; None without finite values.
+    """Return the mean of a quantity at the end of runs; None without finite values.
+
+    The quantity is averaged over the last LAST generations of each seed, and then over the seeds.
 
     The interval is Student's over the seeds. Candidates of one search descend from one another and are not independent,
     so each seed counts once.
@@ -76,7 +81,7 @@ def last_mean(rows: Sequence[Row], value: Callable[[Row], float]) -> Interval | 
 
 
 def last_values(rows: Sequence[Row], value: Callable[[Row], float]) -> Iterator[Floats]:
-    """Yield the finite values of each seed's last generations."""
+    """Yield, for each seed, the finite values of a quantity in its last LAST generations."""
     for seed in sorted({row.seed for row in rows}):
         mine = [row for row in rows if row.seed == seed]
         first = max(row.generation for row in mine) - LAST + 1

@@ -87,7 +87,7 @@ def parser(text: str) -> argparse.ArgumentParser:
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table with the first column aligned left and the others right."""
+    """Return a Markdown table with the first column aligned left and the others right."""
     lines = [header, ["---", *("---:" for _ in header[1:])], *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 

@@ -42,7 +42,7 @@ def designed() -> dict[str, sim.Eyes]:
 
 
 def moment(world: World) -> WorldState:
-    """Return an illustrative state.
+    """Return a state of the world that illustrates its task.
 
     The agent stands before the first fork of a course, or sees a goal on the left and a distractor on the right.
     """

@@ -47,7 +47,7 @@ def difference(peak_nm: float) -> float:
 
 
 def contrast(row: Row) -> float:
-    """Return the difference of goal and adversary for a candidate's best receptor type."""
+    """Return the largest difference between the signals of goal and adversary among a candidate's receptor types."""
     return max((difference(peak) for peak in peaks(row)), default=NO_NUMBER)
 
 
@@ -57,17 +57,17 @@ def peaks(row: Row) -> list[float]:
 
 
 def shortest(row: Row) -> float:
-    """Return the shortest peak [nm]."""
+    """Return the shortest peak of a candidate's receptor types [nm]."""
     return min(peaks(row), default=NO_NUMBER)
 
 
 def middle(row: Row) -> float:
-    """Return the median peak [nm]."""
+    """Return the median peak of a candidate's receptor types [nm]."""
     return float(np.median(peaks(row))) if row.peaks_nm else NO_NUMBER
 
 
 def longest(row: Row) -> float:
-    """Return the longest peak [nm]."""
+    """Return the longest peak of a candidate's receptor types [nm]."""
     return max(peaks(row), default=NO_NUMBER)
 
 
@@ -84,7 +84,7 @@ QUANTITIES = {
 
 
 def page(store: Store) -> Page:
-    """Return the page of stored runs."""
+    """Return the page of results, made from stored runs."""
     return Page(
         name=NAME,
         command=(
@@ -107,7 +107,7 @@ def page(store: Store) -> Page:
 
 
 def table(store: Store) -> str:
-    """Return a table of the first generation, the last generations, and the null model of the last ones."""
+    """Return a table of the quantities in the first and in the last generations, and of their null model."""
     first = [row for row in store.rows if row.generation == 0]
     header = ["mean", "first generation", f"last {LAST} generations", "null model"]
     lines = []
@@ -124,7 +124,7 @@ def rank_correlation(rows: Sequence[Row]) -> float:
 
 
 def table_by_peak(rows: Sequence[Row]) -> str:
-    """Return a table with a row per range of the shortest peak."""
+    """Return a table of fitness and success, with a row per range of the shortest peak."""
     lines = []
     for low, high in itertools.pairwise(RANGES):
         mine = [row for row in rows if not row.failed and low <= shortest(row) < high]

@@ -95,7 +95,7 @@ def _is_sharp(lens: Lens) -> bool:
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
-    """Return the page of stored rows."""
+    """Return the page of results, made from stored rows."""
     lives = [len(_lives(rows, a, p)) for a in APERTURES for p in _powers(rows, a)]
     return Page(
         name=NAME,
@@ -116,7 +116,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
 
 
 def _table(rows: Sequence[Trained]) -> str:
-    """Return a table with a row per lens."""
+    """Return a table of fitness and optical quality, with a row per lens."""
     lines = []
     for aperture in APERTURES:
         for power in _powers(rows, aperture):
@@ -134,7 +134,7 @@ def _table(rows: Sequence[Trained]) -> str:
 
 
 def _worths(rows: Sequence[Trained]) -> str:
-    """Return a table with a row per pupil."""
+    """Return a table of the results of `worth`, with a row per pupil."""
     lines = [[f"{a:g}", str(worth(rows, a) or "-")] for a in APERTURES]
     return markdown_table(["a", "fitness of sharp lenses minus that of nearly sharp ones"], lines)
 

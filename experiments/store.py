@@ -34,7 +34,7 @@ def read_rows(kind: type[Row], path: Path) -> list[Row]:
 
 
 def write_rows(rows: Iterable[Any], path: Path) -> None:
-    """Write a CSV file, completely or not at all, with numbers of six digits.
+    """Write a CSV file, completely or not at all, with six significant digits.
 
     Raises:
         ValueError: the rows are empty.
@@ -58,7 +58,7 @@ class Origin:
     machine: processor and number of cores
     versions: versions of the software that influences the numbers
     whose: "core" or "worker", the unit of `hours`
-    earlier: other commits, with which some of the rows were computed before
+    earlier: other commits, with which some of the rows were computed
     """
 
     hours: float
@@ -108,7 +108,7 @@ class Origin:
         took = f"{self.hours / (least or 1 / 3600):.2g} {self.whose} {unit}"
         commits = ", ".join(_short(commit) for commit in (*self.earlier, self.versions["commit"]))
         python = self.versions["python"]
-        software = ", ".join(filter(None, (f"rhabdom at {commits}", f"Python {python}", packages)))
+        software = ", ".join(filter(None, (f"rhabdom at commit {commits}", f"Python {python}", packages)))
         return f"{took} on {self.machine}; {software}."
 
 

@@ -96,7 +96,7 @@ def send_all_to_stderr() -> None:
 
 
 class OwnedStream:
-    """A text stream that writes to another one. Other code cannot close it, and no fault of it ends the program.
+    """A text stream that writes to another one. Other code cannot close it, and its faults do not end the program.
 
     After a fault, all further output is discarded.
 

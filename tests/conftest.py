@@ -23,8 +23,10 @@ sys.dont_write_bytecode = False
 
 
 def pytest_configure() -> None:
-    """Give each xdist worker a single Dr.Jit thread: a second thread spins while it waits and slows the other
-    workers."""
+    """Give each xdist worker a single Dr.Jit thread.
+
+    A second thread spins while it waits, which slows down the other workers.
+    """
     if "PYTEST_XDIST_WORKER" in os.environ:
         import drjit
 

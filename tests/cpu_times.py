@@ -30,7 +30,7 @@ def cpu_seconds() -> float:
 
 
 class Stopwatch:
-    """Runs where tests run: adds its CPU time to the report of each test phase."""
+    """Plugin of the processes that run tests. It adds the CPU time to the report of each phase of a test."""
 
     def __init__(self) -> None:
         self.read = 0.0
@@ -52,7 +52,7 @@ class Stopwatch:
 
 
 class Recorder:
-    """Runs in the process that the user started: collects the reports of all workers and writes the file."""
+    """Plugin of the process that the user started. It collects the reports of all workers, and writes the file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -98,7 +98,7 @@ def part(test: str, by: str) -> str:
 
 
 def main() -> None:
-    """Prints CPU seconds, most expensive first."""
+    """Print CPU seconds, most expensive first."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("file", type=Path, help="written by pytest --cpu-times")
     parser.add_argument("--by", choices=("folder", "file", "function", "test"), default="file")

@@ -50,7 +50,7 @@ def complaint(call, arguments):
 
 
 def complaints(call, valid):
-    """Complaints about every argument in turn, with each odd value in its place; the valid call must succeed."""
+    """Return the complaints about calls in which an odd value replaces one argument; the valid call must succeed."""
     call(**valid)
     found = {}
     for argument in valid:
@@ -61,7 +61,10 @@ def complaints(call, valid):
 
 
 def masked(value, rng):
-    """The same numbers, at least one of them masked; a row of three for None, and None for values of other kinds."""
+    """Return the same numbers with at least one of them masked.
+
+    The result is a row of three for None, and None for values of other kinds.
+    """
     try:
         given = np.asarray([1.0, 2.0, 3.0] if value is None else value)
     except (TypeError, ValueError):
@@ -74,7 +77,7 @@ def masked(value, rng):
 
 
 def masked_complaints(call, valid, rng):
-    """Arguments that accept masked elements, or refuse them in the wrong form. Lists may contain them, too."""
+    """Return complaints about arguments that accept masked elements, also within lists, or refuse them incorrectly."""
     found = {}
     for argument, value in valid.items():
         if (array := masked(value, rng)) is None:

@@ -23,8 +23,10 @@ from tests.evolve.learning.bright_spot import BrightSpot
 
 
 class Pen(BrightSpot):
-    """A spot of light on a plane, observed without rendering. Moving incurs a cost through the term that contact has in
-    our worlds."""
+    """A spot of light on a plane, observed without rendering.
+
+    Moving has a cost, in the reward term that contact has in sim's worlds.
+    """
 
     failures: ClassVar = Counter()
 
@@ -37,14 +39,16 @@ class Pen(BrightSpot):
 
 
 def pens(animal, config, *seeds):
-    """A replacement for `worlds_of`."""
+    """Replace `worlds_of`: return environments without rendering."""
     episodes = config.evaluation.episodes
     return TrainingEnvs(*(Pen(n, memory=animal.memory_frames) for n in (config.learning.n_envs, episodes, episodes)))
 
 
 def life(config, animal):
-    """Result of a candidate: its training, and the returns of its evaluation episodes. Learning is real, in worlds that
-    take milliseconds."""
+    """Return the result of a candidate: its training, and the returns of its evaluation episodes.
+
+    Learning is real, in worlds that take milliseconds.
+    """
     with TemporaryDirectory() as folder, mock.patch.object(fitness, "worlds_of", pens):
         outcome = fitness.evaluate(animal, config, 7, Path(folder) / "policy")
     assert outcome.failure is None

@@ -30,7 +30,7 @@ DIVIDED = (
 
 
 def group(test: str) -> str:
-    """Name of the group of a test; tests of one group run on one worker."""
+    """Return the name of a test's group; the tests of a group run on one worker."""
     alone = test if test.startswith(DIVIDED) else test.split("::")[0]
     return next((name for name, starts in SHARING.items() if test.startswith(starts)), alone)
 

@@ -30,7 +30,10 @@ settings.register_profile(ALL)
 
 
 def sweep(count: int, fast: int = FAST_EXAMPLES) -> settings:
-    """Settings of a test with random examples, the same in every run: `count` with `--all`, else the first `fast`."""
+    """Return the settings of a test with random examples, which are the same in every run.
+
+    The test has `count` examples with `--all`, and otherwise the first `fast` of them.
+    """
     return settings(
         max_examples=count if settings.get_current_profile_name() == ALL else min(count, fast),
         deadline=None,
@@ -51,7 +54,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def slow(*values: object) -> Any:
-    """A case of `pytest.mark.parametrize` that is slow."""
+    """Return a case for `pytest.mark.parametrize` that is slow."""
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
@@ -74,7 +77,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def fast_cases(cases: list[dict[str, int]], count: int) -> list[int]:
-    """Indices of `count` cases, chosen one after another: each time the first case with the most values not chosen yet.
+    """Return the indices of `count` cases that cover as many values of the parameters as possible.
+
+    They are chosen one after another. Each time, it is the first case with the most values that are not covered yet.
 
     cases: for each parameter, a number that equal values share
     """

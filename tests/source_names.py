@@ -6,8 +6,8 @@ use.
 - paths under our folders, anywhere in the text, and file names that end in .py in code spans;
 - modules and their names that begin with one of our packages (`optics.methods.hankel`), anywhere in the text;
 - in code spans: members of our classes (`Eye.kernel`), members of modules by their last name
-  (`lighting.spawn_bounce_ray`), settings (`search.rungs`), and single words that look like code (called, with an
-  underscore, or a capital in mixed case).
+  (`lighting.spawn_bounce_ray`), settings (`search.rungs`), and single words that look like code (with parentheses for a
+  call, with an underscore, or in mixed case).
 
 Fenced commands and code are left out, because other tests run them.
 """
@@ -64,8 +64,10 @@ def missing(text: str) -> list[str]:
 
 
 def path_exists(path: str) -> bool:
-    """Return whether the path exists: a path from the repository's root, which may hold stars, or the end of a Python
-    file's path."""
+    """Return whether a path exists.
+
+    It is a path from the repository's root, which may contain wildcards, or the end of a Python file's path.
+    """
     path = path.rstrip(".")
     if path.startswith(GENERATED):
         return True
@@ -73,8 +75,10 @@ def path_exists(path: str) -> bool:
 
 
 def name_exists(name: str) -> bool:
-    """Return whether a dotted name exists. It starts with one of our packages, with a class, module or variable, or
-    with a section of a run's settings."""
+    """Return whether a dotted name exists.
+
+    It starts with one of our packages, with a class, module or variable, or with a section of a run's settings.
+    """
     head, attribute = name.split(".")[:2]
     if head in PACKAGES:
         return _resolves(name)
@@ -97,8 +101,7 @@ def name_exists(name: str) -> bool:
 
 
 def _resolves(name: str) -> bool:
-    """Return whether the name resolves: through modules first, then one name of the module, then one member of the
-    class."""
+    """Return whether a name consists of modules, a name in the last module, and possibly a member of this class."""
     module, rest = name, []
     while module not in modules():
         module, _, last = module.rpartition(".")
@@ -117,7 +120,7 @@ def python_files() -> list[str]:
 
 @lru_cache
 def modules() -> dict[str, ast.Module]:
-    """Dotted name of each module -> its syntax tree."""
+    """Return the syntax tree of each module, by its dotted name."""
     found = {package: ast.Module([], []) for package in PACKAGES}
     for path in python_files():
         module = path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")

@@ -16,7 +16,7 @@ def test_contracts_hold():
 
 
 def imported_at(path: Path) -> dict[str, bool]:
-    """Top-level packages that a file imports -> True if importing the file imports them."""
+    """Return the top-level packages that a file imports, each with True if it is imported on import of the file."""
     module = tree(path)
     nested = {id(node) for f in ast.walk(module) if isinstance(f, ast.FunctionDef | ast.Lambda) for node in ast.walk(f)}
     found: dict[str, bool] = {}

@@ -143,8 +143,10 @@ def test_code_runs_and_prints_what_is_shown(document, tmp_path):
 
 
 def agrees(shown, printed):
-    """Return whether the words are equal and numbers agree within 5 % or 2e-5 (float32 noise below that differs between
-    machines)."""
+    """Return whether the words are equal, and numbers agree within 5 % or 2e-5.
+
+    float32 noise below 2e-5 differs between machines.
+    """
     pairs = zip(NUMBER.findall(shown), NUMBER.findall(printed), strict=False)
     same_words = NUMBER.sub("#", shown).split() == NUMBER.sub("#", printed).split()
     return same_words and all(math.isclose(float(a), float(b), rel_tol=0.05, abs_tol=2e-5) for a, b in pairs)

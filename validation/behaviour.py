@@ -36,7 +36,7 @@ MODES = ("training", "evaluation")
 WORLDS, STEPS = (1, 24, 64), 300
 USER_TASKS = {"FindBall": "find_ball", "AntSeeks": "ant_seeks", "Prey": "front_or_side"}  # class: file in examples/
 USER_WORLDS, USER_STEPS = (1, 12), 100
-PSFS = 5  # for each method
+PSFS = 5  # number of PSFs of each method
 METHODS = (
     "hankel",
     "low_rank",
@@ -87,7 +87,7 @@ def _played(venv: Any, steps: int) -> str:
 
 
 def encounter() -> str:
-    """Return episodes of prey and predator, both with random actions, as a PettingZoo environment."""
+    """Return the hash of episodes of prey and predator as a PettingZoo environment, both with random actions."""
     prey, predator = (_example(name, "front_or_side") for name in ("Prey", "Predator"))
     hunter = type("Hunter", (predator,), {"rewards": lambda self, data: {"near": -abs(data.qpos[2] - data.qpos[0])}})
     solitary = type("Prey", (prey,), {"others": ()})
@@ -145,7 +145,7 @@ def psfs(method: str) -> Iterator[tuple[str, str]]:
 
 
 def user_evolution(task: str, folder: Path) -> Iterator[tuple[str, str]]:
-    """Record and EXR files of a small seeded evolution of a user task."""
+    """Yield names and hashes of the record and the EXR files of a small seeded evolution of a user task."""
     run = folder / task
     _evolve("run", f"{EXAMPLES / USER_TASKS[task]}.py:{task}", *SMALL, "--out", str(run))
     yield f"record {task}", _record(run)
@@ -153,7 +153,7 @@ def user_evolution(task: str, folder: Path) -> Iterator[tuple[str, str]]:
 
 
 def evolution(folder: Path) -> Iterator[tuple[str, str]]:
-    """Record, EXR files and report of a small seeded evolution."""
+    """Yield names and hashes of the record, the EXR files and the report of a small seeded evolution."""
     run = folder / "run"
     _evolve(*EVOLUTION, "--out", str(run))
     yield "record", _record(run)
@@ -222,7 +222,7 @@ def main() -> int:
     if asked.out:
         asked.out.write_text(text)
     if not asked.against:
-        print(f"{len(found)} outputs, all together {_hash(text)[:16]}")
+        print(f"{len(found)} outputs; hash of all: {_hash(text)[:16]}")
         return 0
     stored = json.loads(asked.against.read_text())
     differing = sorted(name for name in found.keys() | stored.keys() if found.get(name) != stored.get(name))

@@ -41,5 +41,5 @@ def episode_failure_lines(found: Sequence[EpisodeFailure]) -> list[str]:
     if not found:
         return []
     number, most = sum(one.episodes for one in found), found[0]
-    whose = f"{most.episodes:,}, of {most.candidates} candidate{'s' * (most.candidates > 1)}"
-    return [f"episodes that failed: {number:,}; most often ({whose}): {most.said}"]
+    whose = f"{most.episodes:,} episodes of {most.candidates} candidate{'s' * (most.candidates > 1)}"
+    return [f"failed episodes: {number:,}; most frequent failure ({whose}): {most.said}"]

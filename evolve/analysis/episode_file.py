@@ -179,7 +179,10 @@ def _tuples(value: Any) -> Any:
 
 
 def _described(solid: Solid, number: int, arrays: dict[str, Any]) -> dict[str, Any]:
-    """Return a solid as JSON values, and add the arrays of its mesh to `arrays`."""
+    """Return a solid as JSON values, and add the arrays of its mesh to `arrays`.
+
+    number: index of the solid, which is part of the names of its arrays
+    """
     if solid.triangles is not None:
         mesh = {name: array for name, array in vars(solid.triangles).items() if array is not None}
         arrays |= {f"solid{number}.{name}": array for name, array in mesh.items()}

@@ -88,7 +88,7 @@ def trained_policy(run: Run, candidate: Candidate) -> EyePolicy:
 
 @contextlib.contextmanager
 def damage_named(path: Path) -> Iterator[None]:
-    """Name the file of a policy whose episodes cannot be played.
+    """Convert errors of a policy inside the context to errors that name the policy's file.
 
     Raises:
         RunError: the policy belongs to another animal, or its actions are not finite.

@@ -80,7 +80,7 @@ def succeeded(candidate: Candidate) -> bool:
 
 
 def by_generation(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
-    """Return the candidates of each generation, sorted by generation and index."""
+    """Return (generation, its candidates) for each generation, sorted by generation and by index."""
     ordered = sorted(candidates, key=lambda c: (c.generation, c.index))
     return [(generation, list(members)) for generation, members in groupby(ordered, lambda c: c.generation)]
 
@@ -113,7 +113,7 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return a quantity over the generations: its spread in each population, and its value in the champion.
+    """Return a quantity over the generations: its spread in each population, and its value in the best candidate.
 
     value: function that returns the quantity of a phenotype
     """

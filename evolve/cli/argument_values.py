@@ -13,21 +13,21 @@ LONGEST = 4000  # maximum number of digits; Python converts at most 4,300
 
 
 def seed(text: str) -> int:
-    """Return the seed in the text of an argument."""
+    """Convert the text of an argument to a seed."""
     if not text.isdecimal() or len(text) > LONGEST:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number, 0 or more")
     return int(text)
 
 
 def every(text: str) -> int:
-    """Return the number of actions between two images in the text of an argument."""
+    """Convert the text of an argument to a number of actions between two images."""
     if not text.isdecimal() or len(text) > LONGEST or not 1 <= int(text) <= MOST_EVERY:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 1 to {MOST_EVERY:,}")
     return int(text)
 
 
 def searches(text: str) -> int:
-    """Return the number of searches in the text of an argument. A p-value needs at least 2."""
+    """Convert the text of an argument to a number of searches, at least 2, because a p-value needs them."""
     if not text.isdecimal() or len(text) > LONGEST or not 2 <= int(text) <= MOST_SEARCHES:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 2 to {MOST_SEARCHES:,}")
     return int(text)

@@ -24,7 +24,7 @@ begin here:
   evolve run detection --preset quick        evolve eyes, a few minutes
   evolve list                                the runs under runs/
   evolve report runs/detection-quick-1 --open
-every command has examples: evolve run --help
+options and examples of a command: evolve run --help
 """
 EXAMPLES = {
     "run": """\
@@ -151,7 +151,7 @@ def _add_runs(commands: Commands) -> None:
         command.add_argument(
             "--scheduler", metavar="ADDRESS", help="address of the Dask scheduler, such as tls://host:8786"
         )
-        for name, whose in (("ca-file", "certificates to trust"), ("cert", "our certificate"), ("key", "its key")):
+        for name, whose in (("ca-file", "certificates to trust"), ("cert", "own certificate"), ("key", "private key")):
             command.add_argument(f"--tls-{name}", type=Path, metavar="FILE", help=f"for a tls:// scheduler: {whose}")
         command.add_argument(
             "--device",
@@ -199,10 +199,10 @@ def _add_watching(commands: Commands) -> None:
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
     _add_damage(compare)
     compare.add_argument("--json", action="store_true", help="print JSON")
-    compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with their fitness curves")
-    drift = _command(commands, "drift", "drift.drift", "test which genes changed by more than chance explains")
-    drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories that differ in seeds")
-    many = "number of searches with random fitness with which the runs are compared (default: 200)"
+    compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with the fitness curves")
+    drift = _command(commands, "drift", "drift.drift", "test which genes changed by more than chance would explain")
+    drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="runs that differ only in their seeds")
+    many = "number of searches with random fitness, with which the runs are compared (default: 200)"
     _add_damage(drift)
     drift.add_argument("--searches", type=searches, default=200, metavar="N", help=many)
     drift.add_argument("--json", action="store_true", help="print JSON")
@@ -224,7 +224,7 @@ def _add_products(commands: Commands) -> None:
             said = f"{shown} every N actions (default: 8)"
             product.add_argument("--every", type=every, default=usual, metavar="N", help=said)
         if name == "replay":
-            product.add_argument("--test", action="store_true", help="play in the test set of a family of layouts")
+            product.add_argument("--test", action="store_true", help="play in a layout of the family's test set")
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
             product.add_argument("--mp4", action="store_true", help="also write a video with one frame per action")
@@ -257,10 +257,10 @@ def _add_voice(command: argparse.ArgumentParser) -> None:
 def _add_tables(commands: Commands) -> None:
     """Add the commands that list tasks, presets, genes and settings, or check results and the installation."""
     validate = _command(
-        commands, "validate", "validate.validate", "run the validation scripts of a checkout, which check results"
+        commands, "validate", "validate.validate", "run validation scripts (in a checkout of the repository)"
     )
     validate.add_argument("proofs", nargs="*", metavar="NAME", help="scripts to run (default: all)")
-    validate.add_argument("--list", action="store_true", help="list the scripts by name, and run none")
+    validate.add_argument("--list", action="store_true", help="list the scripts without running them")
     doctor = _command(commands, "doctor", "validate.doctor", "report what is installed and whether it works")
     tasks = _command(commands, "tasks", "listings.tasks", "list the tasks")
     presets = _command(commands, "presets", "listings.presets", "list the presets")
@@ -270,7 +270,7 @@ def _add_tables(commands: Commands) -> None:
     config = _command(commands, "config", "show_config.config", "show all settings of a run, or their schema")
     config.add_argument("what", choices=("show", "schema"), help="show: as TOML, for --config; schema: as JSON schema")
     _add_settings(config)
-    completion = _command(commands, "completion", "completion.completion", "print a shell's completion of this command")
+    completion = _command(commands, "completion", "completion.completion", "print a completion script for a shell")
     completion.add_argument("shell", choices=SHELLS, help="the shell")
 
 
@@ -295,5 +295,5 @@ def _command(
 
 def _add_damage(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        "--before-damage", action="store_true", help="use only the lines of a record before the first damaged one"
+        "--before-damage", action="store_true", help="ignore a damaged record from the first damaged line on"
     )

@@ -14,8 +14,9 @@ def add_photograph(command: ArgumentParser) -> None:
     command.add_argument("--animal", required=True, metavar="NAME", help="animal, such as honeybee, goldfish or eagle")
     angle = "angle that the width of the photograph covers in the visual field [degrees]"
     command.add_argument("--width-deg", type=float, required=True, metavar="DEG", help=angle)
-    ultraviolet = "ultraviolet reflectance of white surfaces, which no photograph contains, 0 to 1 (default: 1)"
+    ultraviolet = "assumed ultraviolet reflectance of white surfaces, 0 to 1; photographs do not record it (default: 1)"
     command.add_argument("--uv", type=float, default=1.0, metavar="SHARE", help=ultraviolet)
-    distance = "distance of the scene [m]: a number, or a .npy file with one for each pixel (default: infinity)"
+    distance = "distance of the scene [m]: a number, or a .npy file with one number per pixel (default: infinity)"
     command.add_argument("--depth", metavar="METRES", help=distance)
-    command.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="output directory (default: this one)")
+    where = "output directory (default: the current one)"
+    command.add_argument("--out", type=Path, default=Path(), metavar="DIR", help=where)

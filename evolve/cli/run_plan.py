@@ -97,8 +97,8 @@ class RunPlan:
         """Return a line with the number of candidates and steps of each rung; no line if there is only one rung."""
         search = self.config.search
         ends = zip(sizes(search), budgets(search, self.config.learning), strict=True)
-        rungs = ", ".join(f"{size} to {steps:,} steps" for size, steps in ends)
-        return [f"rungs  {rungs}"] if search.rungs > 1 else []
+        rungs = ", ".join(f"{size} candidates for {steps:,} steps" for size, steps in ends)
+        return [f"rungs          {rungs}"] if search.rungs > 1 else []
 
     def _line_bytes(self) -> int:
         """Return the size of a candidate's line in the record [bytes]."""
@@ -126,11 +126,11 @@ class RunPlan:
             *_gene_lines(config),
         ]
         for name, pace in self.paces.items():
-            what = {"start": "like the first", "middle": "in the middle of all ranges"}[name]
+            what = {"start": "are like the first", "middle": "have genes in the middle of their ranges"}[name]
             whole = config.learning.total_steps
             speed = whole / pace.training_s(config.learning, 0, whole)
             lines.append(
-                f"predicted      {_duration(self.hours[name])} if animals stay {what}: {speed:,.0f} steps/s "
+                f"predicted      {_duration(self.hours[name])} if animals {what}: {speed:,.0f} steps/s "
                 f"per worker, {pace.candidate_s(config):,.0f} s per candidate"
             )
         if self.paces:

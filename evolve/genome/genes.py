@@ -147,7 +147,7 @@ def _all_genes(relief_points: int) -> dict[str, Gene]:
 def _body() -> list[Gene]:
     gene = partial(_gene, "morphological")
     return [
-        gene("n_eyes", INTEGER, (1, 32), (1, 16, 1), "", "eyes around the body"),
+        gene("n_eyes", INTEGER, (1, 32), (1, 16, 1), "", "number of eyes around the body"),
         gene("placement_range_deg", REAL, (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
         _held(gene(TILT, REAL, (-90, 90), (-60, 60, 0), "deg", "elevation of the eyes; only in user tasks")),
         gene("fov_deg", REAL, (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
@@ -185,7 +185,7 @@ def _brain() -> list[Gene]:
     return [
         # Photoreceptors of fast flies in bright light have 3 ms, and those of toads in the dark have seconds.
         _held(gene(TIME_CONSTANT, REAL, (0.1, 10_000), (1, 500, 20), "ms", "time constant of the receptors' filter")),
-        gene("memory_frames", INTEGER, (1, 32), (1, 10, 5), "frames", "past frames that the brain sees"),
+        gene("memory_frames", INTEGER, (1, 32), (1, 10, 5), "frames", "frames that the brain sees"),
         gene("neurons", INTEGER, (1, 512), (1, 512, 64), "", "neurons in each hidden layer"),
         _held(gene("layers", INTEGER, (1, 4), (1, 4, 2), "", "hidden layers of actor and critic")),
     ]

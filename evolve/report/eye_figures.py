@@ -222,8 +222,8 @@ def _mtf(light: WhiteLight) -> Html:
 def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
     """Return the MTF in white daylight of a circular aperture of the same width without aberrations, (frequency,).
 
-    In each band, the MTF is (2/π)(arccos s - s √(1 - s²)) with s = f / cutoff (Goodman, §6.3.3). The bands are weighted
-    by their light.
+    In each band, the MTF is (2/π)(arccos s - s √(1 - s²)), where s is the frequency divided by the cutoff frequency
+    (Goodman, §6.3.3). The bands are weighted by their light.
     """
     weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)
     s = np.clip(frequency / light.psf.cutoff[:, None], 0, 1)

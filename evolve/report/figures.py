@@ -51,7 +51,9 @@ def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Ca
 
 
 def costs_figure(candidates: Sequence[Candidate]) -> Html:
-    """Draw the two parts of fitness, task fitness above costs: of each candidate, and of the best so far.
+    """Draw the two parts of fitness over the generations: task fitness in the upper panel, costs in the lower one.
+
+    Each panel shows all candidates, and the best candidate so far.
 
     Raises:
         ValueError: no candidate has succeeded.

@@ -73,7 +73,7 @@ class Drift:
 
     @property
     def random(self) -> str:
-        """Fitness of the searches, as text."""
+        """Random quantity that the searches maximise, as text: "fitness" or "task fitness minus costs"."""
         return "task fitness minus costs" if self.costs else "fitness"
 
     def as_plain_values(self) -> dict[str, Any]:

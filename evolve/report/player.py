@@ -212,7 +212,7 @@ def _kept(episode: Episode) -> np.ndarray:
 
 
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
-    """Return (frame, "goal" or "adversary") for each object that was reached; frame: the first frame after this."""
+    """Return (frame, "goal" or "adversary") for each object that was reached; the frame is the first one afterwards."""
     found = [
         (int(np.searchsorted(kept, time)), name)
         for name in EVENTS

@@ -56,9 +56,9 @@ class RerunStream:
         self.stream.log(list(entity), what)
 
     def columns(self, entity: tuple[str, ...], n: int, columns: Any) -> None:
-        """Log data of an entity before each of n actions.
+        """Log the states of an entity before each of n actions.
 
-        columns: the data, as rerun's columns
+        columns: one state for each action, as rerun's columns
         """
         actions, rr = np.arange(n), self.rr
         times = [rr.TimeColumn("action", sequence=actions), rr.TimeColumn("time", duration=actions * self.seconds)]

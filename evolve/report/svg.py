@@ -96,7 +96,7 @@ def _without_inline_styles(text: str) -> Html:
 
 
 def _with_own_ids(text: str, name: str) -> str:
-    """Prefix ids that are referenced in the figure with its name, and remove other ids.
+    """Put the figure's name in front of every id to which the figure itself refers, and remove all other ids.
 
     Links to targets outside the figure remain unchanged.
     """

@@ -91,7 +91,7 @@ class Tally:
         search = run.config.search
         last = search.generations - 1
         reached = Place.from_id(len(run.candidates), search.population).generation
-        parts = [f"generation {min(reached, last)} of 0 to {last}"]
+        parts = [f"generation {min(reached, last)} (last: {last})"]
         if run.best is not None:
             parts.append(f"best {run.best.fitness:.3g}")
         if run.best is not None and self.median is not None:

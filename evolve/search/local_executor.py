@@ -34,7 +34,7 @@ OUT_OF_MEMORY = (
 
 @dataclass
 class _Worker:
-    """A worker process, the executor's end of its pipe, and the current job; None: the worker is idle."""
+    """A worker process, the executor's end of its pipe, and the current job (None if the worker is idle)."""
 
     process: Any
     connection: Connection

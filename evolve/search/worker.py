@@ -46,7 +46,14 @@ class Message:
 
 
 def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: Callable[[], None] | None) -> None:
-    """Evaluate the candidates that arrive through the pipe, and send a message for each result; run in the process."""
+    """Evaluate the candidates that arrive through the pipe, and send a message for each result.
+
+    This is the main function of a worker process.
+
+    connection: the worker's end of the pipe
+    evaluate: function that is called as `evaluate(*job.arguments, progress=...)`
+    prepare: function that is called before the first candidate; None: no preparation
+    """
     send_all_to_stderr()
     threading.Thread(target=_die_with_parent, daemon=True).start()
     try:

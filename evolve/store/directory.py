@@ -242,7 +242,7 @@ class Run:
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:
-        """Candidates in the order of the record, each once for every rung that it has reached."""
+        """Candidates in the order of the record; a candidate that has completed several rungs occurs once for each."""
         return list(self.record.lines.values())
 
     def on_record(self, candidate_id: int, rung: int) -> Candidate | None:

@@ -21,7 +21,7 @@ class Evaluation:
     returns: return of each evaluation episode
     success_rate: fraction of the evaluation episodes that were solved
     steps: number of agent steps in training
-    seconds: wall-clock time of training and evaluation
+    seconds: wall time of training and evaluation [s]
     curve: learning curve, (training steps, mean return of the evaluation episodes) at each evaluation
     failure: message in one line; None if the candidate did not fail
     episode_failures: (message in one line, number of episodes that ended with it), the most frequent first

@@ -22,7 +22,7 @@ from evolve.store.regular_files import opened, require_size
 
 __all__ = ["Record", "RunError"]
 
-LARGEST_RECORD, LONGEST_LINE = 2**31, 2**25  # maximum length of a line [bytes]; a candidate's line has some thousands
+LARGEST_RECORD, LONGEST_LINE = 2**31, 2**25  # maximum sizes [bytes]; a candidate's line has some thousands
 Lines = dict[tuple[int, int], Candidate]  # (candidate id, rung) -> the candidate after this rung
 
 

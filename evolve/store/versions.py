@@ -99,7 +99,9 @@ def run_id(run: Path) -> str:
 
 
 def provenance(run: Path) -> dict[str, Any]:
-    """Return values that identify a run in files that are made from it; unknown values are missing.
+    """Return values by name that identify a run in the files that are made from it.
+
+    Values that are unknown are omitted. The names and their meanings are:
 
     run: name of the run directory
     run_id: see `run_id`

@@ -58,7 +58,7 @@ def _guide(diameter: float, length: float) -> Waveguide:
 
 
 def _by_angle(diameter: float, focal_length: float, angle_deg: float, length: float) -> Facet:
-    """Return a facet whose rhabdom has the width f · angle."""
+    """Return a facet whose rhabdom has the width f · angle, so that it subtends `angle_deg` in the visual field."""
     return Facet(diameter, focal_length, focal_length * math.radians(angle_deg), length)
 
 
@@ -137,7 +137,7 @@ def megalopta(rings: int = 10) -> AppositionEye:
 
 
 def cirolana() -> Eye:
-    """Return one ommatidium of the marine isopod *Cirolana borealis*: a receptor that accepts light from 45°.
+    """Return one ommatidium of the marine isopod *Cirolana borealis*, with an acceptance angle of 45°.
 
     Source: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981: D = 150 µm, Δρ = 45°. Its rhabdom has too many modes
     to be modelled as a waveguide, and the focus lies below its tip. The eye is therefore a lens in front of a single

@@ -27,7 +27,7 @@ __all__ = ["EDGE_REACH", "LEAST_RIPPLE", "Aperture", "Nodes", "SoftAperture"]
 # Choice: the largest reach of the soft edge beyond the aperture, in radii.
 EDGE_REACH = 0.25
 LEAST_RIPPLE = 1e-13  # choice: smallest ripple of a soft edge's spectrum; it is above the rounding errors of float64
-MOST_CYCLES = 1e90  # far beyond pupils of valid size, wavelength and distance, which the planner then refuses
+MOST_CYCLES = 1e90  # far above any realistic value, so that the planner, and not this check, refuses a pupil
 
 
 class SoftAperture(ABC):

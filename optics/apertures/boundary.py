@@ -27,7 +27,7 @@ PARALLEL = 1e-12
 # number of lines.
 ALONG, MOST_LINES = 0.3819660, 200
 NARROW = 1e-6  # choice, radii: narrower gaps are not compared with `contains`
-TOUCHING = 1e-9  # choice, squared, in radii: a near miss within it counts as an intersection, which only adds a cut
+TOUCHING = 1e-9  # choice, relative square of a gap: closer edges count as touching; a superfluous cut does no harm
 
 Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -125,6 +125,8 @@ def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Cont
 
     Pieces of the boundary lie between open and closed areas. If several pieces coincide, only the first is kept.
 
+    middle, left: midpoints of the pieces, and unit normals that point to their left, (n, 2) each.
+
     Both sides of a piece are tested at points that are closer to this piece than to any other edge. The test therefore
     works for arbitrarily narrow gaps.
     """
@@ -134,7 +136,7 @@ def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Cont
 
 
 def _first_of_coincident(middle: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Return a mask (n,) of the pieces that do not coincide with an earlier piece."""
+    """Return a mask (n,) of the pieces that do not coincide with an earlier piece; arguments as in `_edges`."""
     first = np.ones(len(middle), dtype=bool)
     if len(middle):
         pairs = KDTree(middle).query_pairs(NEIGHBOURS, output_type="ndarray")
@@ -158,7 +160,7 @@ def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
 
 
 def _near_segment(by_axis: list[np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) whose x or y lies within a segment's range. The axis with the smaller range counts.
+    """Return the points (n, 2) that lie within a segment's range along one axis, the one along which it is shorter.
 
     by_axis: all points sorted by x, and sorted by y.
     """
@@ -235,7 +237,7 @@ def _of_circles(arc: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _between(places: np.ndarray, low: float, high: float, shortest: float) -> np.ndarray:
-    """Return both ends and the places between them, in ascending order and at least `shortest` apart."""
+    """Return `low`, `high` and the places between them, in ascending order and at least `shortest` apart."""
     inside = np.sort(places[(places > low + shortest) & (places < high - shortest)])
     kept = inside[np.diff(inside, prepend=low) > shortest]
     return np.concatenate([[low], kept, [high]])

@@ -122,7 +122,7 @@ class SoftAnnulus(SoftAperture):
 
 @lru_cache(maxsize=512)
 def disk_table(edge: SoftEdge, radius: float) -> Interpolant:
-    """Return the profile of a soft disk across its edge."""
+    """Return the transmittance of a soft disk of this radius across its edge, as a table of `disk_profile`."""
     ends = radius - edge.reach, radius + edge.reach
     return Interpolant.from_function(
         lambda rho: disk_profile(edge, radius, rho), ends, 2 * edge.cycles, edge.ripple / 4
@@ -132,9 +132,9 @@ def disk_table(edge: SoftEdge, radius: float) -> Interpolant:
 def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndarray:
     """Return the transmittance of a soft disk at distances ρ from its axis, by quadrature. It is an even function of ρ.
 
-    A(ρ) = ∫ g(r) r θ(ρ, r) dr, where g is the kernel. θ = 2 arccos((ρ² + r² - R²)/(2ρr)) is the angle over which a
-    circle of radius r about the point lies inside the disk. The substitution r = lower + span sin²(πu/2) makes the
-    arccos a smooth function at both ends.
+    A(ρ) = ∫ g(r) r θ(ρ, r) dr, where g is the kernel and R the radius of the disk. θ = 2 arccos((ρ² + r² - R²)/(2ρr))
+    is the angle over which a circle of radius r about the point lies inside the disk. The arccos varies for r from
+    lower to lower + span. The substitution r = lower + span sin²(πu/2) makes it smooth at both ends.
     """
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
@@ -150,9 +150,9 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
 
 
 def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Nodes:
-    """Return Gauss-Legendre nodes along the radius, and equidistant nodes around each ring.
+    """Return nodes over a ring: Gauss-Legendre nodes along the radius, and equidistant nodes around each circle.
 
-    Smaller rings have fewer nodes.
+    Smaller circles have fewer nodes. `Aperture.nodes` describes cycles and digits.
 
     The rule represents the edge exactly and converges spectrally. Over a full disk, the mean around a ring is a smooth
     function of r². For few cycles, a rule in r² therefore needs fewer nodes.

@@ -22,7 +22,7 @@ from optics.numerics.arguments import finite, in_range, is_sized, one_of, reals,
 
 __all__ = ["Combined", "difference", "hexagonal_segments", "intersection", "union"]
 
-MOST_RINGS = 12  # choice: 469 segments
+MOST_RINGS = 12  # choice: largest number of rings, which have 469 segments
 SMALLEST = 1e-9  # choice, R²: smallest area of an opening
 
 RULES: dict[str, Callable[[list[np.ndarray]], np.ndarray]] = {

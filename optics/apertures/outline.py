@@ -166,5 +166,5 @@ class Outline(ReadOnlyArrays):
 
 
 def _within(angle: float, begin: float, end: float) -> bool:
-    """Return whether an angle [rad] lies on an arc."""
+    """Return whether an angle [rad] lies on the arc from `begin` to `end`, modulo 2π."""
     return bool((angle - begin) % TURN < end - begin or end - begin >= TURN)

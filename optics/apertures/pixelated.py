@@ -72,7 +72,7 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Return the number of nodes along a pixel with which rows and columns are as accurate as `nodes`.
+        """Return the number of nodes along a pixel that makes rows and columns of nodes as accurate as `nodes`.
 
         None: the number would be too large.
         """
@@ -96,7 +96,10 @@ class PixelatedAperture(Aperture):
         return float(self._widths.max())
 
     def rows(self, across: int) -> np.ndarray:
-        """Return the ascending positions of the rows (and of the columns) of nodes in units of R, (count x across,)."""
+        """Return the ascending positions of the rows (and of the columns) of nodes in units of R, (count · across,).
+
+        across: number of nodes along a pixel.
+        """
         u, _ = gauss_legendre(across)
         return (self._centres[:, None] + (u - 0.5) * self._widths[:, None]).ravel()
 
@@ -123,7 +126,7 @@ class PixelatedAperture(Aperture):
 
     @cached_property
     def _whole(self) -> np.ndarray:
-        """Mask of the pixels that lie inside, (row, column)."""
+        """Mask of the pixels that lie wholly within the opening, (row, column)."""
         return self.contains(self._centres[None, :], self._centres[:, None]) & ~self._near
 
     @cached_property
@@ -163,7 +166,10 @@ class PixelatedAperture(Aperture):
     def _pieces(
         self, at: np.ndarray, cycles: float, digits: float, degree: int = 0
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield x, y and weights of the nodes in each panel of a cut pixel's open part: see `strips`."""
+        """Yield x, y and weights of the nodes in each panel of a cut pixel's open part: see `strips`.
+
+        at: (row, column) of the pixel.
+        """
         bottom, left = self._centres[at] - self._widths[at] / 2
         height, width = self._widths[at]
         box = float(left), float(left + width), float(bottom), float(bottom + height)

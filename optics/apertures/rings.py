@@ -105,7 +105,7 @@ class Rings(Aperture):
 
 @dataclass(frozen=True, eq=False)
 class SoftRings(SoftAperture):
-    """Sums and differences of soft disks."""
+    """Rings with soft edges, computed as sums and differences of soft disks."""
 
     edge: SoftEdge
     radii: np.ndarray

@@ -53,7 +53,7 @@ class SoftEdge:
 
     @property
     def reach(self) -> float:
-        """Half width of the soft edge. It follows from a window whose spectrum ends at half the transition."""
+        """Half width of the soft edge, β/(π t) with the width t of the transition between passband and stopband."""
         return self.beta / (pi * (self.stopband - self.passband))
 
     @property
@@ -62,7 +62,7 @@ class SoftEdge:
         return self.reach * self.stopband
 
     def ring(self, r: np.ndarray) -> np.ndarray:
-        """Return 2π r g(r), the kernel's weight on the circle of radius r <= reach.
+        """Return 2π r g(r), the weight of the kernel g on the circle of radius r <= reach.
 
         The integral from 0 to `reach` is 1.
         """
@@ -116,7 +116,7 @@ def _beta(ripple: float) -> float:
 
 
 def kaiser_beta(ripple: float) -> float:
-    """Return β for a ripple in one dimension, by Kaiser's rule.
+    """Return the parameter β of a Kaiser window for a ripple in one dimension, by Kaiser's rule.
 
     Source: Oppenheim & Schafer, Discrete-Time Signal Processing, §7.5.
     """

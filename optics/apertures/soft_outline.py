@@ -103,7 +103,7 @@ class _Arc:
         self.count = dr.opaque(types.Index, len(nodes))
 
     def share(self, x: Array, y: Array, radius: Array, begin: Array, end: Array) -> Array:
-        """Return the contribution of an arc between two angles.
+        """Return the contribution of the arc from `begin` to `end` [rad] to the transmittance at points (x, y).
 
         The part of the arc within the kernel's reach is centred on the point's direction φ and has the half angle τ.
 
@@ -131,7 +131,7 @@ class _Arc:
         return total
 
     def _angle(self, x: Array, y: Array, radius: Array, first: Array, last: Array) -> Array:
-        """Return the angle that an arc subtends.
+        """Return the angle [rad] that the arc from `first` to `last` subtends at points (x, y).
 
         It is the angle of the chord, plus a full turn for points between chord and arc.
         """
@@ -145,7 +145,10 @@ class _Arc:
         return dr.atan2(cross, dot + TINY) + dr.select(between, 2 * pi, 0)
 
     def _integral(self, x: Array, y: Array, radius: Array, first: Array, last: Array, zero: Array) -> Array:
-        """Return ∫ H(r) (R - p·e(t)) R dt, with p the point and e(t) the unit vector at the angle t."""
+        """Return ∫ H(r) (R - p·e(t)) R dt along an arc of radius R, for the point p and the unit vector e(t) at t.
+
+        H is the function of `radial_table`.
+        """
         import drjit as dr
 
         types = self.types

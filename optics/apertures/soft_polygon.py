@@ -76,9 +76,10 @@ def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, 
 
 
 class _Line:
-    """Contribution W(d, s) of a piece of a line, from the foot of the perpendicular to a distance s along the line.
+    """Contribution W(d, s) of a piece of a line to the transmittance at a point.
 
-    d is the signed length of the perpendicular from the point.
+    The piece extends from the foot of the perpendicular from the point to a distance s along the line. d is the signed
+    length of the perpendicular.
 
     Parts of the line beyond the kernel's reach contribute the angle that they subtend. If the line passes through the
     reach, the whole chord contributes a value tabulated for a half-plane. A piece that ends within the reach
@@ -110,7 +111,12 @@ class _Line:
         return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
 
     def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
-        """Return W(d, s). `chord` is half the contribution of the whole chord; it is 0 if the line is out of reach."""
+        """Return the contribution W(d, s) of a line from its foot to the distance s.
+
+        near: mask of the points with the line within the kernel's reach.
+        half, chord: half the length of the chord within the reach, and half of its contribution, which is 0 without a
+            chord.
+        """
         import drjit as dr
 
         within = near & (dr.abs(s) < half)
@@ -120,7 +126,10 @@ class _Line:
         return dr.atan(slope) / (2 * pi) + through + dr.if_stmt((s, d, zero), within, self._integral, _nothing)
 
     def _integral(self, s: Array, d: Array, zero: Array) -> Array:
-        """Return the integral ∫ d H(r) dt from 0 to s."""
+        """Return ∫ d H(r) dt along a line from its foot at t = 0 to t = s.
+
+        Here r² = d² + t², and H is the function of `radial_table`.
+        """
         import drjit as dr
 
         types = self.types
@@ -141,7 +150,7 @@ def _nothing(*arguments: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def radial_table(edge: SoftEdge) -> Interpolant:
-    """Return H(r) = G(r)/r², G = ∫₀^r g(r') r' dr'."""
+    """Return a table of H(r) = G(r)/r², where G = ∫₀^r g(r') r' dr' and g is the kernel."""
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + edge.beta))
 
     def mean(r: np.ndarray) -> np.ndarray:
@@ -155,9 +164,9 @@ def radial_table(edge: SoftEdge) -> Interpolant:
 
 @lru_cache(maxsize=64)
 def _straight_table(edge: SoftEdge) -> Interpolant:
-    """Return the transmittance at a distance d inside a half-plane.
+    """Return a table of the transmittance at a distance d inside the soft edge of a half-plane.
 
-    It is 1 - ∫ g(r) r 2 arccos(d/r) dr from d to the reach.
+    It is 1 - ∫ g(r) r 2 arccos(d/r) dr from d to the reach of the kernel g.
     """
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + 2 * edge.beta))
 

@@ -84,7 +84,7 @@ def triangles(vertices: np.ndarray) -> np.ndarray:
 
 
 def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bool:
-    """Return whether the corner a, b, c turns left and its triangle contains no other corner of those left."""
+    """Return whether the corner a, b, c turns left and its triangle contains none of the other remaining corners."""
     corner = vertices[[a, b, c]]
     if _cross(corner[1] - corner[0], corner[2] - corner[1]) < 0:
         return False

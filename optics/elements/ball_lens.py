@@ -108,9 +108,11 @@ class BallLens:
         return _profile(self, wavelength).turning(self._relative(height))
 
     def deviation(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
-        """Return the angle [rad] by which the lens bends rays towards the axis, ψ + 2 arcsin(h/R) - π.
+        """Return the angle [rad] by which the lens bends rays towards the axis: ψ + 2 arcsin(h/R) - π.
 
-        height: distance [m] of parallel rays from the axis.
+        ψ is the angle of `turning`.
+
+        height: distance h [m] of parallel rays from the axis.
         """
         h = self._relative(height)
         return _profile(self, wavelength).turning(h) + 2 * np.arcsin(h) - math.pi
@@ -161,7 +163,11 @@ class BallLens:
         return Pupil(edge, medium_n=medium, thin_lens_focal_length=focal, wavefront=Zernike(modes, edge))
 
     def _wavefront(self, h: np.ndarray, focal: float, wavelength: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places [m] of rays on the pupil's plane, and the wavefront [m] there, for relative heights."""
+        """Return the distances [m] of rays from the axis on the pupil's plane, and the wavefront [m] there.
+
+        h: heights of the parallel rays, relative to R.
+        focal: focal length, relative to R.
+        """
         profile = _profile(self, wavelength)
         bent = profile.turning(h) + 2 * np.arcsin(h) - math.pi
         in_range("sine of the steepest ray", float(np.abs(np.sin(bent)).max()), 0.0, STEEPEST)

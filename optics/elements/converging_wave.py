@@ -18,10 +18,10 @@ __all__ = ["ConvergingWave", "is_of_rays", "is_of_samples", "of_rays", "of_sampl
 MM, UM = 1e-3, 1e-6
 # Choice: part of the pupil's size within which samples must be evenly illuminated, and rays have light.
 INSIDE = 0.9
-LIT = 1e-3  # choice: intensity from which on a sample counts as illuminated, relative to the brightest sample
+LIT = 1e-3  # choice: smallest intensity of an illuminated sample, relative to the brightest one
 # If the rim covers part of a sample, the sample's centre lies inside when it keeps more than half of the amplitude.
 HALF = 0.5
-EVEN = 0.1  # choice: tolerance on amplitudes within INSIDE of the size, relative to their median
+EVEN = 0.1  # choice: tolerance on amplitudes in the part INSIDE of the pupil, relative to their median
 ON_Z = (0.0, 0.0, 1.0)
 
 
@@ -32,7 +32,7 @@ class ConvergingWave:
     sines: components along the image plane's axes x and y of the unit vectors from this point to the samples, (2, n).
     ahead: distance [m] by which the wavefront is ahead of the sphere, times the refractive index, (n,).
     rim: rim of the pupil, in sines.
-    on_plane: the rim [m] on the plane behind which the image lies at `distance`.
+    on_plane: rim [m] of the pupil on its plane, which lies `distance` in front of the image.
     distance: radius of the sphere [m].
     wavelength: vacuum wavelength [m].
     position: the point (x, y) [m] on the image plane; None if the object does not contain it.
@@ -171,7 +171,7 @@ def _alike(system: Any) -> list[np.ndarray]:
 
 
 def _centre(places: np.ndarray, radius: float) -> np.ndarray:
-    """Return the centre of the sphere through the points. The centre lies behind them."""
+    """Return the centre of the sphere through the points (3, n)."""
     matrix = np.concatenate([2 * places, np.ones((1, places.shape[1]))]).T
     found = np.linalg.lstsq(matrix, np.sum(places**2, axis=0), rcond=None)[0][:3]
     if not np.isclose(np.linalg.norm(places - found[:, None], axis=0).mean(), radius, rtol=0.05):

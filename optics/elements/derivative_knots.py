@@ -34,7 +34,8 @@ class DerivativeKnots:
 
     borders: ascending borders of the cells along x and along y, in units of the pupil's radius, from -1 to 1. They
         include the borders of a relief of pixels.
-    splines: number of cubic splines by which the derivatives multiply the light in each cell.
+    splines: number of cubic splines, 1 or 2, by which the derivatives multiply the light in each cell. It is 2 if a
+        mask and a relief or wavefront carry derivatives.
     maps: names, rows and columns of the maps, such as "height: 32 x 32".
     names: names of these maps, as arguments of `Pupil`.
     """
@@ -54,7 +55,7 @@ class DerivativeKnots:
 
 
 def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
-    """Return the cells that derivatives with respect to samples of maps require; None if no map is concerned.
+    """Return the cells that derivatives with respect to samples of maps require; None if no derivative requires any.
 
     A derivative with respect to the refractive index is proportional to the height, so it requires the cells of the
     relief, too.

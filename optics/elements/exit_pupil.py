@@ -66,7 +66,7 @@ class ExitPupil:
     def spot_radius(self) -> float:
         """Largest distance [m] from the origin at which a ray of the fitted wavefront hits the image plane.
 
-        The gradient of the wavefront, times the distance and divided by the refractive index, displaces a ray.
+        A ray is displaced by the gradient of the wavefront, times the distance and divided by the refractive index.
         """
         waves, step = self.pupil.wavefront, 1e-4
         assert isinstance(waves, Zernike)

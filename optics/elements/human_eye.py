@@ -146,8 +146,8 @@ class HumanEye:
     def _mean_slopes(self, wavefront: Zernike, radius: float) -> np.ndarray:
         """Return the mean slopes (x, y) of a wavefront over the pupil, which determine the centroid of the image.
 
-        By Gauss's theorem, they are the means of 2 W (cos φ, sin φ) / a over the rim of a pupil of radius a. The mean
-        over RIM points is exact.
+        By Gauss's theorem, they are the means of 2 W (cos φ, sin φ) / a over the rim of the pupil, where W is the
+        wavefront at the azimuth φ and a the pupil's radius. The mean over RIM points is exact.
 
         radius: radius [m] of the circle to which the coefficients refer.
         """
@@ -157,7 +157,7 @@ class HumanEye:
         return slopes
 
     def _aspheric(self, order: int, radius: float) -> float:
-        """Return the Zernike coefficient [µm] of the path n (√(r² + f²) - f) to the retina, minus n r²/2f."""
+        """Return the Zernike coefficient [µm] of Z_order^0 in the path difference n (√(r² + f²) - f) - n r²/2f."""
         at, weights = np.polynomial.legendre.leggauss(NODES)
         rho = (at + 1) / 2
         r, f = radius * rho, self.focal_length

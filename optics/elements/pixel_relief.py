@@ -50,7 +50,7 @@ class PixelRelief(Relief):
         return float(np.ptp(self._heights))
 
     def bandwidth(self, level: float) -> float:
-        """Return infinity unless all heights are equal, since jumps have no band limit."""
+        """Return infinity, because jumps have no band limit; 0 if all heights are equal."""
         return 0.0 if self._level else math.inf
 
     def detail(self, level: float) -> float:

@@ -28,7 +28,7 @@ from optics.numerics.precision import precision
 __all__ = ["MIDDLE", "Pupil"]
 
 TALLEST = 100.0  # choice, radii: highest relief to which the thin-element model applies
-ANY_HEIGHT, OTHER_UNIT = 1e-3, 0.05  # choices [m]: always allowed; probably another unit
+ANY_HEIGHT, OTHER_UNIT = 1e-3, 0.05  # choices [m]: always allowed; probably given in another unit
 LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: neglected level of a mask's spectrum; digits of its transmission
 MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
 SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a pupil without a lens
@@ -121,7 +121,7 @@ class Pupil:
 
     @property
     def transmission(self) -> Scalar:
-        """Fraction of the light on the open aperture that the mask transmits (1 without a mask), with derivatives."""
+        """Fraction of the light on the open aperture that the mask transmits, with derivatives; 1 without a mask."""
         # Nothing is cached: a graph allows one backward pass, and gradients of Dr.Jit numbers may be enabled later.
         if is_differentiable(self.aperture_radius) or not (self.mask is None or self.mask.plain):
             import drjit as dr
@@ -246,14 +246,14 @@ class Pupil:
         return sampled_slopes(self._level if self.pixels else self, wavelength, source, self.pieces(wavelength))
 
     def pieces(self, wavelength: float) -> int:
-        """Return the number of polynomial pieces across the pupil."""
+        """Return the number of polynomial pieces of relief and wavefront across the pupil."""
         pieces = [self.height.knots if self.bends(wavelength) else 0]
         pieces += [0 if self.wavefront is None else self.wavefront.knots]
         return max(pieces)
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
-        """For each set of refractive indices, the first wavelength that was requested."""
+        """First requested wavelength for each set of refractive indices."""
         return {}
 
     def scatter(self, wavelength: float, share: float) -> float:

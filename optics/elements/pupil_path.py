@@ -18,9 +18,9 @@ __all__ = ["lens_path", "relief_height", "wavefront_ahead"]
 
 
 def lens_path(pupil: Pupil, x: Array, y: Array) -> Array | None:
-    """Return the path [m] by which the ideal lens is shorter at points (x, y) [m]; None without a lens.
+    """Return the length [m] by which the ideal lens shortens the path at points (x, y) [m]; None without a lens.
 
-    It is the path in vacuum, √(r² + f²) - f, arrays as in `Relief.height`.
+    It is √(r² + f²) - f, a path in vacuum. x and y are arrays as in `Relief.height`.
     """
     if pupil.thin_lens_focal_length is None:
         return None

@@ -17,7 +17,7 @@ from optics.apertures.polygonal import Polygon
 __all__ = ["Rim", "rim_around"]
 
 BETTER = 0.5  # choice: an oval is chosen if its residual is less than this part of the residual of a circle
-MUCH_BETTER = 0.1  # choice: the same for a Fourier series; on square grids, it may reach a third by chance
+MUCH_BETTER = 0.1  # choice: the same for a Fourier series, which on square grids may reach a third by chance
 FULL = 0.8  # choice: part of a circle that the hull must fill. A hexagon fills 0.83, a square 0.64.
 LEAST_CORNERS = 8  # choice: corners of the hull that an oval, which has at least 5 parameters, needs
 EXACT = 1e-4  # choice, radii: a residual below this is always accepted
@@ -50,7 +50,7 @@ class Rim:
         return Circle() if self.vertices is None else Polygon(self.vertices)
 
     def contains(self, x: np.ndarray, y: np.ndarray, part: float) -> np.ndarray:
-        """Return a mask of the points inside the rim reduced to a part of its size."""
+        """Return a mask of the points inside the rim after it is scaled by the factor `part` about its middle."""
         scale = 1 / (part * self.radius)
         return self.aperture.contains((x - self.middle[0]) * scale, (y - self.middle[1]) * scale)
 
@@ -63,7 +63,7 @@ class Rim:
         return self._scaled(lambda r: r / math.hypot(r, distance))
 
     def _scaled(self, of_radius: Callable[[float], float]) -> Rim:
-        """Return a rim around the origin; `of_radius` changes the distances of its points from the middle."""
+        """Return a rim around the origin; `of_radius` maps distances of points from the middle to new distances."""
         radius = of_radius(self.radius)
         if self.vertices is None:
             return Rim(np.zeros(2), radius)
@@ -154,7 +154,7 @@ def _round(hull: Any) -> tuple[np.ndarray, float, np.ndarray | None, float]:
 
 
 def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Return centre, radius and relative residual of a circle (Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976)."""
+    """Return centre, radius and relative residual of a fitted circle (Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976)."""
     matrix = np.concatenate([2 * corners, np.ones((len(corners), 1))], axis=1)
     middle: np.ndarray = np.linalg.lstsq(matrix, np.sum(corners**2, axis=1), rcond=None)[0][:2]
     r = np.linalg.norm(corners - middle, axis=1)

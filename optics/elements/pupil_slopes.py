@@ -1,4 +1,4 @@
-"""Slopes of the wavefront behind a pupil, by differences of its path."""
+"""Slopes of the wavefront behind a pupil, by finite differences of its optical path."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST = 1025  # choice, limited by memory: largest number of points along a side 
 
 
 class HasPath(Protocol):
-    """Interface of a pupil."""
+    """Interface of a pupil whose slopes are computed from its optical path."""
 
     @property
     def radius(self) -> float: ...
@@ -39,7 +39,7 @@ def all_slopes(pupil: HasPath, wavelength: float, distance: float, angle: tuple[
 
 
 def sampled_slopes(pupil: HasPath, wavelength: float, source: PointSource, pieces: int) -> Slopes:
-    """Return slopes at a limited number of points, by differences over a part of a polynomial piece."""
+    """Return slopes at a limited number of points, by differences with steps shorter than a polynomial piece."""
     place = source.plain
     if 4 * pieces < FEW:
         grid = _grid(pupil, FEW)

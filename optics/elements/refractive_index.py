@@ -168,7 +168,7 @@ def medium(name: str) -> Dispersion:
 
 
 def index_of(name: str, value: Any) -> Dispersion:
-    """Convert a number or a curve to a curve; numbers must lie in [1, 10] and carry no derivatives.
+    """Return the dispersion curve for a number or a curve; numbers lie in [1, 10] and carry no derivatives.
 
     Raises:
         ValueError: the index is neither a number nor a curve.
@@ -182,7 +182,7 @@ def index_of(name: str, value: Any) -> Dispersion:
 
 
 def material(name: str, value: Any) -> Dispersion:
-    """Convert a number or a curve to a curve; numbers may carry derivatives. Errors: see `index_of`."""
+    """Return the dispersion curve for a number or a curve; numbers may carry derivatives. Errors: see `index_of`."""
     if isinstance(value, Dispersion):
         return value
     _refuse_name(name, value)

@@ -133,7 +133,7 @@ class BSplineRelief(Relief):
         return float(np.ptp(plain(self.control_points)))
 
     def bandwidth(self, level: float) -> float:
-        return 1.0  # twice the half cycle per half width of a cubic polynomial
+        return 1.0  # a cubic polynomial has about half a cycle per half width; a factor of 2 is added
 
     def detail(self, level: float) -> float:
         return 0.0
@@ -195,7 +195,7 @@ class HeightMap(Relief):
         return np.ascontiguousarray(_spline_coefficients(_spline_coefficients(self._heights).T).T)
 
     def _values(self, x: Array) -> Array:
-        """Return the spline coefficients as an array like `x`. They are linear in the samples, M h Nᵀ."""
+        """Return the spline coefficients in the array library of `x`: M h Nᵀ for samples h, see `_spline_matrix`."""
         if not is_differentiable(self.samples) or library(x) is np:
             return like(x, self._coefficients)
         down, across = map(_spline_matrix, self._heights.shape)
@@ -236,7 +236,7 @@ class HeightMap(Relief):
 
 
 def _open_grid(x: Array, y: Array) -> bool:
-    """Return whether x is a row and y a column of NumPy, whose heights are a product of matrices."""
+    """Return whether x is a NumPy row and y a NumPy column. The heights are then a product of matrices."""
     return library(x) is np and x.ndim == y.ndim == 2 and len(x) == 1 and y.shape[1] == 1
 
 

@@ -44,8 +44,8 @@ class SphericalIndex:
         """Interpolate a relative index, given as a function of r/R, at Chebyshev points in (r/R)².
 
         Raises:
-            ValueError: n r decreases with r where it is below its value outside, so that light could stay in the
-                sphere.
+            ValueError: n r decreases where it is below 1, its value just outside the sphere. Light could then stay in
+                the sphere.
         """
         found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
         t = np.linspace(0, 1, 20 * TERMS)
@@ -55,38 +55,43 @@ class SphericalIndex:
         return found
 
     def turning(self, h: np.ndarray) -> np.ndarray:
-        """Return the angle ψ [rad] for relative heights h, an array.
+        """Return the angle ψ [rad] by which rays turn about the centre, for heights h relative to R (an array).
 
         Raises:
             ValueError: a ray is totally reflected at the surface.
         """
         y, end, n, least, radial = self._along(h)
-        # The integral of a straight line is known. The difference from it has no peak at small heights.
+        # The integral of a straight ray is known. The integral of the difference from it has no peak at small
+        # heights.
         bend = (n * n - least * least) / (least * radial * (least * y + radial))
         return np.asarray(2 * np.arcsin(end) - 2 * h * end * (bend @ gauss_legendre(NODES)[1]))
 
     def path(self, h: np.ndarray) -> np.ndarray:
-        """Return the optical path inside the sphere, relative to R and to the medium's index, for relative heights."""
+        """Return the optical paths inside the sphere of rays at heights h, in units of R times the medium's index."""
         y, end, n, _, radial = self._along(h)
         return np.asarray(2 * end * ((n * n * y / radial) @ gauss_legendre(NODES)[1]))
 
     def power(self) -> float:
-        """Return R/f of rays near the axis: 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n² d(r/R), the limit of deviation/h."""
+        """Return R/f of rays near the axis, the limit of their deviation divided by their height h relative to R.
+
+        It is 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n² d(r/R) with t = (r/R)².
+        """
         u, weights = gauss_legendre(NODES)
         bend = self.index.deriv()(u * u) / self.index(u * u) ** 2
         return float(2 - 2 / self.index(1.0) - 4 * bend @ weights)
 
     def _turning_point(self, h: np.ndarray) -> np.ndarray:
-        """Return (r/R)² at which n r = h."""
+        """Return (r/R)² at the turning points of rays of relative height h, where n r = h."""
         edge = float(self.index(1.0))
         if not (h < edge).all():
             raise ValueError(f"surface_n is {edge:.4g} of medium_n: must be larger, or rays at the rim are reflected")
         return _solved(lambda t: np.sqrt(t) * self.index(t), h)
 
     def _along(self, h: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return y, its upper end, n, n at the turning point, and √(n² r² - h²), at quadrature nodes (*h.shape, node).
+        """Return values at quadrature nodes along rays of relative height h, (*h.shape, node).
 
-        The upper end has the shape of h.
+        They are y = √(r² - a²), where a is the radius of the turning point; the upper end of y, in the shape of h; n; n
+        at the turning point; and √(n² r² - h²).
         """
         turn = self._turning_point(h)
         end, least = np.sqrt(1 - turn), self.index(turn)[..., None]

@@ -19,6 +19,8 @@ def on_both_sides(heights: np.ndarray) -> bool:
 def square_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
     """Return samples with equal numbers of rows and columns, without derivatives, as a read-only array.
 
+    name, what: name of the argument, and description of its values, for error messages.
+
     Raises:
         ValueError: the array is not square, is empty, or contains a number that is not finite.
     """
@@ -30,6 +32,8 @@ def square_samples(samples: Any, name: str = "height", what: str = "heights [m]"
 
 def map_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
     """Return rows and columns of samples without derivatives, as a read-only array.
+
+    name, what: see `square_samples`.
 
     Raises:
         ValueError: the array is not two-dimensional, is empty, or contains a number that is not finite.

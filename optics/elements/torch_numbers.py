@@ -13,7 +13,7 @@ __all__ = ["refuse_torch", "torch_numbers", "with_numbers"]
 
 
 def torch_numbers(element: Any) -> dict[str, Any]:
-    """Return the tensors that require a gradient, with their places as keys, such as {"height.samples": tensor}.
+    """Return the tensors that require a gradient, with paths of attributes as keys: {"height.samples": tensor}.
 
     element: a pupil, or another dataclass, dictionary or tuple, which is searched with all its entries.
     """
@@ -21,7 +21,7 @@ def torch_numbers(element: Any) -> dict[str, Any]:
 
 
 def with_numbers(element: Any, numbers: Mapping[str, Any]) -> Any:
-    """Return the element with other numbers at the places that `torch_numbers` found."""
+    """Return the element with some attributes replaced; `numbers` has the keys of the result of `torch_numbers`."""
     return _replaced(element, "", numbers)
 
 
@@ -37,7 +37,7 @@ def refuse_torch(beam: Beam) -> None:
 
 
 def _children(element: Any) -> list[tuple[str, Any, Any]]:
-    """Return (name in messages, key, value) of the fields of a dataclass or the entries of a dictionary or tuple."""
+    """Return (name for messages, key, value) for each field of a dataclass, or each entry of a dictionary or tuple."""
     if isinstance(element, float | int | str | None):
         return []  # most elements
     if is_dataclass(element) and not isinstance(element, type):

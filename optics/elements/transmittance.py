@@ -17,7 +17,7 @@ from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 __all__ = ["GaussianMask", "Mask", "MaskMap"]
 
 OVERSHOOT = 0.02  # choice: the spline through the samples may exceed [-1, 1] by this amount
-FINER = 4  # choice: points per sample at which this is checked
+FINER = 4  # choice: points per sample at which the overshoot is checked
 
 
 class Mask(ABC):

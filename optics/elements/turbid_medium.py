@@ -35,7 +35,8 @@ JUST_VISIBLE = 0.02
 # light comes from above, and all are in fog.
 FROM_ABOVE, FROM_EVERYWHERE = 0.5, 1.0
 STEP_NM = 5.0
-# Shortest and longest distance at which errors are computed, in units of 1/c for the largest and the mean c.
+# Shortest and longest distance at which errors are computed: in units of 1/c, with the largest c for the shortest
+# distance and the mean c for the longest.
 SHORTEST, LONGEST = 1e-2, 1e2
 
 
@@ -97,7 +98,7 @@ class TurbidMedium:
         return BandMedium(c, bands.band_values(_in_daylight(self.veil), receptors, nonnegative=True))
 
     def band_error(self, bands: int, receptors: Any) -> float:
-        """Return the largest error of a signal due to this number of bands, relative to white in daylight.
+        """Return the largest error of a signal due to this number of bands, relative to a white surface in daylight.
 
         The maximum is taken over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
         The reference is the integral over the spectrum in steps of 1 nm.
@@ -121,7 +122,7 @@ class TurbidMedium:
 
 
 def sea_water(chlorophyll: float) -> TurbidMedium:
-    """Return sea water with this concentration of chlorophyll [mg/m³], in [0, 30].
+    """Return sea water with the concentration C of chlorophyll [mg/m³], in [0, 30].
 
     Absorption and scattering follow the classic model of case 1 waters, with λ in nm. Absorption is a = a_w + a_p + 0.2
     a_p(440) exp(-0.014 (λ - 440)) with a_p = 0.06 A(λ) C^0.65. Scattering is b = b_w + 0.30 C^0.62 (550/λ). Pure sea

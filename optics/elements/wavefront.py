@@ -116,9 +116,11 @@ class Zernike(Aberration):
 
     @classmethod
     def from_noll(cls, coefficients_um: Any, radius: float | None = None) -> Zernike:
-        """Return the wavefront for Noll's numbering, {number: [µm]} or a row [µm] from number 1 (piston) on.
+        """Return the wavefront whose coefficients are numbered after Noll.
 
-        Noll's polynomials have the normalisation of OSA, a variance of 1. Astronomy and poppy use them.
+        coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
+
+        Noll's polynomials have the normalisation of OSA, a variance of 1. They are used in astronomy and by poppy.
 
         Raises:
             ValueError: a number is outside 1 to 496, or a coefficient is invalid, see `Zernike`.
@@ -127,7 +129,9 @@ class Zernike(Aberration):
 
     @classmethod
     def from_fringe(cls, coefficients_um: Any, radius: float | None = None) -> Zernike:
-        """Return the wavefront for the Fringe numbering, {number: [µm]} or a row [µm] from number 1 (piston) on.
+        """Return the wavefront whose coefficients have Fringe numbers.
+
+        coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
 
         Fringe polynomials are 1 at the rim, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ. Their coefficients are therefore
         divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use them.
@@ -191,13 +195,13 @@ class Zernike(Aberration):
         return max((n for (n, _), value in self.modes.items() if value != 0 or self.asks), default=0)
 
     def _coefficients(self, named: list[tuple[int, int]], x: Array) -> Array:
-        """Return the coefficients [m] of modes as a row like `x`."""
+        """Return the coefficients [m] of modes as a row of the array type of `x`."""
         if library(x) is np:
             return UM * np.array([self.modes[key] for key in named])
         return library(x).stack([self._coefficient(n, m, x) for n, m in named])
 
     def _coefficient(self, n: int, m: int, x: Array) -> Array:
-        """Return the coefficient [m] of a mode as a number like `x`."""
+        """Return the coefficient [m] of a mode as a number of the array type of `x`."""
         given = self.coefficients_um
         if not isinstance(given, dict) and is_differentiable(given):
             return gather(like(x, given), (n * (n + 2) + m) // 2) * UM

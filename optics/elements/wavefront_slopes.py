@@ -39,7 +39,7 @@ def derivative(values: np.ndarray, step: float) -> np.ndarray:
 def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) -> np.ndarray:
     """Return |∇L + n (ξ - x) / D| for points ξ of the pupil and x of a plane at the distance D from ξ, (target, point).
 
-    points: x, y, ∂L/∂x and ∂L/∂y of points of the pupil.
+    points: x, y, ∂L/∂x and ∂L/∂y of points of the pupil, where L is the optical path to the point.
     to: x and y of the target points.
     bend: refractive index n and distance z [m] of the targets' plane.
     """
@@ -103,8 +103,8 @@ class Slopes(ReadOnlyArrays):
     def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
         """Return the largest slope |∇L + n (ξ - x) / D| of paths through points ξ of the pupil to points x of a window.
 
-        D is the distance between the points. The window lies in a plane at `distance` [m]. The first value is for the
-        disk and its soft edge, the second for the disk alone.
+        L is the optical path to ξ, and D is the distance between ξ and x. The window lies in a plane at `distance` [m].
+        The first value is for the disk and its soft edge, the second for the disk alone.
         """
         soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
         x, y = np.broadcast_arrays(self.grid.x[None, :], self.grid.y[:, None])
@@ -132,10 +132,10 @@ class Slopes(ReadOnlyArrays):
         return float(found[0]), float(found[1])
 
     def to_window(self, distance: float, centre: tuple[float, float], medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return slopes |∇L + n (ξ - c) / D| of paths to the centre of a window, and distances of the points.
+        """Return slopes of the paths to the centre of a window, and distances of their points from the axis [radii].
 
-        The slopes are those along x or y, whichever is larger, at points of the disk, flat. The distances of these
-        points from the axis are in units of the radius. D is the distance of the centre c from the point.
+        Both arrays are flat and have one entry for each point ξ of the disk. A slope is |∇L + n (ξ - c) / D| along x or
+        along y, whichever is larger, where L is the optical path to ξ and D the distance from ξ to the centre c.
         """
         inside = self._inside
         along_x, along_y = self._bent(distance, centre, medium_n)
@@ -162,7 +162,7 @@ class Slopes(ReadOnlyArrays):
         return found
 
     def _bent(self, distance: float, centre: tuple[float, float], medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return ∇L + n (ξ - c) / D along x and along y."""
+        """Return ∇L + n (ξ - c) / D along x and along y; see `to_window`."""
         x, y = self.grid.x[None, :] - centre[0], self.grid.y[:, None] - centre[1]
         scale = medium_n / np.sqrt(x * x + y * y + distance * distance)
         return self.along_x + x * scale, self.along_y + y * scale

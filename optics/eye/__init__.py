@@ -17,7 +17,7 @@ depth_range           distances in a scene and their layers
 kernel_bank           kernels of an eye for a scene
 band_choice           choice of the number of spectral bands
 retinal_image         convolution of a scene with a kernel
-occlusion             layers of a depth map, and what near surfaces hide
+occlusion             layers of a depth map, in which near surfaces hide far ones
 layered_image         image of a scene with many distances
 polarization          microvilli over a retina and polarised scenes
 signals               signals of a scene

@@ -94,8 +94,9 @@ def ideal_contrast_sensitivity(
 
         d' = c T √(N A / 2),
 
-    with the transferred contrast T, N photons per area, and the area A of many periods. The sensitivity is 1/c. Source:
-    Geisler (J. Opt. Soc. Am. A 1, 775, 1984), used by Banks, Geisler & Bennett (Vision Research 27, 1915, 1987).
+    where T is the contrast that optics and receptors transfer, N the number of photons per area, and A the area of the
+    grating, which has many periods. The sensitivity is 1/c. Source: Geisler (J. Opt. Soc. Am. A 1, 775, 1984), used by
+    Banks, Geisler & Bennett (Vision Research 27, 1915, 1987).
 
     cycles_per_degree: frequencies of the gratings.
     contrast: contrast T that optics and receptors transfer at these frequencies, in [0, 1], of the same shape. For

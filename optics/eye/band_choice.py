@@ -40,8 +40,8 @@ def choose_bands(
 
     kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
         side of a receptor. None: the kernel is the same for all wavelengths.
-    white: fraction of the signal of a white surface that remains behind kernels wide enough to contain all light. None:
-        the fraction that remains behind the given kernels.
+    white: fraction of a white surface's signal that kernels transmit if they are wide enough to contain all light.
+        None: the fraction that the given kernels transmit.
 
     Raises:
         AccuracyError: the error with 32 bands exceeds the tolerance.
@@ -69,7 +69,7 @@ def choose_bands(
 
 
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
-    """Return the largest error for coloured surfaces over all phases φ and all channels.
+    """Return the largest error for the coloured surfaces of `choose_bands`, over all phases φ and all channels.
 
     It is half the modulus of the error of Σ w d e^{2πiλ/Λ}, with the bands' weights w and daylight d.
     """

@@ -141,7 +141,7 @@ def camera_eye(
 
 @lru_cache(maxsize=4)
 def _camera_eye(pupil: Pupil, sensor: Sensor, distance: float, tolerance: float) -> Eye:
-    """Return the eye of a camera. Recent eyes are kept, because they keep their kernels."""
+    """Return the eye of a camera. Recent eyes are cached, because they contain their kernels."""
     width = sensor.pixels[1] * sensor.pitch
     focal = distance / number(behind_pupil(pupil, 1.0))
     return Eye(
@@ -185,7 +185,7 @@ def _radiance(scene: Any, eye: Eye, samples_per_pixel: int) -> np.ndarray:
 
 
 def _distances(depth: Any, shape: tuple[int, ...]) -> Any:
-    """Return a checked distance, or a map of distances."""
+    """Return the distance, or the map of distances, after checks."""
     if is_differentiable(depth) or np.ndim(found := reals("depth", depth)) == 0:
         positive("depth", depth, infinite=True, carried=True)
         return depth

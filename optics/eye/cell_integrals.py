@@ -30,9 +30,9 @@ FEWER = ((2.0, 1e-2, 0.5), (1.0, 1e-3, 0.25))
 
 
 def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
-    """Return the samples per cycle of the highest frequency that cell integrals need.
+    """Return the number of samples that integrals over cells need per cycle of the highest frequency.
 
-    Their error is then within a third of the tolerance.
+    The error of the integrals is then within a third of the tolerance.
 
     cycles: number of cycles of the highest frequency per cell.
     """
@@ -91,7 +91,7 @@ def _knots(x: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _over_samples(held: np.ndarray, degree: int) -> np.ndarray:
-    """Return Q C⁻¹ for Q = held."""
+    """Return Q C⁻¹, see `cell_integrals`, for the integrals Q = held of B-splines over cells, (cell, B-spline)."""
     from scipy.linalg import solve_banded
 
     samples = held.shape[1]
@@ -105,9 +105,9 @@ def _over_samples(held: np.ndarray, degree: int) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
-    """Return the numbers of lower and upper diagonals of C, and C in band form. They are the same for every pitch.
+    """Return the B-splines at the samples as a matrix C in band form, with its numbers of lower and upper diagonals.
 
-    Every sample lies within the support of degree + 1 B-splines.
+    Every sample lies within the support of degree + 1 B-splines. C is the same for every pitch.
     """
     x, sample = np.arange(samples, dtype=float), np.arange(samples)[:, None]
     there = _bsplines(_knots(x, degree), degree, x)

@@ -63,7 +63,10 @@ class DepthRange:
 
 
 def layers_for(z: Any) -> tuple[str, tuple[float, ...]]:
-    """Return `depth_layers` for the scene of `Eye.see`, and the distances [m] on which its kernels depend."""
+    """Return the `depth_layers` that `Eye.see` uses for a scene, and the distances [m] on which the kernels depend.
+
+    z: distances [m] in the scene, a number or an array.
+    """
     found = DepthRange.from_distances(z).distances
     return (DISTINCT, found) if 1 < len(found) <= MOST_DISTINCT else ("auto", (found[0], found[-1]))
 

@@ -293,7 +293,7 @@ class Eye(EyeSpec):
             the field.
 
         Raises:
-            ValueError: a direction outside the field.
+            ValueError: the direction is outside the field.
         """
         own = self if self.lattice is None and direction_deg is None else receptor_in(self, direction_deg)
         found = describe(own, number(own.white_signal), own.psf(z), partial(own.kernel, z=z))

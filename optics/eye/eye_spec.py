@@ -43,7 +43,7 @@ class EyeSpec:
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
-        AccuracyError: microvilli behind a pupil whose rays are too steep for the tolerance.
+        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance.
     """
 
     pupil: Pupil | None = None
@@ -217,7 +217,7 @@ class EyeSpec:
 
     @property
     def parallax(self) -> float:
-        """Shift [average receptors m] of the image across the pupil's diameter, per difference of inverse distance."""
+        """Shift of the image [average receptors] between opposite edges of the pupil, per unit of 1/distance [1/m]."""
         if self.pupil is None:
             return 0.0
         return 2 * number(self.pupil.aperture_radius) * number(self.sensor_distance) / min(self.receptor_size)
@@ -247,7 +247,8 @@ class EyeSpec:
     def receptor_photons(self) -> np.ndarray | None:
         """Absorbed photons for a signal of 1 of each receptor; None without a photon budget.
 
-        (channel, h, w), or (channel, 1, 1) if all receptors are alike. Large receptors absorb more photons.
+        The shape is (channel, h, w), or (channel, 1, 1) if all receptors are alike. Large receptors absorb more
+        photons.
         """
         if self.photons is None:
             return None

@@ -3,8 +3,8 @@
 A point source is imaged at the position v [m] relative to a waveguide. Let E(v) be the fraction of its light on the
 pupil that the waveguide accepts and absorbs. If a receptor occupies the area A of the retina, its kernel is E(v)/A,
 integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area. The
-waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. The kernel of a
-source at the position u, for a receptor at r, has the argument r - u = -v, so that it is E rotated by 180°.
+waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. For a source
+imaged at u and a receptor at r, the kernel is a function of r - u = -v. It is therefore E rotated by 180°.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
     Raises:
         ValueError: the waveguide has no guided mode at one of the wavelengths, or an argument carries a derivative.
-        AccuracyError: the field E needs too many samples.
+        AccuracyError: the receptor's field needs too many samples.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     spot = spot_of(beams, retina)
@@ -95,9 +95,10 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """Return E over the cells of a window that contains all of E, except for a fraction of at most the tolerance.
+    """Return the accepted fraction of a source's light, E, over the cells of a window.
 
-    The window is widened until this holds. It is never wider than the light of `spot` and the waveguide together.
+    The window is widened until it contains all of E except for a fraction of at most the tolerance. It is never wider
+    than the light of `spot` and the waveguide together.
     """
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
@@ -117,7 +118,7 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Number of cells in a row, their side, and the sampling distance that resolves E. Lengths are tangents."""
+    """Number of cells in a row, their side, and the sampling distance that resolves a receptor's field, as tangents."""
 
     count: int
     side: float
@@ -135,7 +136,7 @@ class _Cells:
 
     @property
     def step(self) -> float:
-        """Sampling distance, as a sine."""
+        """Pitch of samples of the receptor's field, as a sine."""
         return self.pitch * samples_per_cycle(self.tolerance) / samples_per_cycle(self.tolerance / FINER)
 
 
@@ -148,7 +149,10 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return E integrated over each cell, in terms of tangents, and the fraction of E that the cells contain."""
+    """Return integrals over cells of E, the accepted fraction of a source's light, and the part of E in these cells.
+
+    Areas of cells are in squared tangents. The part is relative to the integral of E over all directions.
+    """
     from scipy.ndimage import map_coordinates
 
     middle = [math.tan(angle) for angle in beam.source.angle]

@@ -41,8 +41,8 @@ class KernelBank:
     kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
     choices: the chosen numbers of nodes, for depth and for the field.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
-    parallax: shift [cells m] that the pupil's diameter causes in the image, per difference of inverse distance. Near
-        surfaces hide far ones within this shift. 0: no surface hides another, as in renderers whose rays all pass the
+    parallax: shift of the image [cells] between opposite edges of the pupil, per difference of 1/distance [1/m]. Within
+        this shift, near surfaces hide far ones. 0: no surface hides another, as in renderers whose rays all pass the
         middle of the pupil.
     """
 
@@ -98,6 +98,7 @@ def prepare(
 
     kernel_at: function of (z, right, down) that returns a kernel. Positions in the field run from -1 to 1, the edges of
         the retina.
+    z: distances [m] in the scene, a number or an array.
     counts: number of depth layers, and of zones across the longer side of the retina; or "auto", or "distinct" for one
         layer at each distance.
     mean: number of cells along the side of the square over which errors are averaged, as in a receptor's signal (None:

@@ -45,7 +45,11 @@ def retinal_image(
 
 @dataclass(frozen=True)
 class _Scene:
-    """A scene with the kernels that blur it. Cells (Y, X) have the light and the distance of the cell `source`."""
+    """A scene with the kernels that blur it.
+
+    The argument `source` (Y, X) of the methods is the flat index of the cell from which a cell takes its light and
+    distance. The argument `cells` (Y, X) is a mask of the selected cells.
+    """
 
     light: np.ndarray
     inverse_distance: np.ndarray
@@ -61,8 +65,9 @@ class _Scene:
     def passing(self, layer: Layer) -> Array:
         """Return the fraction of the light from behind that passes a layer, (band, *shape).
 
-        Some cells of the layer hide nothing, because their surface continues in a farther layer. That layer is dark
-        behind them. The fraction is therefore relative to the part of the pupil that these cells do not cover.
+        Some cells of the layer hide nothing, because their surface continues in a farther layer. The farther layer does
+        not contain these cells again. The fraction is therefore relative to the part of the pupil that these cells do
+        not cover.
         """
         import drjit as dr
 

@@ -5,8 +5,8 @@ kernel of the near surface's distance. With T as the light that passes all neare
 
     image = Σ_l T_l · (kernel_l ⊗ radiance_l),   T_(l-1) = T_l (1 - kernel_l ⊗ coverage_l),
 
-which composites the layers over one another. Kernels of different layers are blurred independently, so the
-formula is exact if the far surface is locally uniform, or if either surface is in focus.
+which composites the layers over one another. Different layers are blurred independently, so the formula is exact if the
+far surface is locally uniform, or if either surface is in focus.
 
 A depth map contains no radiance behind a near surface. There, far surfaces continue with their nearest visible cell.
 Surfaces whose depth changes gradually hide nothing of themselves, so only jumps of depth hide light.
@@ -32,7 +32,7 @@ MOST_LAYERS = 64  # choice, limited by time: largest number of layers
 class Layer:
     """Cells of a scene in one range of distances.
 
-    source: (Y, X) int, flat index of the cell whose radiance and distance each cell has.
+    source: (Y, X) int, flat index of the cell from which each cell takes its radiance and distance.
     cells: (Y, X) bool, the cells of the layer, including cells behind nearer layers.
     hiding: (Y, X) bool, those cells that hide farther layers.
     """

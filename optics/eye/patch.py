@@ -1,4 +1,4 @@
-"""The receptor that looks in a direction, as an eye of its own: the limits of vision vary over an eye."""
+"""An eye with only the receptor that faces a given direction, because the limits of vision vary over an eye."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def receptor_in(eye: AnyEye, direction_deg: tuple[float, float] | None) -> AnyEy
     direction_deg: angles (right, up) from the axis. None: the middle of the field.
 
     Raises:
-        ValueError: a direction outside the field of `eye`.
+        ValueError: the direction is outside the field of `eye`.
     """
     toward = eye.eccentricity_deg if direction_deg is None else direction("direction_deg", direction_deg)
     distance, sizes = number(eye.sensor_distance), np.array(eye.receptor_size[::-1])

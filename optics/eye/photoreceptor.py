@@ -27,7 +27,7 @@ def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
 
 
 def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, types: Precision) -> Array:
-    """Return a² Σ_b weights[c, b] irradiance[b]: Dr.Jit (band, y, x) -> (channel, y, x).
+    """Return the signals a² Σ_b weights[c, b] irradiance[b] of channels c: Dr.Jit (band, y, x) -> (channel, y, x).
 
     gathered: the throughput a².
     """

@@ -104,7 +104,10 @@ def taken_by(
 
 
 def _preferences(tile: Tile, resolution: tuple[int, int]) -> np.ndarray:
-    """Return (d - 1)/(d + 1) times cos 2φ and sin 2φ of each receptor, (2, h, w)."""
+    """Return (d - 1)/(d + 1) times cos 2φ and sin 2φ for each receptor, (2, h, w).
+
+    d is the dichroic ratio of the receptor's microvilli, and φ is their azimuth.
+    """
     contrast = np.array([[_contrast(cell.dichroic_ratio) for cell in row] for row in tile])
     twice = np.radians([[2 * cell.azimuth_deg for cell in row] for row in tile])
     everywhere = np.ix_(*(np.arange(n) % m for n, m in zip(resolution, contrast.shape, strict=True)))

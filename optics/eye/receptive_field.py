@@ -139,9 +139,9 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
 
 
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
-    """Return the result of a function of the area that the light reaches.
+    """Return the result of `compute` for the area that the light reaches.
 
-    If it is refused for a steep relief, the area is limited to the longer or else to the shorter side of the retina.
+    If `compute` refuses a steep relief, the area is limited to the longer or else to the shorter side of the retina.
     """
     errors: list[AccuracyError] = []
     for most in (math.inf, max(retina.size), min(retina.size)):
@@ -163,7 +163,7 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
 def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
     """Return the area that the light reaches.
 
-    most: largest half side [m]. With the longer side of the retina, the area contains the light that arrives at any
+    most: largest half side [m]. If it is the longer side of the retina, the area contains the light that arrives at any
         receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
     """
     distance = number(retina.distance)
@@ -226,8 +226,8 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 
     The fraction of the light that the window loses may equal the tolerance. Half of it is for diffraction at the
     pupil's edge, and half for rays that hit the retina outside the window. If masks, pixels or fine detail scatter
-    light, they use half of the rays' half. A spatial frequency is a sine divided by λ. Diffraction therefore increases
-    the sine of a ray's angle θ by λ times the added frequency, and the ray hits the retina at z tan θ.
+    light, rays and this light share the second half equally. A spatial frequency is a sine divided by λ. Diffraction
+    thus increases the sine of a ray's angle θ by λ times the added frequency. The ray hits the retina at z tan θ.
 
     centre: geometric image (x, y) [m].
     """

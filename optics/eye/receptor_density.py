@@ -108,7 +108,7 @@ def density_of(value: Any) -> Density | DensityMap | None:
     """Return the density of receptors in the form that an `Eye` stores.
 
     Raises:
-        ValueError: neither a function, nor a map of positive numbers, nor None.
+        ValueError: the value is neither a function, nor a map of positive numbers, nor None.
     """
     if value is None or isinstance(value, DensityMap):
         return value
@@ -134,7 +134,7 @@ def density_on(
     middle: tangents (right, down) of the direction of the field's middle.
 
     Raises:
-        ValueError: a function whose values are not positive and finite, or have another shape than its arguments.
+        ValueError: the values of a function are not positive and finite, or do not have the shape of its arguments.
     """
     if isinstance(density, DensityMap):
         return density.values
@@ -158,7 +158,9 @@ def _checked(name: str, values: np.ndarray) -> np.ndarray:
 
 
 def _per_length(angle_deg: np.ndarray, middle_deg: float, e2_deg: float) -> np.ndarray:
-    """Return the receptors per length of the flat retina along an axis, if 1/(1 + E/E₂) of them share an angle.
+    """Return the relative number of receptors per length of the flat retina along an axis.
+
+    Per angle, it is 1/(1 + E/E₂), where E is the angle from `middle_deg`.
 
     The angle dα on the retina at the distance f has the length f dα/cos²α.
     """

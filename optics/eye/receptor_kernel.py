@@ -24,7 +24,7 @@ CELLS_FOR_BANDS = 2  # cells per receptor along an axis, for the choice of bands
 
 
 def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
-    """Return a kernel, see `Eye.kernel`.
+    """Return the kernel of an eye, a Dr.Jit tensor (band, ky, kx); see `Eye.kernel`.
 
     direction: tangents (right, down) of the source's direction.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.

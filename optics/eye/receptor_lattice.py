@@ -2,9 +2,9 @@
 
 Coordinates are x to the right and y down in the visual field, from the middle of the retina. Their units are the width
 and the height of an average receptor: the retina of h x w receptors is [-w/2, w/2] x [-h/2, h/2]. Each row extends over
-the whole width, and has w receptors of its own widths. The heights of rows follow from the density's mean over the
-columns, and the widths in a row from its mean over that row (the conditional distribution, Rosenblatt, Ann. Math. Stat.
-23, 470, 1952). The rectangles leave no gaps, and an array of signals remains an image (row, column).
+the whole width and has w receptors, whose widths differ from row to row. The heights of rows follow from the density's
+mean over the columns, and the widths in a row from its mean over that row (the conditional distribution, Rosenblatt,
+Ann. Math. Stat. 23, 470, 1952). The rectangles leave no gaps, and an array of signals remains an image (row, column).
 """
 
 from __future__ import annotations
@@ -81,10 +81,10 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack(found)
 
     def places(self, counted: np.ndarray) -> np.ndarray:
-        """Return places (x, y), (n, 2), for coordinates that count receptors from the middle of the retina.
+        """Return positions (x, y) on the retina, (n, 2), given in coordinates that count receptors from its middle.
 
-        The receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2] of the counting coordinates. Beyond
-        the rim, receptors continue with the size of the outermost ones.
+        In these coordinates, the receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. Beyond the
+        rim, receptors continue with the size of the outermost ones.
         """
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         column, row = (counted + np.array([width, height]) / 2).T
@@ -94,7 +94,7 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack([x, y], axis=-1)
 
     def counted(self, places: np.ndarray) -> np.ndarray:
-        """Return the coordinates (..., 2) that count receptors, for places (x, y): the inverse of `places`."""
+        """Return positions (x, y) in coordinates that count receptors, (..., 2): the inverse of `places`."""
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         x, y = np.moveaxis(places, -1, 0)
         i = np.clip(np.searchsorted(self.rows, y, side="right") - 1, 0, height - 1)
@@ -108,7 +108,10 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack([column - width / 2, row - height / 2], axis=-1)
 
     def receptors_at(self, shape: tuple[int, int]) -> np.ndarray:
-        """Return the number of the receptor, row by row, at the middle of each of `shape` equal cells of the retina."""
+        """Return the index of the receptor at the middle of each of `shape` equal cells of the retina, (row, column).
+
+        Receptors are counted row by row.
+        """
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         y, x = (n * ((2 * np.arange(m) + 1) / (2 * m) - 0.5) for n, m in zip((height, width), shape, strict=True))
         column, row = np.moveaxis(self.counted(np.stack(np.meshgrid(x, y), axis=-1)), -1, 0)
@@ -132,7 +135,7 @@ def receptor_lattice(
     Arguments as in `density_on`.
 
     Raises:
-        ValueError: see `density_on`, or a receptor that is far narrower than the average.
+        ValueError: see `density_on`, or a receptor is far narrower than the average.
     """
     values = density_on(density, resolution, halves, middle)
     if values.min() == values.max():
@@ -155,7 +158,7 @@ def overlaps(edges: np.ndarray, cells: int) -> np.ndarray:
 
 
 def _edges(densities: np.ndarray, count: int) -> np.ndarray:
-    """Return edges (row, count + 1) from -count/2 to count/2, between which each density (row, cell) has equal sums."""
+    """Return edges (row, count + 1) from -count/2 to count/2 that divide each row of densities into equal sums."""
     cells = densities.shape[1]
     sums = np.concatenate([np.zeros((len(densities), 1)), np.cumsum(densities, axis=1)], axis=1)
     at, shares = np.arange(cells + 1) / cells - 0.5, np.arange(1, count) / count

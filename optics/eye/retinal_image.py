@@ -37,7 +37,9 @@ def blur(
 
 
 def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], types: Precision) -> Array:
-    """Return one band as a flat array.
+    """Return one band of the blurred image, of the size `shape`, as a flat array.
+
+    pairs: each scene (Y, X) with its kernel (ky, kx).
 
     The period of the transforms is long enough for wrapped parts to land outside the middle part.
     """
@@ -157,6 +159,6 @@ def with_centre(kernel: Array) -> Array:
 
 
 def _of_receptors(image: Array, shares: np.ndarray, types: Precision) -> Array:
-    """Return weighted sums over the cells of each receptor. shares: weights along an axis."""
+    """Return weighted sums over the cells of each receptor. shares: weights of its cells along an axis."""
     down, across = (types.Tensor(np.kron(np.eye(n // len(shares)), shares)) for n in image.shape[1:])
     return matmul(down, matmul(image, across, transposed=True))

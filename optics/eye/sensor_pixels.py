@@ -19,7 +19,7 @@ BEYOND = 8  # choice: samples beyond the outermost pixels, where a spline throug
 class SensorPixels:
     """Pixels of a sensor, and the samples from which means over the pixels follow.
 
-    samples: grid of the samples. The pixels lie around the samples of another grid, whose pitch is their side.
+    samples: grid of the samples. The pixels are the cells of another grid, whose pitch is the side of a pixel.
     rows, columns: matrices (pixel, sample) of the means along y and x. The means of an image are rows @ image @
         columns.T.
     """

@@ -128,7 +128,7 @@ class Description:
         return {"acuity, vertical": f"{bound}{_cycles(self._vertical_limit)}, {apart}"}
 
     def _range_rows(self) -> dict[str, str]:
-        """Rows on receptors in other directions, unless all are alike."""
+        """Return table rows on the range of receptor spacings over the eye; none if all receptors are alike."""
         if self.interommatidial_range_deg is None:
             return {}
         names = "spacing, horizontal", "spacing, vertical"

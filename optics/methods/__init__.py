@@ -15,17 +15,19 @@ row_blocks           blocks of rows of a large pupil, whose spectra are summed
 derivative_cells     nodes between the knots of maps, for derivatives with respect to their samples
 pixelated_spectrum   the angular spectrum of pupils made of pixels
 smooth_pupil         the light behind a steep pupil, convolved with a Gaussian
-smooth_spectrum      the angular spectrum of steep pupils, from samples of this light
+smooth_spectrum      the angular spectrum of steep pupils, from the light of `smooth_pupil`
 hankel               the angular spectrum of rotationally symmetric pupils, along one radius
 low_rank             one matrix product, with a Fourier kernel times a slow factor
-slow_factor          this factor, and the points of the window that interpolate it
-window_sampling      the same method at coarse tolerances: few samples, from the light in the window
-window_rank          rank of the slow factor for these samples
+slow_factor          the slow factor of `low_rank`, and the points of the window that interpolate it
+window_sampling      `low_rank` at coarse tolerances, for one PSF
+window_plan          samples of several pupils that the light in a window needs, at coarse tolerances
+window_rank          rank of the slow factor for the samples of `window_plan`
+window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         several sources and wavelengths through one pupil, from the same samples
-window_check         error of such a PSF, by a sum over other samples in a few rows and columns
-window_sums          their sums, and the adjoint of these sums
+window_check         error of such PSFs, by a sum over other samples in a few places
+window_sums          sums over the pupil for `window_sampling` and `window_stack`, and their adjoint
 far_field            one Fourier transform onto directions for each of a few nodes of the window
-far_field_nodes      the choice of these nodes, and their weights in every direction
+far_field_nodes      the choice of the nodes of `far_field`, and their weights in every direction
 fresnel              approximate: Fresnel and Fraunhofer, with their predicted errors
 geometric            approximate: density of rays; the pinhole
 smythe               vector fields from fields that scalar methods propagate
@@ -34,5 +36,6 @@ scalar_theory        upper bound on the error of scalar theory
 rays                 end points of rays in geometrical optics
 pupil_sampling       samples of the pupil for matrix products
 sine_samples         samples of the pupil that are evenly spaced in the sines of rays to the window
+sine_stack           such samples of several pupils at once
 spectral_taper       the taper of a spectrum before grazing incidence
 """

@@ -38,7 +38,10 @@ __all__ = [
 
 @dataclass(frozen=True)
 class GridSampling(SpectrumSampling):
-    """Spectrum of a pupil with a soft edge on a grid. pupil_period: number of the pupil's samples per period."""
+    """Spectrum of a pupil with a soft edge on a grid.
+
+    pupil_period: number of the pupil's samples per period.
+    """
 
     method: str
     edge: PupilEdge
@@ -59,11 +62,11 @@ class GridSampling(SpectrumSampling):
         return Grid.square(min(self.pupil_period, across), pitch)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
         return self.whole_phase(_angular_spectrum(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
 
     @property
@@ -190,9 +193,10 @@ def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling
 
 
 def transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
-    """Return exp(ikz (cos θ - 1)) under the spectral taper. The split method omits the paraxial part -ikz sin²θ/2.
+    """Return the transfer function exp(ikz (cos θ - 1)) for light at the angle θ, times the spectral taper.
 
-    See Goodman, eq. 3-74. With q = 1 - cos θ, the exponent is -ikz q, and without the paraxial part -ikz q²/2.
+    See Goodman, eq. 3-74. With q = 1 - cos θ, the exponent is -ikz q. The split method omits its paraxial part, -ikz
+    sin²θ/2, so the exponent is -ikz q²/2.
     """
     import drjit as dr
 
@@ -209,8 +213,8 @@ def transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precisi
 def versine(s2: Array) -> Array:
     """Return q = 1 - cos θ from sin²θ, in float64.
 
-    The difference loses digits, and multiplication by kz makes the error large. One correction step towards q (2 - q) =
-    sin²θ restores the digits without a division.
+    The difference 1 - cos θ loses digits, and multiplication by kz makes the error large. One correction step towards q
+    (2 - q) = sin²θ restores the digits without a division.
     """
     import drjit as dr
 
@@ -219,7 +223,7 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Propagate the field from the relay plane to the window by Fresnel's integral, the paraxial part."""
+    """Propagate the field from the relay plane to the window by Fresnel's integral, which adds the paraxial part."""
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

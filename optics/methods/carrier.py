@@ -15,7 +15,10 @@ __all__ = ["on_line", "on_window", "with_sphere"]
 def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, sign: int) -> Field:
     """Return the field times e^{±ik(ρ - z)} at points (x, y) [m].
 
-    ρ is the distance from the centre of the pupil; ρ - z = r²/(ρ + z).
+    ρ is the distance of the point from the pupil's centre, and z that of the window's plane. ρ - z is computed as (x² +
+    y²)/(ρ + z).
+
+    sign: sign of the exponent.
     """
     import drjit as dr
 
@@ -32,7 +35,9 @@ def on_window(field: Field, beam: Beam, problem: Problem) -> Field:
 
 
 def on_line(profile: Field, line: RadialProfile | DistinctRadii, beam: Beam, problem: Problem) -> Field:
-    """Return a rotationally symmetric field over the window, interpolated from the radii of a line.
+    """Return a rotationally symmetric field over the window, interpolated from its values at radii.
+
+    profile: field at the radii `line`.
 
     Without its spherical phase the field is as smooth as the intensity.
     """

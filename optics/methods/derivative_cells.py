@@ -1,9 +1,9 @@
 """Quadrature nodes in the cells between the knots of maps, for derivatives with respect to the samples of the maps.
 
-In a cell, the integrand of a derivative is a cubic polynomial times a wave, the light behind the pupil. With t in
-[-1, 1] across the cell, the wave is e^{izt} or slower, with the Chebyshev coefficients 2 J_k(z). n Gauss-Legendre nodes
-are exact up to degree 2n - 1. Cells that the edge of the aperture cuts have the same nodes, with weights that are exact
-up to degree n - 1 over the open part.
+In a cell, the integrand of a derivative is a cubic polynomial times a wave, the light behind the pupil. With t in [-1,
+1] across the cell, and z the largest phase of the wave from the middle to a border, the wave is e^{izt} or slower. Its
+Chebyshev coefficients are 2 J_k(z). n Gauss-Legendre nodes are exact up to degree 2n - 1. Cells that the edge of the
+aperture cuts have the same nodes, with weights that are exact up to degree n - 1 over the open part.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MOST_CELLS = 4096  # choice, limited by memory: largest number of cells along a 
 SPLINE = (1.0, 0.970, 0.150, 0.076)
 # Choice: the error of cut cells is T^CUT_POWER, where T is the sum of the coefficients from degree n on. The power lies
 # between 1, for weights that are exact up to degree n - 1, and 2, for cells of which hardly anything is cut off. Both
-# errors are upper bounds, of which about a tenth is reached. test_gradients.py compares with exact derivatives.
+# are upper bounds; actual errors are about a tenth of them. test_gradients.py compares with exact derivatives.
 CUT_POWER, REACHED = 1.8, 0.1
 WAVES = np.concatenate([[0.0], np.geomspace(0.01, 40.0, 120)])  # values of z in the table of errors
 DEGREES = 96  # number of degrees in this table, above which all coefficients are negligible
@@ -65,7 +65,7 @@ def _divided(opening: Aperture, borders: tuple[float, ...], halvings: int) -> Pi
 
 
 def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
-    """Return the error for 1 to MOST_NODES nodes along a cell.
+    """Return the error of derivatives for 1 to MOST_NODES nodes along a cell.
 
     z: half the phase [rad] that the wave gains across the cell, at points that are evenly spread.
     cut_share: share of the area that lies in cut cells.
@@ -83,7 +83,7 @@ def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _tails(splines: int) -> np.ndarray:
-    """Return sums of the Chebyshev coefficients of the integrand from each degree on, (z, degree)."""
+    """Return sums of the Chebyshev coefficients of the integrand from each degree on, (z, degree), for z in WAVES."""
     from scipy.special import jv
 
     wave = 2 * np.abs(jv(np.arange(DEGREES), WAVES[:, None]))

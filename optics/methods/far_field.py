@@ -45,7 +45,7 @@ class FarFieldSampling:
     """Samples of the pupil and of direction cosines, and nodes over the window.
 
     The pitch of the direction cosines is λ / (period x pitch of the pupil). The nodes are Chebyshev points in the angle
-    atan(x/z), because the kernel as a function of x has poles at ±iz.
+    atan(x/z), because the kernel as a function of x has poles at ±iz, with z the distance of the window.
     """
 
     edge: PupilEdge
@@ -59,11 +59,11 @@ class FarFieldSampling:
     model_error: float = 0.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -214,7 +214,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
 
 def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
-    """Return G(ξ; x) on the pupil's grid. The two tangents define the direction of x.
+    """Return the slow factor G(ξ; x) of `_far_field` on the pupil's grid. Two tangents define the direction of x.
 
     A constant phase is omitted.
     """

@@ -39,11 +39,11 @@ class WindowNodes:
         return [(float(at[column]), float(at[row])) for row, column in self.kept]
 
     def weights(self, angle: np.ndarray, dtype: str) -> np.ndarray:
-        """Return the weights of the kept nodes for the directions of a square grid of cosines, (kept, 2, place).
+        """Return the weights of the kept nodes for directions on a square grid of direction cosines, (kept, 2, place).
 
         The second axis contains real and imaginary parts.
 
-        angle: atan(x/z) of these directions, (y, x). Its transpose is atan(y/z).
+        angle: atan(x/z) of the directions, (y, x). The grid is symmetric, so that the transpose is atan(y/z).
         """
         across = _chebyshev(angle / self.half_angle, self.count).astype(dtype).reshape(self.count, -1)
         down = _chebyshev(angle.T / self.half_angle, self.count).astype(dtype).reshape(self.count, -1)

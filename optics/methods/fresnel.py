@@ -51,13 +51,13 @@ class ParaxialSampling:
         return model_error(self.problem, self.method == "fresnel")
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         u = beam.behind(self.edge.aperture, self.pupil, precision(problem.dtype))
         curved = self.method == "fresnel"
         return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, curved).intensity
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -169,9 +169,8 @@ def paraxial_integral(
 ) -> Field:
     """Return the field over the window at `distance`, without a phase that does not affect the intensity:
 
-    U(x) = 1/(iλz) ∫ u(ξ) e^{iπξ²/λz} e^{-2πi x·ξ/λz} dξ   (Goodman, Introduction to Fourier Optics, eq. 4-17);
-
-    The integral is one Fourier sum with an arbitrary output pitch.
+    U(x) = 1/(iλz) ∫ u(ξ) e^{iπξ²/λz} e^{-2πi x·ξ/λz} dξ (Goodman, Introduction to Fourier Optics, eq. 4-17). The
+    integral is one Fourier sum with an arbitrary output pitch.
 
     wavelength: wavelength [m] in the medium.
     curved: False replaces the quadratic phase factor by 1 (eq. 4-25).

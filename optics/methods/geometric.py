@@ -22,7 +22,7 @@ __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
 # Choice: step, in pupil radii, of the central differences for the local slope. Their error is the square of the step
 # times a third derivative.
 STEP = 1e-4
-DIGITS = 1.0  # choice: digits of the quadrature rule, at the highest frequency of the spectrum of a splat
+DIGITS = 1.0  # choice: digits of the quadrature rule, at the highest frequency of a splat, a B-spline around a ray
 # Relative L2 size of the Fresnel fringes behind an edge, for a disk of Fresnel number 1. It falls with the fourth root
 # of the Fresnel number.
 FRINGES = 0.75
@@ -92,7 +92,7 @@ class PinholeSampling:
         """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
-            ValueError: derivatives are required, but the cell of the light does not change smoothly.
+            ValueError: derivatives are requested, but light jumps from cell to cell.
         """
         import drjit as dr
 

@@ -56,17 +56,17 @@ class HankelSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         types = precision(problem.dtype)
         profile = _hankel(beam, problem, self, types).intensity
         return self.line.onto(profile, problem.window, types)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return 2 * (self.line.radius + problem.radius)
 
     @property
@@ -111,7 +111,7 @@ def _round_up(n: int) -> int:
 
 
 def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision) -> Field:
-    """Return the field on the radii of the line, without the carrier e^{ikz}."""
+    """Return the field at the radii of `how.line`, without the carrier e^{ikz}."""
     import drjit as dr
 
     nodes, weights = _on_rings(problem.aperture.rings, how.radii)

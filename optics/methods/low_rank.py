@@ -25,7 +25,7 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["LowRankSampling", "low_rank"]
 
-STEEPEST = 8.0  # choice, radius over distance: at larger ratios, a test on the rim is not sufficient
+STEEPEST = 8.0  # choice, radius over distance: at larger ratios, a test of the rank at the rim is not sufficient
 MOST_BYTES = 288_000_000  # choice, limited by memory: largest matrix between pupil and window, of which two exist
 
 
@@ -50,20 +50,20 @@ class LowRankSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         return _low_rank(beam, problem, self, precision(problem.dtype)).intensity
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
 
     @property
     def directions(self) -> np.ndarray:
-        """Direction s = ξ/c of the samples along either axis."""
+        """Directions of the samples along either axis: positions divided by `scale`."""
         found: np.ndarray = self.pupil.at / self.scale
         return found
 
@@ -127,9 +127,9 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
 
     A phase that cancels in the intensity is omitted. G varies slowly with x, so L_a interpolates it. u is the position
     in the window relative to its centre, and s is ξ/c or the sines of the samples. For each axis, the sums over the
-    points of interpolation and over ξ are combined. The field is then A_y W A_xᵀ, two matrix products. A_x does not
-    change if window and samples are both mirrored, so the matrices are split into even and odd parts along x. This
-    halves the cost of the first product.
+    points of interpolation and over ξ are combined. The field is then A_y W A_xᵀ, two matrix products, where W contains
+    P G and A the remaining factors along an axis. A_x does not change if window and samples are both mirrored, so the
+    matrices are split into even and odd parts along x. This halves the cost of the first product.
     """
     window = problem.window
     nodes = how.half_width * chebyshev_points(how.rank)
@@ -146,9 +146,9 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
 
 
 def _halves(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (A[x, j] ± A[x, -j]) / 2, with samples j counted from the middle.
+    """Return the even and the odd part of a matrix, (A[x, j] ± A[x, -j]) / 2, with columns j counted from the middle.
 
-    The middle sample is its own mirror image.
+    The middle column is its own mirror image.
     """
     size = matrix.shape[1]
     ahead, behind = matrix[:, size // 2 :], matrix[:, : size - size // 2][:, ::-1]
@@ -171,9 +171,9 @@ def _unfolded(parts: list[tuple[Array, Array]], window: Grid, types: Precision) 
 
 
 def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> list[tuple[Array, Array]]:
-    """Return W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)], with (a, ξ) counted from the middle, each as two tensors.
+    """Return W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)], each as two tensors, for its real and its imaginary part.
 
-    W = P(ξ, η) G(ξ, η; x_a, y_b).
+    W is P(ξ, η) G(ξ, η; x_a, y_b), see `_low_rank`. Columns (a, ξ) are counted from the middle.
     """
     import drjit as dr
 
@@ -191,7 +191,7 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
 
 
 def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, how: LowRankSampling) -> Field:
-    """Return W at the columns and rows `at`, which are float64 indices."""
+    """Return the matrix W of `_kernel` at the columns and rows `at`, which are float64 indices."""
     import drjit as dr
 
     types, n = u.types, len(how.pupil.at)

@@ -16,7 +16,7 @@ class WithField(Protocol):
     """The additional interface of all exact methods except "far_field": the complex field."""
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window for unit amplitude at the pupil, without the carrier e^{ikz}."""
+        """Return the field U over the window, for unit amplitude at the pupil, without the carrier e^{ikz}."""
 
 
 class Sampling(Protocol):
@@ -48,10 +48,10 @@ class Sampling(Protocol):
         """Relative L2 error of the intensity with infinitely many samples; 0 for exact methods."""
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light.
+        """Return the width [m] of the plane over which the light of rounding errors is spread.
 
         An error with the power of the pupil's light, spread evenly over this width, has the intensity 1/width². The
         wider the plane, the smaller are the rounding errors within the window.

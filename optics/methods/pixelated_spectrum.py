@@ -50,13 +50,13 @@ class PixelSpectrum(SpectrumSampling):
     padding: float = 1.0
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
         types = precision(problem.dtype)
         spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
         return self.whole_phase(arrived(spectrum, beam, problem, self).scaled(1 / self.period**2), beam, problem)
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         types = precision(problem.dtype)
         spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
         return arrived(spectrum, beam, problem, self).scaled(1 / self.period**2).intensity

@@ -39,7 +39,7 @@ DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the to
 # can be a small difference to which the detail contributes most, as for the focal length of a lens in focus.
 FINER_DETAIL = 10.0
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
-FADE_RIPPLE_PER_TOLERANCE = 3.0  # choice: the same for light that fades out where a steep pupil sends little of it
+FADE_RIPPLE_PER_TOLERANCE = 3.0  # choice: the same for the fade of a steep pupil's light beyond the band
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Problem:
     wavelength: wavelength [m] in the medium.
     window: grid of the output.
     symmetric: True if the light behind the pupil is rotationally symmetric.
-    even: True if it is even in x and in y.
+    even: True if this light is even in x and in y.
     widest_band: frequency [1/m] beyond which light may be omitted (infinite: all light that reaches the window counts).
     reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
         beyond it may be wrong, and edge-diffracted light less accurate (None: the whole window must be accurate).
@@ -63,7 +63,7 @@ class Problem:
     moves: whether derivatives with respect to the distance are requested.
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
-    detail_part: phase [rad] of neglected detail, relative to the tolerance.
+    detail_part: largest phase [rad] of neglected detail, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
     steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Light beyond `reach` is lost.
     """
@@ -159,7 +159,7 @@ class Problem:
 
     @property
     def phase_band_inside(self) -> float:
-        """Highest spatial frequency [1/m] over the disk alone, because a relief may be steep in the soft edge."""
+        """Highest spatial frequency [1/m] of the phase over the disk; a relief may be steeper in the soft edge."""
         return SLOPE_MARGIN * self.slopes.steepest_inside / self.light.wavelength + self.detail
 
     @cached_property
@@ -230,10 +230,10 @@ class Problem:
 
     @property
     def fade_ripple(self) -> float:
-        """Allowed amplitude error of light beyond the band."""
+        """Allowed error of the amplitude of light beyond the band, which fades out."""
         if self.steep:
             return min(FADE_RIPPLE_PER_TOLERANCE * self.tolerance, 0.1)
-        return self.ripple if self.reach is None else 0.1  # choice: there is hardly any light beyond it
+        return self.ripple if self.reach is None else 0.1  # choice: there is hardly any light beyond the band
 
     @property
     def outermost(self) -> float:
@@ -245,7 +245,7 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Longest path plus the steepest slope times the radius, in waves. It bounds phases before they are reduced."""
+        """Longest path plus the steepest slope times the radius, in waves; it bounds phases including whole waves."""
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
         return path + self.radius * self.phase_band_inside

@@ -65,7 +65,7 @@ class NodeSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)
@@ -74,7 +74,7 @@ class NodeSampling:
         return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)
@@ -84,7 +84,7 @@ class NodeSampling:
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light.
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`.
 
         It is the width of the focus times the square root of the number of nodes, because the rounding errors of the
         summands are independent.
@@ -213,7 +213,7 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
 def _added(
     beam: Beam, rule: tuple[np.ndarray, ...], at: tuple[Array, Array], total: tuple[Array, Array], types: Precision
 ) -> tuple[Array, Array]:
-    """Return the real and imaginary part of `total` at points (x, y), plus the sum over nodes (x, y, weight)."""
+    """Return `total`, real and imaginary part at points (x, y), plus the sum over nodes (x, y, weight)."""
     import drjit as dr
 
     x, y = at

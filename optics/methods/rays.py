@@ -37,14 +37,14 @@ class Rays:
 
     @cached_property
     def most(self) -> np.ndarray:
-        """Largest magnification at each ray: the larger singular value of the map's gradient."""
+        """Largest magnification at each ray: the larger singular value of the gradient of (to_x, to_y) by (x, y)."""
         root = np.sqrt(np.maximum(np.square(self.norm) - np.square(self.determinant), 0))
         found: np.ndarray = np.sqrt(self.norm + root)
         return found
 
     @cached_property
     def least(self) -> np.ndarray:
-        """Smallest magnification at each ray: the smaller singular value of the map's gradient."""
+        """Smallest magnification at each ray: the smaller singular value of the gradient of (to_x, to_y) by (x, y)."""
         return np.abs(self.determinant) / np.maximum(self.most, 1e-30)
 
     @classmethod

@@ -25,7 +25,7 @@ def block_size(grid: Grid) -> tuple[int, int]:
 
 
 def row_blocks(grid: Grid) -> Iterator[tuple[int, Grid]]:
-    """Yield the first row and the samples of each block. A small grid is its own single block."""
+    """Yield the first row and the samples of each block. A small grid is a single block."""
     height, width = grid.shape
     count, rows = block_size(grid)
     if count == 1:
@@ -38,7 +38,7 @@ def row_blocks(grid: Grid) -> Iterator[tuple[int, Grid]]:
 
 
 def with_rows_moved(spectrum: Field, rows: int, period: Scalar, sign: int) -> Field:
-    """Return the Fourier sum of samples that lie `rows` rows further along y, see `fourier.dft2`."""
+    """Return the Fourier sum of the same samples moved by `rows` rows along y, see `fourier.dft2`."""
     if rows == 0:
         return spectrum
     types = spectrum.types

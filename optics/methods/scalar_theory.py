@@ -69,7 +69,7 @@ def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
 
 
 def light_spread(pupil: Pupil) -> float:
-    """Return the mean square distance [R²] from the axis of the points of the pupil from which light comes.
+    """Return the mean square distance [R²] between the axis and the points of the pupil, weighted by their light.
 
     Distances are measured along one direction, the one with the largest result. The result is a quarter for a disk, a
     half for a thin ring, and 1 for two pinholes on opposite sides of the rim.

@@ -5,8 +5,8 @@ The distance from a point ξ of the pupil to points x = c + u of a window about 
     |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
 
 With s as the variable, the term that is linear in u is exactly the Fourier kernel, however wide the aperture is. The
-remaining terms fall with the distance. They are a curvature of about u²NA²/λD cycles over the window, due to the
-obliquity of the rays.
+remaining terms decrease with the distance. They result from the obliquity of the rays, and vary by about u²NA²/λD
+cycles over the window.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ RIM = 64  # number of points on the rim from which the range of the sines is det
 class SineSamples:
     """A soft aperture on a grid of sines. The grid lies around the sines of the pupil's centre.
 
-    grid: grid of s - s₀, where s₀ are the sines of the pupil's centre.
+    grid: grid of s - s₀, where s are the sines of rays to the window's centre, and s₀ those of the ray from the pupil's
+        centre.
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
@@ -74,7 +75,7 @@ class SineSamples:
         return _middle(self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return s - s₀ of points of the pupil [m]."""
+        """Return sines of rays from points (x, y) [m] to the window's centre, minus those of the central ray."""
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
 
@@ -101,13 +102,13 @@ class SineSamples:
         return found
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points ξ (x, y) [m] of the pupil in the directions s - s₀."""
+        """Return the points (x, y) [m] of the pupil for sines (s, t) relative to those of the pupil's centre."""
         sx, sy = s + self._middle[0], t + self._middle[1]
         slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, max(self.steepest**2, MOST_SQUARE)))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
 
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
-        """Return ξ = c + z s/√(1 - s²) [m] of sample i along x and j along y, which are float64 indices."""
+        """Return the points (x, y) [m] of samples. i and j are their float64 indices along x and along y."""
         import drjit as dr
 
         at = types.Float64(padded_for_packets(self.at))
@@ -128,7 +129,10 @@ class SineSamples:
         return dr.sqrt(1 - dr.minimum(sx * sx + sy * sy, opaque(types, self.steepest**2)))
 
     def field(self, beam: Beam, types: Precision) -> Field:
-        """Return the field behind the pupil times the areas of the samples dξ dη = z²/cos⁴θ ds dt [m²]."""
+        """Return the field behind the pupil times the areas of the samples [m²].
+
+        The area is dξ dη = z²/cos⁴θ ds dt for a ray at the angle θ, with the sines (s, t).
+        """
         import drjit as dr
 
         column, row = self.grid.coordinates(types)
@@ -178,8 +182,8 @@ def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: flo
     The result is None if samples that are evenly spaced in sines are too uneven in the pupil, or if the grid would be
     too large.
 
-    The distance of two points in the pupil is at most z/cos³θ times the distance of their sines. The number of cycles
-    per unit of sine is therefore the number of cycles per metre times this factor.
+    The distance between two points in the pupil is at most z/cos³θ times the distance between their sines. The number
+    of cycles per unit of sine is therefore the number of cycles per metre times this factor.
 
     shift: distance by which the grid is shifted along both axes, in units of its pitch, at most 1.
     """

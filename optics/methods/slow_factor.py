@@ -108,7 +108,11 @@ def _between(rank: int) -> np.ndarray:
 
 
 def _line(along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (x, y) of a line along x (0) or y (1), relative to the window's centre."""
+    """Return the points (x, y) of a line along x (0) or y (1), relative to the window's centre.
+
+    at: positions along the line.
+    across: position of the line along the other axis.
+    """
     beside = np.full_like(at, across)
     return (at, beside) if along == 0 else (beside, at)
 
@@ -122,6 +126,9 @@ def slow_factor(
 ) -> np.ndarray:
     """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
 
+    u is relative to the window's centre. D is the distance from ξ to u, and ρ the distance from the pupil's centre to
+    u.
+
     s is the direction of ξ in the Fourier kernel e^{-ik s·u}.
 
     dtype: type in which the phase is rounded, "float32" or "float64".
@@ -134,10 +141,10 @@ def axis_factor(
 ) -> np.ndarray:
     """Return the slow factor along x (0) or y (1), relative to its value at the middle of the window, complex.
 
-    It depends on one sine and one position, as the Fourier kernel along its axis does, which can therefore include it.
-    The other sine is `elsewhere`, since the slow factor depends on its square.
+    Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
+    that kernel. Along the other axis, the sine is that of the centre plus `elsewhere`.
 
-    sines: sines along the axis, minus those of the pupil's centre.
+    sines: sines along the axis, minus that of the pupil's centre.
     places: positions [m] along the axis, relative to the middle of the window. They broadcast with the sines.
     """
     return np.asarray(turned(*_along(path, samples, axis, sines, places), "float64"))
@@ -266,7 +273,9 @@ def _whole(
 def fourier_kernel(
     at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float, dtype: str
 ) -> np.ndarray:
-    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u [m] along an axis, relative to the window's centre.
+    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u = `at` [m] relative to the window's centre.
+
+    L_a are the Lagrange polynomials of the interpolation points.
 
     directions: s of each sample.
     nodes: interpolation points a [m].

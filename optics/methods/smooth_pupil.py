@@ -4,11 +4,11 @@ The convolution multiplies the light of a ray of the frequency ν by e^{-2π²δ
 Light that is too steep to arrive in a window disappears from the samples, and a division of the spectrum by this factor
 restores the light of all other rays exactly.
 
-Within the Gaussian, the phase is a quadratic function: the samples contain the slope and the curvature of the wavefront
-in closed form. The edge of the aperture is a straight line there, so that light diffracted by it remains, even where
-the relief is steep. The integral of the Gaussian over one side of this line is a complementary error function of a
-complex argument. At a corner, the factors of both sides are multiplied. The largest neglected term is the third
-derivative of the phase, times δ³.
+Within the width of the Gaussian, the phase is approximated by a quadratic function, with the slope and the curvature of
+the wavefront. The integral then has a closed form. The edge of the aperture is a straight line there, so that light
+diffracted by it remains, even where the relief is steep. The integral of the Gaussian over one side of this line is a
+complementary error function of a complex argument. At a corner, the factors of both sides are multiplied. The largest
+neglected term is the third derivative of the phase, times δ³.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Side:
     offset: float = 0.0
 
     def depth(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return how far points lie inside the opening [radii], and the outward normal (x, y) of the side there."""
+        """Return the depth of points inside the opening [radii], and the outward normal (x, y) of the side there."""
         if self.radius == 0:
             depth = self.offset - self.normal[0] * x - self.normal[1] * y
             return depth, np.full_like(depth, self.normal[0]), np.full_like(depth, self.normal[1])
@@ -84,7 +84,7 @@ def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
 
 
 class _Gaussian(NamedTuple):
-    """The Gaussian times the light within it: logarithm of its integral, complex mean and complex covariance."""
+    """The Gaussian times the light, again a Gaussian: logarithm of its integral, complex mean and covariance."""
 
     log: np.ndarray
     mean: tuple[np.ndarray, np.ndarray]
@@ -159,7 +159,9 @@ class SmoothPupil:
     ) -> _Gaussian:
         """Return ∫ e^{-u²/2δ²} e^{2πi (W + ∇W·u + uᵀHu/2)} du / 2πδ².
 
-        waves: W, without whole waves. slope: its gradient [1/m]. bends: H, its second derivatives xx, xy, yy [1/m²].
+        waves: W, without whole waves.
+        slope: gradient of W [1/m].
+        bends: H, the second derivatives of W along xx, xy and yy [1/m²].
         """
         square = self.width**2
         xx, xy, yy = (-2j * math.pi * square * bend for bend in bends)
@@ -174,8 +176,8 @@ class SmoothPupil:
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the integral of the Gaussian over the aperture, at points in radii.
 
-        The factors of all near sides are multiplied. If the light of one side is diffracted by a steep slope, it comes
-        from the side itself. All other factors then refer to the Gaussian along this side.
+        The factors of all near sides are multiplied. If light is diffracted by one side and the slope there is steep,
+        the light comes from this side itself. All other factors then refer to the Gaussian along this side.
         """
         depth, across, down = np.stack([np.broadcast_arrays(*side.depth(x, y)) for side in self.sides], axis=1)
         mean, variance = inner.along(across, down)

@@ -69,7 +69,7 @@ class SmoothSpectrum(SpectrumSampling):
 
     @cached_property
     def closed_form(self) -> Grid:
-        """Samples of the closed form."""
+        """Samples at which the convolved light is computed in closed form."""
         if self.blur == 0:
             return self.pupil
         return _samples(self.smooth.outermost, _pitch(self.taper.end, self.smooth.width, self.tolerance))
@@ -83,7 +83,7 @@ class SmoothSpectrum(SpectrumSampling):
         return self.pupil_period / self.pupil.shape[0]
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         assert problem.reach is not None
         types, window = precision(problem.dtype), problem.window
         found = intensity_of(self._propagated(self._light(beam, types.dtype), self._transfer(beam, problem), window))
@@ -156,7 +156,7 @@ def _back(spectrum: np.ndarray, top: int, period: int) -> np.ndarray:
 
 
 def may_be_steep(beam: Beam) -> bool:
-    """Return whether these methods apply to the pupil: it has a smooth relief or wavefront, and no mask.
+    """Return whether `smooth_spectrum` applies to the pupil: it has a smooth relief or wavefront, and no mask.
 
     The aperture must be a circle, a ring, a slit or a convex polygon, and no number may carry a derivative.
     """
@@ -187,7 +187,7 @@ def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
 
 
 def _pitch(band: float, width: float, tolerance: float) -> float:
-    """Return the pitch [m] of light that is convolved with a Gaussian of this width [m], for a band [1/m].
+    """Return the sampling pitch [m] for a band [1/m] of light that is convolved with a Gaussian of this width [m].
 
     The Gaussian attenuates light that is aliased onto the band more than light in the band.
     """

@@ -95,5 +95,5 @@ class SpectrumSampling:
         return field * Field.from_waves(1.0, waves, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx

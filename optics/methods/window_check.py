@@ -2,7 +2,7 @@
 
 The other samples are finer, their grid is shifted by a fraction of the pitch that is not a simple ratio, and their edge
 is sharper. The comparison therefore shows light that the samples alias, detail that they miss, and the softness of the
-edge. It also shows the error of the rank, because the slow factor is interpolated over the pupil, and not over the
+edge. It also shows the error of the rank, because the check interpolates the slow factor over the pupil instead of the
 window. The sum has an error of its own, which is at most half of the error that it finds.
 """
 
@@ -22,9 +22,9 @@ __all__ = ["window_errors"]
 CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_sampling.py
 UNSEEN = 0.05  # choice: error that both sums may share, relative to the tolerance
 ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
-SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities with which these are drawn, see `_drawn`
+SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
 INTERPOLATED = 0.5  # choice: largest error of the interpolated kernel of the check, relative to the tolerance
-# Choices: numbers of interpolation points across the pupil, and phases [rad] up to which the earlier ones may suffice.
+# Choices: numbers of interpolation points across the pupil, and phases [rad] from which on each is too small.
 ORDERS, PHASES = (2, 3, 5, 7, 9, 12, 16), (0.02, 0.3, 0.8, 1.5, 3.0, 6.0)
 
 
@@ -47,7 +47,7 @@ def window_errors(
     exact = _at_points(samples, path, field, (u, v), tolerance)
     drawn = images[np.arange(len(images))[:, None, None], rows[:, :, None], columns[:, None, :]]
     squared = np.mean(np.square(drawn - exact) / chance, (1, 2))
-    # choice: a PSF may be too bright, and errors are relative to the exact one
+    # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the exact PSF
     bright = np.minimum(total, np.mean(np.square(exact) / chance, (1, 2)))
     total = np.where(total > 0, np.where(squared > 0.01 * total, bright, total), np.nan)
     rounding = float(np.finfo(field.real.dtype).eps)
@@ -88,8 +88,8 @@ def _ratios(
     """Return interpolation points in sines, (pupil, a), and the factor there, (stack, v, u, b, a).
 
     The factor is the slow factor relative to the middle of the window, divided by its values along both axes. Its
-    interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. It starts
-    with a number of points that is usually sufficient for the phase there.
+    interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. The
+    search starts with a number of points that is usually sufficient for the phase there.
     """
 
     def ratio(directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray) -> np.ndarray:

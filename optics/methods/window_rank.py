@@ -23,7 +23,7 @@ RAYS, PLACES = 100, 6  # choices: numbers of rays, and of places along a side of
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
 OUTSIDE = 1e-3  # choice: weight of rays that miss the window
 MOST_RANK = 12  # choice: largest rank
-RANK_OF_DISTANCE = 3  # The Fourier kernel does not follow the distance, whose derivative is quadratic over the window.
+RANK_OF_DISTANCE = 3  # least rank for derivatives by the distance, which are quadratic in the window's positions
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ def window_ranks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the necessary ranks, (beam,), and whether `cross_term` is necessary. A rank that is too large is 0.
 
-    They are sufficient for the end points of rays, around which the light is. Derivatives may move light anywhere, so
-    the rank is then also sufficient on average over the whole window.
+    The rank suffices at the end points of rays, around which the light arrives. If derivatives are requested, light may
+    move anywhere. The rank then also suffices on average over the whole window.
 
     tolerance: tolerances, (beam,).
     """

@@ -54,7 +54,7 @@ class WindowSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         if problem.differentiated:
             return self._recorded(beam, problem).intensity
         return precision(problem.dtype).Float(padded_for_packets(self.plain_intensity(beam, problem)))
@@ -65,7 +65,7 @@ class WindowSampling:
         return window_images(problem.stack, samples, self.rank, self.crossed, problem.window, problem.dtype).ravel()
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
         if problem.differentiated:
             return on_window(self._recorded(beam, problem), beam, problem)
         u = Field.from_numpy(self._field(beam, problem), problem.window.dx, precision(problem.dtype))
@@ -81,13 +81,13 @@ class WindowSampling:
         return recorded_field(light, beam.distance, sums, problem.window)
 
     def sums(self, path: Path, dtype: str) -> WindowSums:
-        """Return the arrays of the sums. The wavelength may be longer than that for which the samples are made."""
+        """Return the arrays of the sums. The wavelength may be longer than the one that determined the samples."""
         return _window_sums(
             self.pupil, max(self.rank, CROSSED_RANK) if self.crossed else self.rank, self.half_width, path, dtype
         )
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
+        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
         return problem.wavelength / self.pupil.grid.dx
 
     @property
@@ -145,7 +145,7 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
     kernel = kernel / (axis_factor(path, pupil, 0, column, u) * axis_factor(path, pupil, 1, row, v))
 
     def by_distance() -> np.ndarray:
-        """Return the derivative of z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to z."""
+        """Return the derivative of the kernel z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to the distance z."""
         turns = 2j * np.pi / path.wavelength * (z / distance - z / np.sqrt(x * x + y * y + z * z))
         near_by = -(near.real * z / distance**2) / near
         return np.asarray(kernel * (1 / z - 2 * z / distance**2 + turns + near_by), complex_dtype)

@@ -39,7 +39,7 @@ class WindowStack:
     wavelengths: wavelengths [m] in vacuum.
     distance: distance [m] of the window behind the pupil.
     dtype: "float32" or "float64".
-    convert: function that returns a NumPy array as an array of the library that computes: NumPy or PyTorch.
+    convert: function that converts a NumPy array to the library of the computation, NumPy or PyTorch.
     """
 
     pupil: Pupil
@@ -90,9 +90,9 @@ class WindowStack:
             yield straight(wavelength) * turned(size, path / wavelength, self.dtype)
 
     def _straight(self, samples: SineSamples) -> Callable[[float], Array]:
-        """Return a function of the wavelength, the waves of the sources behind the ideal lens, (source, η, ξ).
+        """Return a function that returns, for a wavelength, the waves behind the ideal lens, (source, η, ξ).
 
-        If none of their numbers carries a derivative, NumPy computes them.
+        If no number of lens and sources carries a derivative, NumPy computes the waves.
         """
         pupil, (x, y, _) = self.pupil, samples.layout
         numbers = [number for source in self.sources for number in (source.distance, *source.angle)]

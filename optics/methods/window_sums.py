@@ -4,8 +4,8 @@
 
 P is the light behind the pupil, times the areas of its samples. `down` and `across` are Fourier kernels times the
 interpolation weights of the points (b, a) of the window, and `kernel` is the slow factor at these points. At rank 1,
-there is one such point, and the sum is the matrix Fourier transform of P times one factor. These three arrays describe
-the geometry alone, so all light that passes the same samples shares them.
+there is one such point, and the sum is the matrix Fourier transform of P times one factor. `down`, `across` and
+`kernel` describe the geometry alone, so all light that passes the same samples shares them.
 
 `window_field` and `pupil_gradient` accept arrays of any library with the operators of NumPy, such as PyTorch, and any
 number of leading axes (pupil, depth, wavelength), which are broadcast.
@@ -38,7 +38,7 @@ def window_field(pupil: Any, kernel: Any, down: Any, across: Any) -> Any:
 
 
 def pupil_gradient(cotangent: Any, kernel: Any, down: Any, across: Any) -> Any:
-    """Return the gradient of a loss L with respect to the pupil, ∂L/∂Re P + i ∂L/∂Im P, (..., η, ξ).
+    """Return the gradient of a loss L with respect to the pupil's light P, ∂L/∂Re P + i ∂L/∂Im P, (..., η, ξ).
 
     It is the adjoint of `window_field` and takes about as long.
 
@@ -51,7 +51,7 @@ def pupil_gradient(cotangent: Any, kernel: Any, down: Any, across: Any) -> Any:
 
 
 def _weighted(pupil: Any, kernel: Any) -> Any:
-    """Return P[η, ξ] kernel[b, a, η, ξ] as matrices (..., b·η, a·ξ)."""
+    """Return pupil[η, ξ] · kernel[b, a, η, ξ] as matrices (..., b·η, a·ξ)."""
     rows, columns, height, width = kernel.shape[-4:]
     if rows == columns == 1:
         return pupil * kernel[..., 0, 0, :, :]
@@ -99,7 +99,7 @@ def recorded_field(pupil: Field, distance: Scalar, sums: WindowSums, window: Gri
     moves = carries_derivative(distance)
 
     class WindowField(dr.CustomOp):
-        """The sums as one operation. For derivatives with respect to the distance, it stores the pupil's light."""
+        """`sums.field` as one operation of Dr.Jit. The pupil's light is kept for derivatives by the distance."""
 
         def eval(self, re: Array, im: Array, distance: Array) -> tuple[Array, Array]:
             self.pupil = _complex(re, im, shape)

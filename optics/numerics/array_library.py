@@ -30,9 +30,9 @@ def library(x: Array) -> Any:
 def like(x: Array, value: Any) -> Array:
     """Return `value` as an array of the type, precision and device of `x`.
 
-    value: number or array. NumPy arrays carry no derivatives. PyTorch and Dr.Jit each keep their own.
+    value: number or array. Arrays of PyTorch and of Dr.Jit keep their derivatives. NumPy arrays have none.
 
-    A Dr.Jit array is flat. Dr.Jit treats it as data, so the same kernel serves other values.
+    A Dr.Jit result is flat and is treated as data, so that other values do not need a new kernel.
 
     Raises:
         ValueError: `value` carries a derivative of Dr.Jit and `x` is a tensor of PyTorch, or the reverse.

@@ -15,7 +15,7 @@ Shape = tuple[int, int]
 
 
 def lines_seconds(lines: int, period: int, real: str) -> float:
-    """Return the time of transforms of contiguous lines, including padding and selection.
+    """Return the time [s] of transforms of contiguous lines, including padding and the selection of results.
 
     real: type of real and imaginary parts, "float32" or "float64".
     """
@@ -23,7 +23,7 @@ def lines_seconds(lines: int, period: int, real: str) -> float:
 
 
 def products_seconds(shape_in: Shape, shape_out: Shape, real: str, terms: int = 1) -> float:
-    """Return the time of products with one matrix for each axis, and with `terms` such pairs."""
+    """Return the time [s] of products with one matrix per axis, summed over `terms` such pairs of matrices."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return 8 * terms * (my * ny * nx + my * nx * mx) / ARRAY_MATMUL_FLOPS[real]
 
@@ -40,7 +40,7 @@ def fft_wins(shape_in: Shape, period: float, shape_out: Shape, real: str) -> boo
 
 
 def sum_seconds(shape_in: Shape, period: float, shape_out: Shape, real: str) -> float:
-    """Return the time of `fourier.fourier_sum`, including the matrices."""
+    """Return the time [s] of `fourier.fourier_sum`, including the computation of its matrices."""
     if fft_wins(shape_in, period, shape_out, real):
         return fft_seconds(shape_in, int(period), shape_out, real)
     entries = shape_in[0] * shape_out[0] + shape_in[1] * shape_out[1]

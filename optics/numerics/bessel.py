@@ -66,7 +66,10 @@ def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
 
 @lru_cache(maxsize=3)
 def _series(rounding: str) -> tuple[list[float], list[float], list[float]]:
-    """Return Chebyshev coefficients of J₀ in x² over [0, 8], and of P and Q x/8 in (8/x)² beyond."""
+    """Return Chebyshev coefficients of J₀ in x² over [0, 8], and of P and of Q · x/8 in (8/x)² beyond 8.
+
+    P and Q are defined at the top of the module.
+    """
     from scipy.special import hankel1e, j0
 
     inner, outer = TERMS[rounding]

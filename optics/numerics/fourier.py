@@ -66,7 +66,7 @@ def dft2(
     pitch: float,
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Field:
-    """Return the Fourier sum of a field at `shape` output samples (formula above).
+    """Return the Fourier sum of a field at `shape` output samples; see the formula at the top of the module.
 
     The result is a Field on a grid of the given output pitch.
 

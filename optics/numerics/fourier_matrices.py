@@ -37,7 +37,7 @@ def halves_pay(shape_in: Shape, shape_out: Shape) -> bool:
 
 
 def _products(shape_in: Shape, shape_out: Shape) -> tuple[int, int]:
-    """Return the number of products of the sum along x, and of the sum along y that follows."""
+    """Return the numbers of multiplications in the sum along x, and in the sum along y that follows."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return ny * nx * mx, ny * mx * my
 
@@ -53,7 +53,7 @@ def _halves_seconds(shape_in: Shape, shape_out: Shape) -> float:
 
 
 def by_whole_matrices(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """Return A_y u A_xᵀ, with one matrix per axis."""
+    """Return the sum as A_y u A_xᵀ, with one Fourier matrix per axis (`_matrix`)."""
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     u = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
     along_x = along_y = _matrix(types, mx, nx, period, sign)
@@ -110,9 +110,10 @@ def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
 
 
 def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
-    """Return sums and differences of rows j and -j of (ny, mx) numbers.
+    """Return the sums and the differences of rows j and -j, after the sum along x.
 
-    across: sums over the rows' samples, as the halves that `_both_sides` combines.
+    across: sums along x in the form that `_both_sides` combines.
+    size: number of rows, and of results in each.
     """
     ny, mx = size
     shape = ny // 2 + 1, mx
@@ -142,7 +143,9 @@ def _unfolded_rows(down: list[Array], shape: Shape, types: Precision) -> Parts:
 def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, there: Array = True) -> Parts:
     """Return the real and imaginary part of Σ (even cos + i odd sin) for k of either sign.
 
-    halves: sums for |k| of the even parts, followed by sums of the odd parts.
+    halves: sums for |k| of the even parts, followed by sums of the odd parts, each real and imaginary.
+    place: flat index of |k| in these sums.
+    there: mask of the entries that exist; all others are 0.
     """
     import drjit as dr
 

@@ -33,8 +33,8 @@ __all__ = [
 # Choice: number of samples along an axis for interpolation onto a grid. The error falls with the eighth power of their
 # distance. Tables of functions are interpolated from six samples, with an error that falls with the sixth power.
 TAPS = 8
-# Largest error of eight-point interpolation of e^{iφ}, divided by (radians per sample)⁸. It is |Π(t - x_j)| / 8!, and
-# halfway between the middle two samples (1·3·5·7)²/2⁸ / 8!.
+# Largest error of eight-point interpolation of e^{iφ}, divided by (radians per sample)⁸. It is |Π(t - x_j)| / 8!, which
+# is (1·3·5·7)²/2⁸ / 8! halfway between the middle two samples.
 LAGRANGE_8 = 1.07e-3
 TABLE_TAPS = 6
 MARGIN = TABLE_TAPS // 2 - 1  # number of samples beyond either end of a table that interpolation reads

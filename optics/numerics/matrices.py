@@ -12,7 +12,7 @@ THREE_PAY = 1e7
 
 
 def matmul(left: Array, right: Array, transposed: bool = False) -> Array:
-    """Return left @ right, or left @ rightᵀ."""
+    """Return left @ right, or left @ rightᵀ if `transposed` is True."""
     import drjit as dr
 
     return dr.matmul(left, right, Bt=transposed)

@@ -23,7 +23,7 @@ def readable(name: str, value: Any) -> Any:
     masked elements (numpy.ma) as data. Entries of lists and tuples are treated in the same way.
 
     Raises:
-        ValueError: masked elements, or a tensor on the device "meta", which contains no numbers.
+        ValueError: elements are masked, or a tensor is on the device "meta", which contains no numbers.
     """
     if type(value) is np.ndarray:
         return value
@@ -52,7 +52,7 @@ def full_precision(name: str, value: Any) -> Any:
 
 
 def as_array(name: str, values: Any) -> np.ndarray:
-    """Return `values` as an array; one of objects if NumPy cannot convert them. See `full_precision`."""
+    """Return `values` as an array, of type object if NumPy cannot convert them. See `full_precision`."""
     values = full_precision(name, values)
     try:
         given = np.asarray(values)
@@ -73,7 +73,7 @@ def real_array(name: str, value: Any) -> np.ndarray | None:
 
 
 def _half(value: Any) -> str:
-    """Return the name of the type of half precision in `value`, or an empty string."""
+    """Return the name of a half-precision type in `value`, or an empty string."""
     if type(value) in (float, int, str):
         return ""  # fast path: planning calls this thousands of times
     if isinstance(value, (list, tuple)):

@@ -69,7 +69,7 @@ def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
 def _degree(cycles: float, digits: float) -> int:
     """Return the degree of the polynomial that represents a wave of `cycles` cycles between the ends.
 
-    Rules for the many parts of an opening often need the same number.
+    It is cached, because rules for the many parts of an opening often need the same number.
     """
     return int(harmonics(np.array(pi * cycles), digits))
 

@@ -20,7 +20,8 @@ __all__ = ["DistinctRadii", "RadialProfile"]
 # Choice: entries of the matrix that maps points to the table; 128 MB in float64. If the matrix would be larger, the
 # image is computed at the positions of the table.
 LARGEST_MATRIX = 2**24
-# Choice, limited by memory: radii of 8 windows are cached up to this number of samples, and of one above it.
+# Choice, limited by memory: the radii of 8 windows are cached if they have at most this number of samples, else those
+# of one window.
 LARGE_WINDOW = 2**18
 BESIDE = TAPS // 2 - 1  # number of positions of the table beyond the axis; there is one more beyond the rim
 
@@ -85,7 +86,7 @@ class RadialProfile:
         return self.radius * np.cos(np.pi * (np.arange(self.points) + 0.5) / (2 * self.points))
 
     def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
-        """Return values, given at `positions` and interpolated to the samples of the window, flat.
+        """Return the values at the samples of the window, flat, interpolated from values at `positions`.
 
         The result is 0 beyond the rim. Negative results are replaced by 0 unless `signed` is True.
         """
@@ -144,7 +145,7 @@ class DistinctRadii:
         return 0
 
     def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
-        """Return values, given at `positions`, at the samples of the window, flat."""
+        """Return the values at the samples of the window, flat, from values at `positions`."""
         import drjit as dr
 
         return dr.gather(types.Float, types.Float(values), types.Index(self._distinct[1]))
@@ -169,10 +170,10 @@ def _places(table: int) -> np.ndarray:
 
 @lru_cache(maxsize=32)
 def _refinement(points: int, table: int, rim: float, dtype: str) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Return the flat matrix (table + 7, points) of even Chebyshev interpolation to -3 ... table + 3, and its shape.
+    """Return the flat matrix (table + 7, points) that interpolates from Chebyshev points to the table, and its shape.
 
-    The positions are evenly spaced. The axis is position 0, and the rim, in units of the line's radius, is position
-    table - 1.
+    The interpolating polynomial is even. The table has evenly spaced positions, which are numbered from -3 to table +
+    3. The axis is position 0, and the rim, in units of the line's radius, is position table - 1.
     """
     radius = rim * _places(table)
     nodes = np.cos(np.pi * (np.arange(points) + 0.5) / (2 * points))

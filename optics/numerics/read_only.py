@@ -35,5 +35,5 @@ class ReadOnlyArrays:
 
 @cache
 def _names(kind: Any) -> tuple[str, ...]:
-    """Return the names of the fields of a dataclass, which every step of a simulation needs."""
+    """Return the names of the fields of a dataclass, cached because every step of a simulation needs them."""
     return tuple(field.name for field in fields(kind))

@@ -51,20 +51,23 @@ class ScatteredSum:
         self.first = low_y + self.held[0] // 2, low_x + self.held[1] // 2
 
     def evaluate(self, u: np.ndarray) -> np.ndarray:
-        """Return S (sum, y, x), complex, for amplitudes (sum, point)."""
+        """Return the Fourier sums S (sum, y, x), complex, for amplitudes u of the points (sum, point)."""
         held = (self.cells.T @ np.ascontiguousarray(u.T)).T.reshape(len(u), *self.held)
         found = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.shape, 1) for one in held])
         return found * self._factor()
 
     def at(self, samples: np.ndarray) -> np.ndarray:
-        """Return u (sum, point), complex, for samples (sum, y, x): the transpose of `evaluate`."""
+        """Return the sums u (sum, point), complex, at the points: the transpose of `evaluate`.
+
+        samples: values S (sum, y, x).
+        """
         parts = samples * self._factor()
         held = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.held, 1) for one in parts])
         found: np.ndarray = (self.cells @ held.reshape(len(samples), -1).T).T
         return found
 
     def _factor(self) -> np.ndarray:
-        """Return the phase of the cells' position, divided by the transform of the spreading kernel, (y, x)."""
+        """Return the phase factor of the cells' position, divided by the transform of the spreading kernel, (y, x)."""
         axes = []
         for first, n in zip(self.first, self.shape, strict=True):
             turns = (np.arange(n) - n // 2) * first / self.period

@@ -1,4 +1,4 @@
-"""Functions of Dr.Jit arrays as operations of PyTorch, and tensors that are differentiated once."""
+"""Functions of Dr.Jit arrays as operations of PyTorch, and tensors that can be differentiated only once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["DrJitOperation", "Once", "common_device", "torch_place"]
 
 
 class Once(torch.autograd.Function):
-    """The identity, whose derivative refuses to be differentiated."""
+    """The identity; an attempt to compute its second derivative raises an error."""
 
     @staticmethod
     def forward(ctx: Any, tensor: Any) -> Any:
@@ -63,7 +63,7 @@ class DrJitOperation(torch.autograd.Function):
 
 
 class FirstDerivative(torch.autograd.Function):
-    """First derivatives, which refuse to be differentiated."""
+    """First derivatives; an attempt to differentiate them raises an error."""
 
     @staticmethod
     def forward(ctx: Any, *slopes: Any) -> Any:

@@ -89,7 +89,7 @@ def _tabulated(ommatidium: Ommatidium, wavelengths: tuple[float, ...], loss: flo
 
 
 def _accepted(ommatidium: Ommatidium, wavelength: float, grid: Grid) -> tuple[np.ndarray, float]:
-    """Return the values on a grid of sines of the light's directions, and the share of all accepted light in it."""
+    """Return the accepted fraction on a grid of the light's direction sines, and the share of accepted light in it."""
     steepest = math.hypot(grid.dx * grid.shape[0] / 2, grid.dx * grid.shape[1] / 2)
     caught: ModesAtPupil = coupled_modes(ommatidium, wavelength, next((s for s in STEEPEST if s >= steepest), 1.0))
     taken = np.array([ommatidium.rhabdom.absorbed(mode) for mode in ommatidium.modes(wavelength)])

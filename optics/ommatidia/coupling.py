@@ -37,7 +37,7 @@ class ModesAtPupil:
     """Modes of a waveguide, propagated back to the nodes of a pupil.
 
     x, y: positions of the nodes [m].
-    weights: P Ψ dξ, (mode, node).
+    weights: amplitude P of the pupil, times the mode's field Ψ at the node, times its area dξ, (mode, node).
     area_of: dξ of each node [m²].
     wavenumber: k n₀ [1/m] in front of the pupil.
     area: open area of the pupil [m²].

@@ -139,7 +139,7 @@ class Ommatidium:
         return float(at[1]) if bend >= 0 else float(at[1]) + step * (left - right) / (2 * bend)
 
     def _half(self, low: float, high: float, peak: float, turn: float, wavelength: float) -> float:
-        """Return the angle between `low` and `high` at which the sensitivity is half of `peak`, by a cubic."""
+        """Return the angle between `low` and `high` at which the sensitivity is half of `peak`, by a cubic fit."""
         at = np.linspace(low, high, 4)
         seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
         return float(np.polynomial.polynomial.polyval(peak / 2, np.polynomial.polynomial.polyfit(seen, at, 3)))

@@ -51,7 +51,7 @@ def _radii(mode: Mode) -> float:
 def radiated(
     modes: tuple[Mode, ...], x: np.ndarray, y: np.ndarray, end: tuple[float, float, float], k: float
 ) -> np.ndarray:
-    """Return Ψ of each mode at points of a pupil, (mode, point), up to a constant phase.
+    """Return the field Ψ of each mode at points of a pupil, (mode, point), up to a constant phase.
 
     end: position (x, y, z) [m] of the waveguide's end, relative to the pupil's centre. The waveguide's axis joins these
         two points.
@@ -69,7 +69,10 @@ def radiated(
 
 
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return G D² for D = z/cos θ, as a function of the mode's number, by linear interpolation between close points."""
+    """Return G D² at points at the distances D = z/cos θ, as a function of the mode's number.
+
+    It is interpolated linearly between close points. G is defined at the top of the module.
+    """
     z = float((distance * np.sqrt(1 - sine**2)).mean())
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
     radians = k * reach(modes) * sines[1] / 2
@@ -85,7 +88,10 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return G D² for arbitrary sines and distances, as a function of the mode's number."""
+    """Return G D² at points with arbitrary sines and distances D, as a function of the mode's number.
+
+    G is defined at the top of the module.
+    """
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
     nearness = (1 - CLEAR) / float(distance.max()), (1 + CLEAR) / float(distance.min())
     far = reach(modes)
@@ -113,7 +119,7 @@ def _in_guide_frame(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float
 
 
 def _scaled(at: np.ndarray, ends: Ends) -> np.ndarray:
-    """Map a range to [-1, 1]."""
+    """Map positions from the range `ends` to [-1, 1]."""
     found: np.ndarray = (2 * at - ends[0] - ends[1]) / (ends[1] - ends[0])
     return found
 
@@ -124,7 +130,7 @@ def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
 
 
 def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> np.ndarray:
-    """Return G D² at places (sin θ, D), (mode, place), by quadrature."""
+    """Return G D² at places (sin θ, D), (mode, place), by quadrature. G is defined at the top of the module."""
     u, v, weight = _mode_nodes(modes, k * float(sine.max()))
     # G is the same for the modes with sin lφ and with cos lφ. Only the cosine is nonzero at φ = 0, so it is used.
     amplitude = np.stack([weight * replace(mode, sine=False).field(u, v) for mode in modes], axis=1)

@@ -66,7 +66,7 @@ class Mode:
         return here * here / (below * above)
 
     def _square(self) -> float:
-        """Return the integral of the squared field, scaled to 1 at the core's edge, in closed form with κ."""
+        """Return the integral of the squared field, scaled to 1 at the core's edge, in closed form."""
         azimuth = math.pi * (2 if self.l == 0 else 1)
         outside = self.radius**2 / 2 * (1 / self._kappa() - 1)
         return azimuth * outside / (1 - self.core_share)
@@ -137,6 +137,8 @@ class Waveguide:
 @lru_cache(maxsize=4096)
 def _roots(l: int, v: float) -> tuple[float, ...]:
     """Return U of all guided modes of azimuthal order l: the roots of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W).
+
+    Here W² = v² - U².
 
     Each mode above its cut-off has one root, between a zero of J_{l-1} and the next zero of J_l.
     """

@@ -87,7 +87,7 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
 
 
 def _mean(result: PSFResult, values: Sequence[Array]) -> Array:
-    """Return one value per wavelength, from one value per request."""
+    """Return values, one for each request of a PSF, as one array; or their weighted mean if the PSF is a mean."""
     import drjit as dr
 
     types = precision("float64")
@@ -96,13 +96,13 @@ def _mean(result: PSFResult, values: Sequence[Array]) -> Array:
 
 
 def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
-    """Return the same as `_mean`, of numbers or of tuples of numbers."""
+    """Return the result of `_mean` for numbers or tuples of numbers, as a NumPy array."""
     found = np.array(values)
     return found if result.shares is None else np.atleast_1d(result.shares @ found)
 
 
 def _at_edge(request: Request) -> Array:
-    """Return the factor on the evanescent light of an edge that is due to the directions of rays at the edge.
+    """Return the factor by which the directions of rays at an edge change its evanescent light.
 
     The light at a point of the edge is spread along the line s + t n of frequencies, in units of 1/λ. Here s is the
     frequency of the ray, and n is the normal of the edge. Its power is proportional to 1/t². The line leaves the unit
@@ -184,6 +184,9 @@ class _Sum:
     def fraction(self, beam: Beam, wavelength: float) -> Array:
         """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ and the waves W of the beam.
 
+        The outer sum is over the frequencies (sx, sy) of weight w, the inner sum over the pupil's nodes with amplitudes
+        u.
+
         Derivatives come from the adjoint of the sum, which consists of three sums of the same size. It is computed only
         if a number of the beam carries a derivative.
         """
@@ -209,7 +212,7 @@ class _Sum:
 
     @staticmethod
     def _slopes(at: Sequence[Array], places: Sequence[Array], back: Sequence[Array], total: Array) -> tuple[Array, ...]:
-        """Return the derivatives of the sum by h, by the waves and by the amplitudes of the nodes.
+        """Return the derivatives of `fraction` by h, by the waves and by the amplitudes of the nodes.
 
         at: h, waves and amplitudes
         places: x, y of the nodes, and sx, sy of the frequencies

@@ -43,7 +43,7 @@ class PSFBatch(OnWindow):
     tensor: PSFs [1/m²] as a Dr.Jit tensor (eye, depth, wavelength, y, x) with derivatives.
     psf: the same as a NumPy array.
     plans: one plan per PSF, in the same order, as a flat tuple.
-    members: light of each PSF, in the same order.
+    members: light of each PSF, in the order of `plans`.
     setup: parameters that all PSFs share.
 
     See PSFResult for conventions.
@@ -174,7 +174,10 @@ def _members(
 def _joined(
     known: dict[int, tuple[np.ndarray, Plan]], rest: dict[int, tuple[Array, Plan]], types: Precision
 ) -> tuple[Array, list[Plan]]:
-    """Return all PSFs in one array, and their plans."""
+    """Return all PSFs in one array, and their plans.
+
+    known, rest: PSFs of the shared plan, and all other PSFs, by index.
+    """
     import drjit as dr
 
     both = {**known, **rest}

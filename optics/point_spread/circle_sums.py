@@ -32,7 +32,9 @@ PART = 0.1  # choice: error of interpolation and quadrature, in units of the ker
 
 @dataclass(frozen=True, eq=False)
 class SoftCircles:
-    """The sums Σ_j v_j w(ρ_j, R) for every radius R, as a product of matrices.
+    """The sums Σ_j v_j w(ρ_j, R) over samples v for every radius R, as a product of matrices.
+
+    w is the weight of a sample at the distance ρ_j from the centre, which is defined at the top of the module.
 
     near: indices of the samples that contribute to any circle.
     samples: interpolation between these samples and evenly spaced distances (sample, distance), sparse.
@@ -106,11 +108,11 @@ def soft_sums(circles: SoftCircles, values: Array) -> Array:
 
 
 def sums_of_cells(values: Array, distance: np.ndarray, radii: np.ndarray, dx: float) -> Array:
-    """Return sums of means over cells of side dx within circles, flat (row, radius), with derivatives.
+    """Return sums within circles of values that are means over cells, flat (row, radius), with derivatives.
 
-    A cell at the distance ρ has the weight (R - ρ)/dx + 1/2, limited to [0, 1]. The sum is the difference between two
-    values of the function t ↦ Σ v max(t - ρ, 0)/dx. This function follows from the sums of v and of vρ over all cells
-    nearer than t.
+    Cells have the side dx. A cell at the distance ρ has the weight (R - ρ)/dx + 1/2, limited to [0, 1]. The sum is the
+    difference between two values of the function t ↦ Σ v max(t - ρ, 0)/dx. This function follows from the sums of v and
+    of vρ over all cells nearer than t.
 
     values: flat Dr.Jit Float64 array (row, sample).
     """

@@ -1,7 +1,7 @@
 """PSFs of several depths and wavelengths from one plan, at coarse tolerances.
 
 The PSFs that need the most samples are those at the shortest wavelength, for the nearest and the farthest source. Their
-plans decide for all. The error of each PSF is checked as that of a single one.
+plans determine the samples of all PSFs. The error of each PSF is then checked separately.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def coarse_stack(
         return None
     images = stack.intensity(sampling)
     met: np.ndarray = without.errors(sampling, plain(images), tolerance) <= tolerance
-    return images, met  # a dark window has no error, and is left to other methods
+    return images, met  # a dark window has the error NaN, so other methods compute it
 
 
 def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method: str) -> WindowSampling | None:

@@ -112,8 +112,8 @@ class Converging(ReadOnlyArrays):
         """Return the error of field components to which both planes of polarisation contribute.
 
         A check of a single plane of polarisation does not detect this error. It results from the approximation that the
-        path has the same curvature for the whole pupil. Only a fraction of the fields interferes: the squared sine of
-        the steepest ray, which rotated rays contribute to the other component.
+        path has the same curvature for the whole pupil. Only the light that rotated rays contribute to the other
+        component interferes. Its fraction is the squared sine of the steepest ray.
         """
         z, bright = number(self.beam.distance), np.abs(scalar) ** 2
         off = np.add.outer((window.y - self.image[1]) ** 2, (window.x - self.image[0]) ** 2)

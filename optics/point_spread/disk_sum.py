@@ -25,7 +25,7 @@ MOST_AGAIN = 1025  # choice: most samples along a side of a recomputed window
 
 @dataclass(frozen=True, eq=False)
 class DiskSum:
-    """A sum over a disk.
+    """Light on a disk, as a weighted sum over samples.
 
     light: the field on samples that are fine enough for sums.
     share: weight of each sample, (y, x).

@@ -94,7 +94,7 @@ class Microvilli:
         return float(most / least)
 
     def _along(self, light: VectorFocus) -> np.ndarray:
-        """Return E·m of each part, (part, y, x)."""
+        """Return E·m of each part of the light, (part, y, x), with m the direction of the microvilli."""
         turn = math.radians(self.azimuth_deg)
         found: np.ndarray = math.cos(turn) * light.parts[:, 0] + math.sin(turn) * light.parts[:, 1]
         return found

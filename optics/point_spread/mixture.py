@@ -13,7 +13,10 @@ __all__ = ["Mixture", "a_mixture", "flat", "mixed"]
 
 
 class Mixture(Protocol):
-    """Interface of light of several wavelengths, such as a WhitePSF. See the functions with the methods' names."""
+    """Interface of light of several wavelengths, such as a WhitePSF.
+
+    Its methods are documented by the functions of the same names.
+    """
 
     def mtf(self, tolerance: float = 0.02) -> Any: ...
 

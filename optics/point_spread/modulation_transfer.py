@@ -165,7 +165,7 @@ class MTF(ReadOnlyArrays):
         return MTF(tensor, self.fx, self.fy, self.cutoff[:count], errors, shares, self.centre, causes)
 
     def profile(self, frequencies: np.ndarray, with_error: bool = False) -> Any:
-        """Return the mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
+        """Return the mean contrast over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
 
         The frequencies need not lie on the grid. Beyond the Nyquist frequency of the PSF's samples (half a cycle per
         sample), contrasts are 0.
@@ -187,7 +187,7 @@ class MTF(ReadOnlyArrays):
         return (to_user(found), self._radial_errors(f) + unsure) if with_error else to_user(found)
 
     def _over_orientations(self, f: np.ndarray) -> tuple[Array, np.ndarray]:
-        """Return the mean over all orientations, and its error due to their number, (wavelength, frequency)."""
+        """Return the mean contrast over all orientations, and its error, (wavelength, frequency)."""
         found, n = self._mean(f, ORIENTATIONS, 0.0), ORIENTATIONS
         allowed = np.maximum(self.predicted_error, FINEST)[:, None]
         while n < MOST_ORIENTATIONS:
@@ -206,7 +206,8 @@ class MTF(ReadOnlyArrays):
     def _radial_errors(self, f: np.ndarray) -> np.ndarray:
         """Return the mean of `errors` over the orientations at radial frequencies f, (wavelength, frequency).
 
-        It is interpolated between rings one step of the grid wide. Below one step, the largest possible error is used.
+        The mean is interpolated between rings that are one step of the grid wide. Below one step, the largest possible
+        error is used.
         """
         step, side = float(self.fx[1] - self.fx[0]), self.fx.size
         ring = np.rint(np.hypot.outer(self.fy, self.fx) / step).astype(np.intp).ravel()
@@ -218,7 +219,7 @@ class MTF(ReadOnlyArrays):
         return np.where(f == 0, 0.0, found)
 
     def _mean(self, f: np.ndarray, n: int, shift: float) -> Array:
-        """Return the mean over n orientations within half a turn, (wavelength, frequency).
+        """Return the mean contrast over n orientations within half a turn, (wavelength, frequency).
 
         shift: angle of the first orientation, in steps between orientations.
         """

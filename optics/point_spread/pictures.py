@@ -1,6 +1,6 @@
 """Computation of requested PSFs.
 
-Each PSF is planned, computed and compared with the direct sum; if it fails, it is repeated.
+Each PSF is planned, computed and compared with the direct sum. If the comparison fails, the PSF is computed again.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class _Attempt:
 
     @property
     def for_window(self) -> bool:
-        """True if the samples are made for the light of the window alone."""
+        """True if the samples suffice for the light of the window alone."""
         return isinstance(self.sampling, WindowSampling)
 
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
@@ -112,8 +112,8 @@ class _Attempt:
 
         If the method was an approximation, the next attempt uses an exact method. Otherwise it has a smaller tolerance,
         because a dark window needs more digits than a bright one. The result is None if the dtype cannot provide them.
-        If the samples of the window's light would need a tolerance for which they are not made, the next attempt
-        resolves all light instead, at the original tolerance.
+        Samples for the window's light alone do not support very small tolerances. If such a tolerance would be
+        necessary, the next attempt resolves all light instead, at the original tolerance.
 
         last: True for the last attempt. Its tolerance is reduced further, because quadrature rules change in steps and
             a slightly smaller tolerance may give the same nodes.
@@ -136,7 +136,7 @@ class _Attempt:
 
 
 def _area(beam: Beam, problem: Problem) -> Array:
-    """Return the area of the open pupil [m²] with the derivative of its radius."""
+    """Return the area of the open pupil [m²], with derivatives with respect to its radius."""
     types = precision(problem.dtype)
     radius = opaque(types, beam.radius)
     return types.Float(beam.pupil.aperture.area * radius * radius)

@@ -251,7 +251,7 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
 
 
 def _count(sampling: Sampling) -> str:
-    """Return the number of samples in words. The two numbers of a Hankel transform are not sides of a grid."""
+    """Return the number of samples in words; for a Hankel transform, the numbers of radii and angles."""
     if sampling.method == "hankel":
         return f"integrals over {sampling.samples[0]:.2g} radii and {sampling.samples[1]:.2g} angles"
     if sampling.samples[1] == 1:

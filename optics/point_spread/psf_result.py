@@ -136,7 +136,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def window_sums(self) -> np.ndarray | Array:
-        """Sum over the samples, times their area, (wavelength,), without checking the pitch."""
+        """Sum over the samples times their area, (wavelength,). The pitch is not checked."""
         import drjit as dr
 
         waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)
@@ -248,7 +248,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
         """Return a PSF for sums, whose samples are at most `coarsest` [m] apart.
 
-        It is `of_all_light` if these samples are fine enough. Otherwise several samples fill the cell of each one.
+        It is `of_all_light` if its samples are fine enough. Otherwise each sample is divided into several equal ones.
 
         Raises:
             AccuracyError: see `recompute_on`.

@@ -92,7 +92,7 @@ class Request:
 
 
 def _wrapped(pupil: Pupil) -> str:
-    """Return advice on a height map that jumps. Fields of rays need one slope at each point, so they have no pixels."""
+    """Return advice on a height map that jumps. For fields of rays, which need slopes, it does not suggest pixels."""
     rows, columns = pupil.height.samples.shape
     remedy = "optics.PixelRelief(height) represents the steps"
     if isinstance(pupil.mask, RayField):

@@ -106,8 +106,8 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
 def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> float:
     """Return the relative error of the intensity that the direct sum itself has.
 
-    It has two causes: quadrature to `digits` digits, relative to the amplitude of all light in phase (twice that for
-    the intensity), and the rounding of paths.
+    It has two causes. The quadrature has `digits` digits relative to the amplitude of all light in phase, and the
+    relative error of the intensity is twice that of the amplitude. The other cause is the rounding of paths.
     """
     return 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
 
@@ -191,7 +191,7 @@ def exact_psf(
 
 
 def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarray) -> np.ndarray:
-    """Return the exact PSF at the drawn points, by the direct sum in float64."""
+    """Return the exact PSF at the points with the flat indices `drawn`, by the direct sum in float64."""
     row, column = np.divmod(drawn, problem.window.shape[1])
     return _at_points(beam, problem, reference, problem.window.x[column], problem.window.y[row])
 
@@ -268,11 +268,11 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of sides and corners, and the part of the probabilities that does not depend on the PSF.
+    """Return the nearness of points to sides and corners, and the part of their probabilities that no PSF affects.
 
-    Both are flat arrays, and the second one is the sum of three terms.
+    Both are flat arrays. The second one is the sum of three of the distributions that `_chances` lists.
 
-    centre: position (x, y) of the window, in samples.
+    centre: position (x, y) of the window's centre, in samples.
     """
     height, width = shape
     y, x = (np.square(np.linspace(-1, 1, n)) if n > 1 else np.ones(1) for n in shape)

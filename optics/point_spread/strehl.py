@@ -192,7 +192,7 @@ def _refuse_brighter_outside(result: PSFResult, peak: float) -> None:
 def _vertex(result: PSFResult, middle: tuple[int, int] | None = None) -> Peak:
     """Return the maximum of the paraboloid through the sample `middle` (row, column) and its neighbours.
 
-    middle: None: the brightest sample
+    middle: (row, column); None: the brightest sample.
     """
     import drjit as dr
 

@@ -1,4 +1,4 @@
-"""White light: PSFs, and their measures, for the spectrum of a lamp as each type of receptor weights it."""
+"""PSFs in white light, and their measures. Each type of receptor weights the spectrum of the lamp."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def check_seconds(problem: Problem, sampling: Sampling) -> float:
 
 
 def population_seconds(across: int, window: Grid) -> float:
-    """Return the approximate time per PSF by the common plan of a population, for `across` samples of the pupil [s]."""
+    """Return the approximate time [s] per PSF by a population's common plan, for `across` samples across the pupil."""
     return PER_PSF + across * (across + sum(window.shape)) * PER_ENTRY + math.prod(window.shape) * PER_SAMPLE
 
 

@@ -1,15 +1,17 @@
 """Pupils of a system that are decentred and tilted.
 
 Each plane has its own lateral coordinates about the centre of its pupil, so a decentred pupil only moves the window of
-the propagation to its plane. The plane of a tilted pupil has the depth ζ(x) = x·tan α. Light arrives there as the field
-at the depth ζ, and it leaves from there. If the light's angles to the axis are at most θ, the field is the product of a
-carrier exp(ikcζ) with c = (1 + cos θ)/2 and a function that varies slowly with the depth. This function is interpolated
-between a few planes at Chebyshev nodes z_j. For light that arrives at the tilted plane, and for light that leaves it,
+the propagation to its plane. The plane of a tilted pupil has the depth ζ(x) = x·tan α. The field that arrives at a
+point of this plane is the field at the depth ζ of the point, and light leaves from this depth. If the light's angles to
+the axis are at most θ, the field is the product of a carrier exp(ikcζ) with c = (1 + cos θ)/2 and a function that
+varies slowly with the depth. This function is interpolated between a few planes at Chebyshev nodes z_j. For light that
+arrives at the tilted plane, and for light that leaves it,
 
     U(x, ζ) = exp(ikcζ) Σ_j L_j(ζ) exp(-ikcz_j) U(x, z_j),   w → Σ_j exp(ikcz_j) P(-z_j) [L_j(ζ) exp(-ikcζ) w],
 
-where P is the propagation to the next plane. The second formula is the adjoint of the first one. It becomes the inverse
-if light at the angle θ is multiplied by 1 - tan α tan θ. Fields on tilted planes are stored without exp(ikζ).
+where w is the field that leaves the plane, and P the propagation to the next plane. The second formula is the adjoint
+of the first one. It becomes the inverse if light at the angle θ is multiplied by 1 - tan α tan θ. Fields on tilted
+planes are stored without exp(ikζ).
 """
 
 from __future__ import annotations
@@ -82,7 +84,7 @@ class Alignment:
         return self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]
 
     def nodes(self, radius: float, sine: float, wavelength: float, allowed: float) -> tuple[np.ndarray, float]:
-        """Return the depths [m] between which fields are interpolated, or 0 alone, and the error of the intensity.
+        """Return the depths [m] between which fields are interpolated, or just 0, and the error of the intensity.
 
         Along a ray, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2. Interpolation between n
         Chebyshev nodes has an error of at most φⁿ / (2ⁿ⁻¹ n!).
@@ -107,7 +109,9 @@ class Alignment:
         )
 
     def weights(self, nodes: np.ndarray, grid: Grid, turns: float) -> list[np.ndarray]:
-        """Return L_j(ζ) exp(2πi ζ turns) at the samples of a grid about the centre, (y, x) each.
+        """Return L_j(ζ) exp(2πi ζ turns) for each node j at the samples of a grid about the centre, (y, x) each.
+
+        L_j are the Lagrange polynomials of the nodes, and ζ is the depth of the tilted plane.
 
         turns: waves per depth [1/m].
         """
@@ -118,13 +122,13 @@ class Alignment:
         return [weight * np.exp(2j * np.pi * turns * depth) for weight in found]
 
     def depth(self, grid: Grid) -> np.ndarray:
-        """Return ζ [m] at the samples of a grid about the centre, (y, x)."""
+        """Return the depth ζ [m] of the tilted plane at the samples of a grid about the centre, (y, x)."""
         rows, columns = (np.arange(n) - n // 2 for n in grid.shape)
         found: np.ndarray = grid.dx * np.add.outer(self.slope[1] * rows, self.slope[0] * columns)
         return found
 
     def leaving(self, u: np.ndarray, dx: float, wavelength: float) -> np.ndarray:
-        """Return a field u (y, x) on the tilted plane times the obliquity factor, with sin θ instead of tan θ.
+        """Return a field u (y, x) on the tilted plane times 1 - tan α sin θ, an approximation of the obliquity factor.
 
         wavelength: wavelength [m] in the medium.
         """
@@ -139,11 +143,11 @@ class Alignment:
         return found
 
     def error(self, sine: float) -> float:
-        """Return the relative error of the intensity of light up to the angle θ, due to approximations of the tilt."""
+        """Return the relative error of the intensity due to approximations of the tilt; `sine`: largest sin θ."""
         return self.steepness * sine**2 * (self.steepness + sine)
 
     def on_element(self, x: Array, y: Array, types: Precision) -> tuple[Array, Array]:
-        """Return the coordinates along the tilted plane of points (x, y) [m] perpendicular to the axis."""
+        """Return coordinates along the tilted plane, given coordinates (x, y) [m] perpendicular to the axis."""
         if not self.steepness:
             return x, y
         (sx, sy), stretch = self.slope, math.hypot(1, self.steepness) - 1
@@ -155,14 +159,14 @@ ALIGNED = Alignment()
 
 
 def slowness(sine: float) -> float:
-    """Return 1 - c = (1 - cos θ)/2."""
+    """Return 1 - c = (1 - cos θ)/2 from sin θ, where exp(ikcζ) is the carrier of light at the angle θ."""
     return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 
 def path_to_tilted_plane(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:
-    """Return the path [m] of a source's light from the plane of a pupil's centre to its tilted plane, minus ζ.
+    """Return the path [m] of a source's light from a pupil's plane without tilt to that with tilt, minus the depth ζ.
 
-    The result is for the samples of a grid about the centre, (y, x).
+    The result has one value for each sample of a grid about the pupil's centre, (y, x).
     """
     tangents = [math.tan(angle) for angle in source.angle]
     distance = number(source.distance)

@@ -83,7 +83,7 @@ class Stop:
         return cls(distance, pupil, (1 + EDGE_REACH) * pupil.radius, None, alignment)
 
     def apart(self, other: Alignment) -> float:
-        """Return the largest distance [m] of the centres along an axis."""
+        """Return the distance [m] between both centres along x or along y, whichever is larger."""
         return max(map(abs, self.alignment.beside(other)))
 
 
@@ -110,11 +110,11 @@ class StepSettings:
 
     @property
     def edge_ripple(self) -> float:
-        """Ripple of soft edges. It is not below LEAST_RIPPLE, because of rounding errors."""
+        """Relative ripple of the light behind soft edges, at least LEAST_RIPPLE because of rounding errors."""
         return max(self.ripple, LEAST_RIPPLE)
 
     def reaching(self, half_widths: float, distance: float) -> float:
-        """Return the highest frequency [1/m] that `propagate` does not remove between planes, including its fade.
+        """Return the highest frequency [1/m] of light that `propagate` carries to the next plane, including its fade.
 
         The result is infinite if both planes coincide. If they are close, it includes evanescent waves that have not
         yet decayed.
@@ -159,7 +159,7 @@ class StepSettings:
         return replace(worst, plan=plan, u=np.sum([result.u for result in found], axis=0))
 
     def steep(self, field: PlaneField) -> float:
-        """Return the largest sin θ to the axis that tilts must represent.
+        """Return the largest sin θ, with θ measured from the axis, of light for which tilts must be accurate.
 
         If diffracted light is removed, the remaining light beyond geometrical rays is too weak to matter here.
         """
@@ -236,7 +236,7 @@ class PupilSampling:
         return cls(pupil, source, Grid.square(across, pitch), soft, band, rays, kept, stop.alignment, path)
 
     def transmitted(self, u: np.ndarray | None, settings: StepSettings) -> PlaneField:
-        """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate.
+        """Return the field u on the grid times the pupil's transmittance, or its conjugate in backward propagation.
 
         u: None for light from the source.
         """

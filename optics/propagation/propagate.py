@@ -126,7 +126,7 @@ def propagate(
 def propagated_field(
     given: np.ndarray, dx: float, passage: Passage, window: Grid, tolerance: float, dtype: str
 ) -> PropagationResult:
-    """Return the field (…, y, x) after a passage. The arguments are those of `propagate`, and valid.
+    """Return the field (…, y, x) after a passage. `propagate` has checked the arguments.
 
     Raises:
         AccuracyError: no sampling meets the tolerance.
@@ -217,7 +217,7 @@ def _sample_note(planes: list[PropagatedPlane], tolerance: float) -> str:
 def _plan(
     how: TransformSampling | SeparableSampling, planes: list[PropagatedPlane], tolerance: float, dtype: str
 ) -> Plan:
-    """Return the plan.
+    """Return the plan of a propagation.
 
     Raises:
         AccuracyError: the predicted error exceeds the tolerance.

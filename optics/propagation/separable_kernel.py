@@ -97,7 +97,7 @@ class SeparableSampling:
 
     @property
     def why(self) -> str:
-        """Reason for the sampling, for plans."""
+        """Reason for the sampling, as text for plans."""
         paraxial = "; paraxial, as requested" if self.passage.paraxial else ""
         return f"distant window: the kernel is a sum of {self.terms.count} products of functions of x and y{paraxial}"
 
@@ -162,7 +162,7 @@ def _terms(passage: Passage, range_x: Range, range_y: Range, allowed: float) -> 
 
 
 def _series(coefficients: np.ndarray, span: Range, at: np.ndarray) -> np.ndarray:
-    """Return the polynomials at positions [m] as an array (term, ...)."""
+    """Return Chebyshev series over the range `span` at positions `at` [m], (term, ...)."""
     width = span[1] - span[0]
     scaled = (2 * at - span[1] - span[0]) / width if width else 0 * at
     found: np.ndarray = chebyshev.chebval(scaled, coefficients)
@@ -188,7 +188,10 @@ def _distance(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) ->
 
 
 def _sag(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
-    """Return D(x, y) - |z| without a difference of nearly equal numbers; paraxially, (x² + y²) / 2|z|."""
+    """Return D(x, y) - |z| without a difference of nearly equal numbers; paraxially, (x² + y²) / 2|z|.
+
+    D(x, y) is the distance between points that are (x, y, z) apart.
+    """
     z = abs(passage.z)
     square = np.square(x) + np.square(y)
     found: np.ndarray = square / (2 * z if passage.paraxial else _distance(passage, x, y) + z)
@@ -196,7 +199,7 @@ def _sag(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.n
 
 
 def _longer(passage: Passage, along: np.ndarray, middle: float, other: float) -> np.ndarray:
-    """Return D(along, other) - D(middle, other)."""
+    """Return the difference of distances D(along, other) - D(middle, other), see `_sag`."""
     more, z = np.square(along) - middle**2, abs(passage.z)
     if passage.paraxial:
         return more / (2 * z)
@@ -213,7 +216,7 @@ def _phasor(passage: Passage, path: np.ndarray | float) -> np.ndarray:
 
 
 def _amplitude(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
-    """Return A. Paraxially it is 1/(iλz)."""
+    """Return the amplitude A of the kernel for points that are (x, y, z) apart. Paraxially, it is 1/(iλz)."""
     k, z = 2 * np.pi / passage.wavelength, abs(passage.z)
     if passage.paraxial:
         return np.asarray(-1j * k / (2 * np.pi * passage.z))
@@ -223,7 +226,7 @@ def _amplitude(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -
 
 
 def _slow_part(passage: Passage, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return A(x, y) exp(ik e(x, y))."""
+    """Return the slow part of the kernel, A(x, y) exp(ik e(x, y)), with the amplitude A and the coupling e."""
     cx, cy = passage.centre
     # e = [D(x, y) - D(x, cy)] - [D(cx, y) - D(c)]; both differences have the numerator y² - cy².
     far = _distance(passage, x, y) + _distance(passage, x, cy)

@@ -158,7 +158,7 @@ def _converged(
     """Return the field with as much diffracted light as the tolerance requires.
 
     Most light follows geometrical rays. The margin of frequencies around them is doubled until the intensity changes by
-    less than the tolerance. Otherwise all light is included that can reach the next plane.
+    less than the tolerance. If this does not happen, all light is included that can reach the next plane.
     """
     before = None
     for margin in MARGINS if tolerance >= LEAST_TOLERANCE else ():

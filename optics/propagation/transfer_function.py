@@ -79,7 +79,7 @@ class Band:
     def diagonal(self, wavelength: float) -> float:
         """Return the highest radial frequency [1/m] of a square band.
 
-        It lies on the diagonal fx = fy, where fx / √(1 - λ²fy²) = end.
+        It lies on the diagonal fx = fy, where fx / √(1 - λ²fy²) equals the end of the fade.
         """
         return math.sqrt(2) * self.end / math.hypot(1, self.end * wavelength)
 
@@ -88,7 +88,7 @@ EVERYTHING = Band(math.inf, 0.0, math.inf)
 
 
 def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) -> float:
-    """Return the distance [m] that light of a spatial frequency [1/m] moves to the side."""
+    """Return the distance [m] that light of a spatial frequency [1/m] moves sideways over the distance z [m]."""
     sine = frequency * wavelength
     return z * (sine if paraxial else sine / math.sqrt(1 - sine * sine))
 
@@ -112,7 +112,7 @@ def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxia
 
 
 def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: float) -> Band:
-    """Return the band of given limits, whatever light could reach the window.
+    """Return the band with the given limits, even if more or less light could reach the window.
 
     The result is `EVERYTHING` if its outermost light is too near grazing incidence.
     """

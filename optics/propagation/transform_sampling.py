@@ -138,7 +138,7 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
-    """Return the sampling with the shortest period for a passage. It determines the band of the passage.
+    """Return the sampling with the shortest period for a passage, and with the band that this period allows.
 
     spare: padding [m] for the blur of a truncated spectrum.
 
@@ -258,9 +258,11 @@ def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> n
 
 
 def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:
-    """Return the displacements [m] of light along x and y, for x z tan θ fx/|f| = z λ fx / cos θ.
+    """Return the displacements [m] along x and y of light with the frequencies (fx, fy).
 
-    They are infinite for light that is too near grazing incidence.
+    The displacement along x is z tan θ fx/|f| = z λ fx / cos θ, and that along y correspondingly.
+
+    Both are infinite for light that is too near grazing incidence.
     """
     wavelength, z = how.passage.wavelength, abs(how.passage.z)
     sine2 = 0 * fy if how.passage.paraxial else (fx**2 + fy**2) * wavelength**2

@@ -97,7 +97,7 @@ class SpectralBands(ReadOnlyArrays):
 
 
 def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> np.ndarray:
-    """Return x >= 0 with weights @ x closest to the catches. Among several such x, it is the closest to the means."""
+    """Return x >= 0 with weights @ x closest to the catches; among several such x, the one closest to the means."""
     from scipy.optimize import lsq_linear
 
     equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
@@ -107,7 +107,7 @@ def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> 
 
 
 def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the values of a spectrum at wavelengths, or raise a ValueError."""
+    """Return a function's result as an array of one value per wavelength, or raise a ValueError."""
     found = full_precision("radiance", found)
     try:
         values = np.broadcast_to(np.asarray(found, np.float64), shape)

@@ -116,7 +116,12 @@ class Animals:
 
     @staticmethod
     def replace(seen: Sequence[Arrays], worlds: np.ndarray, pending: Pending) -> None:
-        """Replace the last frames of these worlds by the first frames of their new episodes."""
+        """Replace the last frames of these worlds by the first frames of their new episodes.
+
+        seen: frames of each agent in `seeing`, changed in place
+        worlds: indices of the worlds that have started a new episode
+        pending: their first frames, from `start_episodes`
+        """
         _put(seen, worlds, _waited(pending))
 
     def get_state(self) -> Arrays:
@@ -127,7 +132,7 @@ class Animals:
         return found
 
     def set_state(self, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
-        """Restore the stored state of these worlds."""
+        """Restore the state that `get_state` returned, in the worlds with the indices `chosen`."""
         self.simulation.set_state(state, chosen)
         for number, senses in enumerate(self.seeing):
             now = senses.get_state()

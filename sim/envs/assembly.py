@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 AUTO = "auto"
 LAYOUT = "only built-in tasks have layouts; the world of a user task is its model"
-OF_TASKS = {  # arguments for built-in tasks only, with the place where a user task defines the same
+OF_TASKS = {  # arguments that only built-in tasks accept, with the setting of a user task that replaces them
     "eyes": "a user task defines its eyes by its settings eye and mounts",
     "rays_per_receptor": "a user task defines it by its setting fidelity",
     **dict.fromkeys(("world_seed", "mazes", "course", "layouts", "wall_height"), LAYOUT),
@@ -48,7 +48,7 @@ OF_TASKS = {  # arguments for built-in tasks only, with the place where a user t
     },
 }
 IN_RESET = "pass it to reset(seed=...)"
-MOST = 1_000_000  # chosen limit for n_envs and for memory, more than any memory can hold
+MOST = 1_000_000  # limit for n_envs and for memory; higher values would exceed any computer's RAM
 
 
 def make_vec_env(
@@ -162,7 +162,7 @@ def make_parallel_env(
 
 
 def refuse(options: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
-    """Refuse the arguments that `reasons` names."""
+    """Refuse options that must be left out; `reasons` contains their names, each with the reason."""
     for name, why in reasons.items():
         if name in options:
             raise ValueError(f"{name} = {shown(options[name])}: must be left out, {why}")
@@ -184,7 +184,7 @@ def _require_eyes(eyes: Any) -> None:
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
-    """Refuse arguments that a user task defines itself, and a task that defines its mode itself."""
+    """Refuse arguments whose values a user task defines, and a user task that sets its own mode."""
     parameters = inspect.signature(make_vec_env).parameters
     for name, why in OF_TASKS.items():
         if given[name] != parameters[name].default:

@@ -46,7 +46,10 @@ class Auxiliary:
         self._before: Poses | None = None
 
     def render(self, poses: Poses, fresh: np.ndarray) -> dict[str, np.ndarray]:
-        """Return arrays (world, ...) by name; fresh: numbers of the worlds whose episode has just begun."""
+        """Return the auxiliary entries of the observations by name, each (world, ...).
+
+        fresh: indices of the worlds whose episode has just begun
+        """
         depth = self._renderer.depth(poses)
         ids = self._renderer.ids(poses) if {IDS, FLOW} & {*self._names} else None
         found = {DEPTH: np.where(np.isfinite(depth), depth, 0).astype(np.float32)}
@@ -65,7 +68,8 @@ class Auxiliary:
     def _flow(self, now: Poses, depth: np.ndarray, ids: np.ndarray) -> np.ndarray:
         """Return the optic flow of the points that are visible now.
 
-        The motion of these points back to the previous poses is computed, and its sign is reversed.
+        Points are followed from their present positions back to the previous poses. The flow is the negative of this
+        motion.
         """
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)

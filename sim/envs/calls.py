@@ -82,7 +82,7 @@ class CallOrder:
 
 
 def seed_of(name: str, seed: Any) -> int | None:
-    """Return a seed as an int, or None; ValueError unless it is a whole number from 0 on, or None."""
+    """Return a seed as an int, or None; ValueError unless it is None or a whole number of at least 0."""
     if seed is None:
         return None
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:

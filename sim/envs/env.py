@@ -45,9 +45,9 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     @property
     def state(self) -> Any:
-        """Current state of the world as a batch of one, in its physics' own type.
+        """Current state of the world, as a batch of one world.
 
-        This is `WorldState` for the built-in tasks.
+        Its type depends on the physics; for the built-in tasks, it is `WorldState`.
         """
         return self._batch.state
 

@@ -84,7 +84,8 @@ class EyesOfKind:
     ) -> PendingFrame:
         """Launch the last frame of an action, after the receptors have seen its earlier frames.
 
-        If only some worlds are rendered, and they do not begin an episode, their last frame replaces the one before.
+        If only some worlds are rendered, and they do not begin an episode, the new frame replaces the frame that was
+        last rendered in these worlds.
         """
         everyone, light = np.arange(self._simulation.n), self._simulation.light(self._wavelengths)
         first, chosen = fresh or worlds is not None, everyone if worlds is None else worlds
@@ -110,7 +111,7 @@ class EyesOfKind:
         return signals if self._shot is None else self._shot(signals, self._normals.launch(worlds).wait())
 
     def _normals_of(self, worlds: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return normal numbers of this shape; motion detectors do not add noise of their own."""
+        """Return normal numbers of this shape for the noise of these worlds; motion detectors add no noise."""
         drawn = self._normals.launch(worlds).wait()
         return np.concatenate([drawn, np.zeros_like(drawn)], axis=2) if drawn.shape != shape else drawn
 

@@ -134,6 +134,9 @@ def _draw_dot(shown: np.ndarray, dot: _Dot, nearness: Nearness, color: np.ndarra
     """Draw an eye into the pixels `shown`.
 
     The agent's own body does not hide the eye, so eyes on the far side of the body are visible, too.
+
+    shown: pixels of the image, row by row, (n, 3), which are changed in place
+    color: colour of the iris, (3,)
     """
     free = nearness(dot.pixels) * (dot.depth - 2 * BODY_RADIUS) < 1
     under = shown[dot.pixels].astype(np.float32)

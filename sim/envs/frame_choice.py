@@ -1,7 +1,7 @@
-"""Choice of the number of frames per action that receptors with dynamics need, so that fast motion blurs.
+"""Choice of the number of frames per action that receptors with dynamics need for correct motion blur.
 
-The choice plays a few random actions. It compares the responses at the end of each action with the responses to the
-finest frames, one per physics step.
+A few random actions are simulated. For each number of frames, the responses at the end of each action are compared with
+the responses to the largest possible number, up to one frame per physics step.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def dynamics_of(eye: Any) -> Any:
 def with_frames(
     task: BatchTask, fidelities: Sequence[Fidelities | None], scenes: Mapping[str, WorldScene] | None
 ) -> list[Fidelities | None]:
-    """Return the fidelities with a number of frames for all eyes whose receptors have dynamics.
+    """Return the fidelities with `frames` set for all eyes whose receptors have dynamics.
 
     The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify it. Otherwise it
     is the smallest number for which the errors of all signals are acceptable.
@@ -144,7 +144,11 @@ def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.nda
 
 
 def _responses(dynamics: ReceptorDynamics, signals: np.ndarray, frames: int, seconds: float) -> np.ndarray:
-    """Return the responses at the end of each action if only this number of the frames is rendered."""
+    """Return the responses at the end of each action if `frames` evenly spaced frames of it are rendered.
+
+    signals: signals in all frames, (action, frame, world, ...)
+    seconds: duration of an action [s]
+    """
     if not len(signals):
         return np.zeros(1)
     finest, n = signals.shape[1:3]

@@ -14,7 +14,7 @@ class Memory:
     """The last `frames` frames of every world, newest last.
 
     In a world that starts a new episode, the first frame fills the whole memory, as if the agent had seen the same
-    frame before. If the memory started with zeros, the agent would seem to have come out of darkness.
+    frame before. A memory that started with zeros would look as if the agent had come out of darkness.
     """
 
     def __init__(self, frames: int) -> None:

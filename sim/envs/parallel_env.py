@@ -128,7 +128,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         return self._named([{name: array[0] for name, array in known.items()} for known in observations])
 
     def _commanded(self, actions: Mapping[str, np.ndarray]) -> list[np.ndarray]:
-        """Return the actions of each animal, (1, number)."""
+        """Return the actions of each animal, (1, n_actions), after checking that each animal has some."""
         for name in actions:
             if name not in self.agents:
                 known = did_you_mean(name, self.agents) or f": there are {', '.join(self.agents)}"

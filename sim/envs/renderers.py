@@ -74,7 +74,10 @@ def _of_agent(
 
 
 def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:
-    """Return the simulation's model as a scene for one kind of eyes. Mitsuba traces the samples if these are rays."""
+    """Return the simulation's model as a scene for one kind of eyes.
+
+    If the fidelity's samples are rays, Mitsuba traces them.
+    """
     task, physics = simulation.task, simulation.physics
     return PreparedScene(
         physics.model,

@@ -27,8 +27,8 @@ class Senses:
     number: index of the agent in the simulation
     renderers: renderers of its eyes
     memory: number of frames in an observation
-    sights: its eyes, by kind
-    action: its last action, (world, number) float32
+    sights: signals of its eyes (`EyesOfKind`), by kind
+    action: its last action, (world, n_actions) float32
     observation_space, action_space: spaces of one world
     """
 
@@ -85,7 +85,9 @@ class Senses:
         return bool(self._auxiliary)
 
     def observation(self, seen: Arrays, fresh: np.ndarray) -> Arrays:
-        """Add new frames of all worlds to the memory, and return the observations.
+        """Add new frames to the memory, and return the observations.
+
+        seen: new frames of all worlds, by kind of eyes
 
         fresh: indices of the worlds whose episode has just begun
         """

@@ -281,7 +281,7 @@ class EyesVecEnv(OneEnvironment):
 
 
 def _rows(observations: Sequence[Arrays]) -> Arrays:
-    """Concatenate the observations of all learners."""
+    """Concatenate the observations of all learners, entry by entry, along the first axis."""
     first, *more = observations
     return {name: np.concatenate([of[name] for of in observations]) for name in first} if more else first
 

@@ -142,7 +142,7 @@ def _pixel_bytes(header: Mapping[str, Any]) -> int:
 
 
 def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, str]]:
-    """Return the name, channels and attributes of one part."""
+    """Return the name, channels and attributes of a view's part of this kind, "spectral" or "receptors"."""
     held: dict[str, Any] = {"attributes": dict(view.attributes)}
     attributes: dict[str, str] = {}
     if kind == "spectral":

@@ -11,7 +11,11 @@ from sim.scene.color import preview
 
 
 def preview_of_spectra(radiance: np.ndarray | None, reflectance: np.ndarray | None, nm: np.ndarray) -> np.ndarray:
-    """Return an image of the radiance, or else of the reflectance in daylight, (band, y, x) at wavelengths [nm]."""
+    """Return an image (y, x, 3) of the radiance or, without radiance, of the reflectance in daylight.
+
+    radiance, reflectance: (band, y, x); at least one of them is not None
+    nm: wavelengths of the bands [nm], (band,)
+    """
     if radiance is not None:
         return preview(radiance, nm)
     assert reflectance is not None

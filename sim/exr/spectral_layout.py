@@ -111,7 +111,12 @@ def _fields_of_view(channels: Mapping[str, np.ndarray], header: Mapping[str, Any
 
 
 def _nanometres(value: str, prefix: str | None, unit: str) -> float:
-    """Return the vacuum wavelength [nm] of a wavelength or a frequency."""
+    """Return the vacuum wavelength [nm] of a channel, whose name states a wavelength or a frequency.
+
+    value: the number, with a comma as decimal sign
+    prefix: SI prefix of the unit; None or "": none
+    unit: "m" for a wavelength, otherwise hertz
+    """
     number = float(value.replace(",", "."))
     if unit == "m":
         # One division or multiplication, so that 450 nm is exactly 450.
@@ -129,7 +134,7 @@ def _attributes(header: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _preview(channels: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the preview (y, x, 3); empty without one."""
+    """Return the preview (y, x, 3) as the field "rgb" of a `View`; {} if the channels contain none."""
     if not all(name in channels for name in PREVIEW):
         return {}
     return {"rgb": np.stack([_float32(channels[name]) for name in PREVIEW], axis=-1)}

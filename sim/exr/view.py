@@ -79,7 +79,7 @@ class View:
             if self.rgb is not None and _shape(self.rgb) != (*spectral.shape[1:], 3):
                 raise ValueError(f"{where}: rgb {_kind(self.rgb)}: must be an array (y, x, 3) like the radiance")
             if self.reflectance is not None and self.reflectance.shape != spectral.shape:
-                raise ValueError(f"{where}: reflectance {_kind(self.reflectance)}: must have that of the radiance")
+                raise ValueError(f"{where}: reflectance {_kind(self.reflectance)}: must have the shape of the radiance")
         if self.directions is not None:
             seen = None if self.receptors is None else (3, *self.receptors.shape[1:])
             if self.directions.shape != seen:

@@ -46,7 +46,7 @@ class CompoundEye:
     photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised. A
         wide facet therefore has less shot noise than a narrow one with the same field. None: no shot noise
     radius: radius [m] of the eye's surface, a sphere around the mount on which the facets lie. Facets must not overlap.
-        None: all facets are at the mount, and their diameters are not compared with their distances
+        None: all facets are at the mount, and may overlap
 
     Raises:
         ValueError: an argument is invalid, the number of ommatidia is not in 1 to 1,000,000, two directions are equal,
@@ -117,7 +117,10 @@ class CompoundEye:
 
     @property
     def mosaic(self) -> np.ndarray | None:
-        """Type of each signal, (channel, ommatidium); None if every ommatidium has all types in order."""
+        """Receptor type of each signal, (channel, ommatidium).
+
+        It is None if every ommatidium has receptors of all types, in the order of `receptors`.
+        """
         return None if self.types is None else self.types.T
 
     @property
@@ -127,7 +130,7 @@ class CompoundEye:
 
     @property
     def throughput(self) -> float:
-        """Signal of a white surface, 1."""
+        """Signal of a white surface: 1, because signals are normalised."""
         return 1.0
 
     aperture_throughput = white_signal = throughput
@@ -154,7 +157,10 @@ class CompoundEye:
 
     @property
     def white(self) -> np.ndarray:
-        """Acceptance of white light by each type [sr], Σ_b weights[type, b] daylight_b Ω_b, (type, ommatidium)."""
+        """Acceptance of white light by each receptor type [sr], (type, ommatidium).
+
+        It is Σ_b weights[type, b] daylight_b Ω_b, with Ω_b of `solid_angles`.
+        """
         bands = self.spectral_bands
         found: np.ndarray = (bands.weights * daylight(bands.wavelengths)) @ self.solid_angles.T
         return found
@@ -163,7 +169,7 @@ class CompoundEye:
     def photons(self) -> np.ndarray | None:
         """Absorbed photons for a signal of 1, (channel, ommatidium); None without a photon budget.
 
-        The étendue is the facet's area times the acceptance of white light.
+        The number is proportional to the étendue: the facet's area times the acceptance of white light.
         """
         if self.photon_budget is None:
             return None
@@ -216,7 +222,8 @@ class CompoundEye:
             diameters = np.array([(2 * kind.pupil.area / 3**0.5) ** 0.5 for kind in kinds])[index]
             sizes = np.maximum(sizes, (1 - TOUCHING) * diameters / self.radius)
         tree = KDTree(self.directions)
-        # If the radius is far too small, most pairs are close, and more than fit into memory. Neighbours overlap first.
+        # Nearest neighbours are tested first. If the radius is far too small, they overlap, and the list of all
+        # overlapping pairs would not fit into memory.
         neighbours = tree.query(self.directions, k=[2])[1][:, 0]
         self._refuse_pairs(np.stack([np.arange(len(self)), neighbours], axis=-1), sizes)
         self._refuse_pairs(tree.query_pairs(float(sizes.max()), output_type="ndarray"), sizes)

@@ -208,7 +208,7 @@ class Eyes:
 
 
 def _is_pupil(value: Any) -> bool:
-    """Return whether the value is a Pupil or None."""
+    """Return True if the value is a Pupil or None."""
     if value is None:
         return True
     from optics import Pupil
@@ -234,5 +234,5 @@ def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
 
 
 def camera_rotations(azimuths: np.ndarray) -> np.ndarray:
-    """Return MuJoCo's camera frames of the same eyes, (n, 3, 3): x right, y up, view along -z (determinant +1)."""
+    """Return MuJoCo's camera frames of eyes at these azimuths, (n, 3, 3): x right, y up, view along -z."""
     return eye_rotations(azimuths) * np.array([1.0, 1.0, -1.0])

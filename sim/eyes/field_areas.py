@@ -66,11 +66,10 @@ class FieldAreas:
     def weights(self, fields: ReceptiveFields, receptors: np.ndarray) -> np.ndarray:
         """Return the weight of each rectangle's mean light in the signals of some receptors.
 
-        Its shape is (plane, receptor, rectangle).
+        The shape is (plane, receptor, rectangle), with a plane for each band of each depth layer. A receptor's weights
+        sum to `fields.power`.
 
-        A receptor's weights sum to the power of its field.
-
-        receptors: receptors, numbered row by row
+        receptors: numbers of the receptors, counted row by row, (receptor,)
         """
         rows, columns = np.divmod(receptors, fields.resolution[1])
         lines = zip(self.edges, fields.resolution, fields.field.shape[1:], (rows, columns), strict=True)

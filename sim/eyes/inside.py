@@ -59,7 +59,7 @@ def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
 def _crossings(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray, way: np.ndarray
 ) -> list[float]:
-    """Return the distances at which a ray crosses a mesh [m], nearest first."""
+    """Return the distances at which a ray from `point` in the direction `way` crosses a mesh [m], nearest first."""
     found: list[float] = []
     so_far, beyond = 0.0, _BEYOND * model.geom_rbound[geom]
     while (further := mujoco.mj_rayMesh(model, data, geom, point + so_far * way, way)) >= 0:

@@ -12,7 +12,7 @@ import numpy as np
 from optics.numerics.arguments import did_you_mean, finite, items, of_kind, reals, shown, whole
 
 EXAMPLE = "sim.Mount('head')"
-MOST_EYES = 10_000  # chosen limit for a fan, more than any animal has
+MOST_EYES = 10_000  # chosen limit for the eyes of a fan or ring
 KINDS = ("site", "camera", "body")  # kinds of objects among which a name is searched, in this order
 # Axes (ahead, left, up) in the frame of the object that carries the eye, as rows. In the frame of a body or site, x
 # points ahead and z up. MuJoCo's cameras look along -z, with x to the right.
@@ -98,7 +98,10 @@ class Mount:
 
 
 def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
-    """Check and return a sequence of mounts.
+    """Return mounts as a tuple, after checking that they are a sequence of mounts.
+
+    where: name of the mounts in error messages
+    said: the mounts
 
     Raises:
         ValueError: `said` is a single mount, or not a sequence of mounts.

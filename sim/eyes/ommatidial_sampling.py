@@ -18,7 +18,7 @@ from sim.eyes.viewing_directions import facet_frames
 
 PATTERNS = 16  # choice: arrangements of rays that equal ommatidia share
 STEPS = 20  # choice: steps of Lloyd's algorithm
-COARSE, CELLS = 7, 30  # choice: every seventh direction is used if this leaves at least 30 for each ray
+COARSE, CELLS = 7, 30  # choice: iterations use every seventh direction if these are at least 30 per ray
 CORRECTED = 8  # choice: smallest number of rays with corrected weights; fewer would need negative weights
 
 
@@ -130,7 +130,13 @@ def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray,
 def _centroids(
     points: np.ndarray, places: np.ndarray, masses: np.ndarray, nearest: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the centres of mass of the places nearest to each point; points without any mass stay where they are."""
+    """Return for each point the centre of mass of the places that are nearest to it, (point, 2).
+
+    A point without mass stays where it is.
+
+    places, masses: positions (place, 2) and their masses (place,)
+    nearest: index of the nearest point for each place, (place,); None: computed here
+    """
     nearest = KDTree(points).query(places)[1] if nearest is None else nearest
     total = np.bincount(nearest, masses, len(points))
     safe = np.where(total > 0, total, 1)

@@ -74,7 +74,7 @@ class ReceptiveFields:
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
 
     def drawn_for(self, receptors: np.ndarray) -> ReceptiveFields:
-        """Return the same fields with the mixture of only these receptors' fields."""
+        """Return a copy whose mixture, from which rays are drawn, contains only the fields of these receptors."""
         return replace(self, density=_mixture(self.field, self.resolution, self.cells, receptors))
 
     @property
@@ -135,7 +135,7 @@ class ReceptiveFields:
         return weights
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the value of some receptors' fields in the cells of rays, (plane, receptor, ray)."""
+        """Return the values of these receptors' fields in the cells of the drawn rays, (plane, receptor, ray)."""
         row, column = np.divmod(receptors, self.resolution[1])
         y = draw.rows[None] - row[:, None] * self.cells
         x = draw.columns[None] - column[:, None] * self.cells
@@ -148,7 +148,7 @@ class ReceptiveFields:
 
 
 def cells_per_receptor(resolution: tuple[int, int]) -> int:
-    """Return the number of cells along a receptor's side."""
+    """Return the number of cells along a receptor's side, for eyes of this resolution."""
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
@@ -214,7 +214,7 @@ def bounce_samples(n: int) -> np.ndarray:
 
 
 def van_der_corput(n: int, base: int) -> np.ndarray:
-    """Return the numbers 0 ... n - 1 with their digits mirrored at the radix point, (n,)."""
+    """Return the numbers 0 ... n - 1 with their digits in this base mirrored at the radix point, (n,)."""
     inverse, scale, rest = np.zeros(n), 1 / base, np.arange(n)
     while rest.any():
         inverse += scale * (rest % base)
@@ -231,7 +231,7 @@ def _as_wide(kernels: list[np.ndarray]) -> np.ndarray:
 
 
 def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
-    """Return the kernel convolved with the receptor's square, (plane, y, x)."""
+    """Return the kernel convolved with a receptor's square, which is `cells` cells wide, (plane, y, x)."""
     fields = kernel.astype(np.float64)
     for axis in (1, 2):
         ends = [(0, 0)] * 3

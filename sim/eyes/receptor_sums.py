@@ -24,7 +24,9 @@ ONE_THREAD = 2**18
 
 @dataclass(frozen=True)
 class RowProduct:
-    """signal[view, channel, i, j] = sum over rays of radiance[view, ray] W[channel, receptor (i, j), ray].
+    """Matrix products, one per row of receptors, that sum the radiance along rays to signals.
+
+    signal[view, channel, i, j] is the sum over all rays of radiance[view, ray] W[channel, receptor (i, j), ray].
 
     stretches: for each row of receptors, the index of the first ray that it uses, and the weights of its rays (ray,
         channel * width) float32
@@ -80,7 +82,7 @@ ReceptorSums = Callable[[np.ndarray], np.ndarray]
 
 
 def of_receptors(factors: np.ndarray) -> ReceptorSums:
-    """Return the map to signals from light that is already summed over each receptor.
+    """Return the function that maps light, already summed over each receptor, to signals.
 
     factors: weight of each component in each channel, (channel, component)
     """
@@ -98,7 +100,7 @@ def of_receptors(factors: np.ndarray) -> ReceptorSums:
 def of_components(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], mixing: np.ndarray, basis: np.ndarray
 ) -> ReceptorSums:
-    """Return the map to signals from light along rays, with one matrix product per component and channel.
+    """Return the function that maps light along rays to signals by one matrix product per component and channel.
 
     The factors of bands and channels are multiplied into the weights in advance.
     """
@@ -117,7 +119,7 @@ def of_components(
 
 
 def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-    """Return the map to signals from light along rays, with one matrix product per band.
+    """Return the function that maps light along rays to signals by one matrix product per band.
 
     This is cheaper than `of_components` if there are fewer bands than pairs of a component and a channel.
     """
@@ -173,7 +175,7 @@ def within_stretches(
 
 
 def _mixed(weights: Sequence[scipy.sparse.csr_array], factors: np.ndarray) -> scipy.sparse.csr_array:
-    """Return sum_b factors[b] weights_b, in double precision."""
+    """Return the sum over bands of each band's weights (receptor, ray) times its factor, in double precision."""
     total = float(factors[0]) * weights[0].astype(np.float64)
     for factor, band in zip(factors[1:], weights[1:], strict=True):
         total = total + float(factor) * band.astype(np.float64)

@@ -79,10 +79,7 @@ class BoxSampling:
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of these receptors of the sensor with this number of areas.
-
-        Receptors are numbered row by row.
-        """
+        """Return the samples of some receptors (numbered row by row) in the sensor with this number of areas."""
         count = max(1, round(per_receptor))
         plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
         return Trial(plane, unused, self._means(len(receptors), count), extent)
@@ -98,7 +95,7 @@ class BoxSampling:
         return plane, _unused(plane), count, self.depth, extent_of(self.eye, (1 / columns, 1 / rows))
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of the sensor with this number of rays, for these receptors only (numbered row by row)."""
+        """Return the samples of some receptors (numbered row by row) in the sensor with this number of rays."""
         rays = max(1, round(rays_per_receptor))
         return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
 
@@ -122,7 +119,7 @@ class BoxSampling:
         return np.broadcast_to(weights, (self.eye.bands, *weights.shape))
 
     def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return directions and bounce samples."""
+        """Return the directions (ray, 3) and the bounce samples (ray, 2) of these receptors' rays."""
         height, width = self.eye.resolution
         shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
         corners = self._corners()[receptors]
@@ -130,7 +127,7 @@ class BoxSampling:
         return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
 
     def _through(self, points: np.ndarray) -> np.ndarray:
-        """Return the directions of rays through points (receptor, ray, 2) of squares of size 1, one per receptor."""
+        """Return the directions of rays through points (receptor, ray, 2) in units of the receptors' sides."""
         return directions_of(self.eye, from_receptors(self.eye, points.reshape(-1, 2)))
 
     def _corners(self) -> np.ndarray:
@@ -165,7 +162,7 @@ class FieldSampling:
                 rays += max(1, rays // 4)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of the sensor with this number of rays, for these receptors only.
+        """Return the samples of some receptors (numbered row by row) in the sensor with this number of rays.
 
         Raises:
             NoRaysError: one of these receptors has no ray.
@@ -190,16 +187,16 @@ class FieldSampling:
         return ReceptiveFieldSensor(plane, _unused(plane), weights, self.eye.resolution, self.depth, extent)
 
     def may_share(self, per_receptor: float, *, in_rows: bool = True) -> bool:
-        """Return whether areas are at most one receptor wide, or at most half as wide as one receptor's field.
+        """Return True if areas are small enough that neighbouring receptors have different signals.
 
-        The same must be true of their height. Larger areas would give neighbouring receptors with different fields the
-        same signal.
+        The width of an area must be at most that of one receptor, or at most half the width of one receptor's field.
+        The same applies to its height.
         """
         sides = (1 / n for n in _parts_or_share(per_receptor, in_rows, aspect_of(self.eye)))
         return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of the sensor with this number of areas, for these receptors only."""
+        """Return the samples of some receptors (numbered row by row) in the sensor with this number of areas."""
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), extent_of(self.eye, lattice.size))
@@ -216,7 +213,10 @@ class FieldSampling:
         return ReceptiveFieldSensor(directions, _bounce_samples(draw), weights, self.eye.resolution, self.depth)
 
     def _in_rows(self, of: Callable[[np.ndarray], np.ndarray]) -> tuple[scipy.sparse.csr_array, ...]:
-        """Return the weights of all receptors without negligible ones; `of` returns the weights of one row."""
+        """Return the weights of all receptors, without negligible weights.
+
+        of: function that returns the weights of some receptors; it is called for one row of receptors at a time
+        """
         height, width = self.eye.resolution
         rows: list[list[scipy.sparse.csr_array]] = []
         for i in range(height):

@@ -62,9 +62,9 @@ class BoxSensor(ReadOnlyArrays):
         return sums * np.float32(1.0 / self.rays_per_receptor)
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-        """Return the map to signals from the sums of spectral components over each receptor's rays.
+        """Return the function that maps sums of spectral components over each receptor's rays to signals.
 
-        See `sim.eyes.receptor_sums`.
+        mixing, basis: see `sim.eyes.receptor_sums`
         """
         return of_receptors(mixing @ basis.T / self.rays_per_receptor)
 
@@ -73,8 +73,8 @@ class BoxSensor(ReadOnlyArrays):
 class ReceptiveFieldSensor(ReadOnlyArrays):
     """Sensor of an eye behind a pupil, whose receptors and bands all use the same set of directions.
 
-    The directions are drawn from the mixture of all receptive fields. A receptor's signal is a weighted sum
-    (self-normalised importance sampling):
+    The directions are drawn from the mixture of all receptive fields. The signal of receptor r is a weighted sum over
+    rays p in bands b (self-normalised importance sampling):
 
         signal_r = sum_p W_b[r, p] radiance_b(p),   W_b[r, p] ∝ RF_{r,b}(p) / q(p),   sum_p W_b[r, p] = power_b
 
@@ -85,8 +85,8 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
     If the samples are areas of the visual field instead of rays, W_b[r, p] is the fraction of the receptive field in
     area p.
 
-    Small weights of rays far above and below a row of receptors are set to 0. They are at most a fraction of each
-    receptor's weights, the tolerance of the PSF. In scenes that are nowhere brighter than white in full daylight, this
+    Small weights of rays far above and below a row of receptors are set to 0. For each receptor, they amount to at most
+    the fraction `eye.tolerance` of the sum of its weights. In scenes nowhere brighter than white in full daylight, this
     changes no signal by more than `sim.eyes.sampling.NEGLIGIBLE` times the receptors' noise.
 
     directions: unit vectors in the eye's frame, (ray, 3) float32
@@ -114,9 +114,9 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
         return layers.reshape(self.depth.count, -1, *layers.shape[1:]).sum(axis=0)
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-        """Return the map to signals from spectral components along rays (layer * component, view, ray).
+        """Return the function that maps spectral components along rays (layer * component, view, ray) to signals.
 
-        See `sim.eyes.receptor_sums`.
+        mixing, basis: see `sim.eyes.receptor_sums`
         """
         count, k = self.depth.count, len(basis)
         bands = len(self.weights) // count
@@ -173,9 +173,11 @@ class OmmatidialSensor(ReadOnlyArrays):
         return np.asarray(sums / weights.T[:, None].astype(np.float32))
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-        """Return the map to signals from the sums of spectral components over each ommatidium's rays.
+        """Return the function that maps sums of spectral components over each ommatidium's rays to signals.
 
-        See `sim.eyes.receptor_sums`. Components must be bands.
+        Components must be bands.
+
+        mixing, basis: see `sim.eyes.receptor_sums`
         """
         signals, white = of_receptors(mixing @ basis.T), (mixing @ self.white.T).astype(np.float32)
         return lambda light: signals(light) / white

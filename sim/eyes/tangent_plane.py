@@ -19,7 +19,10 @@ def from_receptors(eye: optics.Eye, counted: np.ndarray) -> np.ndarray:
 
 
 def to_receptors(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """Return the inverse of `from_receptors`, (..., 2)."""
+    """Convert points of the tangent plane to coordinates in which every receptor has the size 1, (..., 2).
+
+    This is the inverse of `from_receptors`.
+    """
     return plane if eye.lattice is None else eye.lattice.counted(plane)
 
 
@@ -69,6 +72,9 @@ def aspect_of(eye: optics.Eye) -> float:
 
 
 def extent_of(eye: optics.Eye, size: tuple[float, float]) -> tuple[float, float]:
-    """Return a rectangle's width and height on the plane at distance 1. size: in receptor widths and heights"""
+    """Return a rectangle's width and height on the plane at distance 1.
+
+    size: width and height of the rectangle [receptor widths and heights]
+    """
     height, width = tangent_size(eye)
     return width * size[0], height * size[1]

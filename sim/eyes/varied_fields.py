@@ -14,7 +14,7 @@ from optics.eye.receptor_lattice import ReceptorLattice, overlaps
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.receptive_fields import Draw, ReceptiveFields, kernels_of
 
-# Weights of a cell and its two neighbours. Fields at rays are then at most four times as large.
+# Weights of a cell and its two neighbours in the average over cells that `_mixture` takes.
 NEAR = 0.25, 0.5, 0.25
 
 
@@ -23,7 +23,8 @@ class VariedFields(ReceptiveFields):
     """Tabulated receptive fields of receptors with a `density`.
 
     field: power per cell of the PSF, rotated by 180°, (plane, y, x)
-    density: see `ReceptiveFields`. It follows the density of receptors, because every receptor has the same share
+    density: see `ReceptiveFields`. It follows the density of receptors, because the fields of all receptors have equal
+        parts in the mixture
     resolution: receptors (height, width)
     cells: cells along the side of an average receptor
     lattice: rectangles of the receptors
@@ -45,11 +46,11 @@ class VariedFields(ReceptiveFields):
         return cls(field, density, eye.resolution, cells, eye.lattice)
 
     def drawn_for(self, receptors: np.ndarray) -> VariedFields:
-        """Return the same fields with the mixture of only these receptors' fields."""
+        """Return a copy whose mixture, from which rays are drawn, contains only the fields of these receptors."""
         return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the value of some receptors' fields at rays, (plane, receptor, ray)."""
+        """Return the values of these receptors' fields at the points of the drawn rays, (plane, receptor, ray)."""
         rows, columns = np.divmod(receptors, self.resolution[1])
         found = np.zeros((len(self.field), len(receptors), len(draw)))
         for row in np.unique(rows):
@@ -58,12 +59,13 @@ class VariedFields(ReceptiveFields):
         return found
 
     def _values_in_row(self, draw: Draw, row: int, columns: np.ndarray) -> np.ndarray:
-        """Return the values for some receptors of a row."""
+        """Return the result of `values` for the receptors in some columns of one row."""
         planes, height, width = self.field.shape
         upper, lower = _edges(self.lattice.rows, self.resolution[0], self.cells)[row : row + 2]
         edges = _edges(self.lattice.columns[row], self.resolution[1], self.cells)
         found = np.zeros((planes, len(columns), len(draw)))
-        # In cells from the corner of the mixture. A ray at y gets the PSF from y + 1/2 - lower to y + 1/2 - upper.
+        # x and y are in cells from the corner of the mixture. The PSF of a ray at y extends from y + 1/2 - lower to y +
+        # 1/2 - upper.
         x, y = (draw.points * self.cells + np.array(self.density.shape[::-1]) / 2 + 0.5).T
         near = np.flatnonzero((y > upper) & (y < lower + height))
         if not near.size:
@@ -79,13 +81,18 @@ class VariedFields(ReceptiveFields):
 
 
 def _edges(edges: np.ndarray, receptors: int, cells: int) -> np.ndarray:
-    """Return edges in cells from the top or the left of the retina."""
+    """Convert edges of receptors to numbers of cells from the top or the left of the retina.
+
+    edges: positions from the middle, in sides of an average receptor
+    receptors: number of receptors along the axis
+    cells: number of cells along the side of an average receptor
+    """
     found: np.ndarray = (edges + receptors / 2) * cells
     return found
 
 
 def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate a table (plane, n + 1, x) linearly along its second axis, (plane, place, x)."""
+    """Interpolate a table (plane, n + 1, x) linearly along its second axis; return (plane, place, x)."""
     at = np.clip(places, 0, table.shape[1] - 1)
     k = np.minimum(at.astype(int), table.shape[1] - 2)
     share = (at - k)[:, None]
@@ -93,7 +100,7 @@ def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate a table (plane, ray, n + 1) linearly at places (receptor, ray), (plane, receptor, ray)."""
+    """Interpolate a table (plane, ray, n + 1) linearly at places (receptor, ray); return (plane, receptor, ray)."""
     at = np.clip(places, 0, table.shape[2] - 1)
     k = np.minimum(at.astype(int), table.shape[2] - 2)
     share, rays = at - k, np.arange(table.shape[1])

@@ -167,7 +167,7 @@ class AgentPhysics:
     def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
         path = states[:, :, self._columns.position] + self._columns.origin
         velocity = states[:, -1, self._columns.velocity].copy()
-        # Time after the action. MuJoCo resets a world that broke down, so its clock shows another time.
+        # Expected time after the action. MuJoCo resets a world that broke down, so that its clock shows another time.
         due = self._start[0] + self.seconds
         unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not finite resets the clock
         unstable |= np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2

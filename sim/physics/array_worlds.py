@@ -14,8 +14,8 @@ from sim.scene.variation import Drawn
 __all__ = ["ArrayWorlds"]
 
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
-# Arrays of a world's state that tasks may write, with the ends of their names in mujoco.mjtState (mjSTATE_QPOS ...).
-# For mocap bodies, the number of values for each body follows.
+# Arrays of a world's state that tasks may write, with the suffixes of their names in mujoco.mjtState (mjSTATE_QPOS
+# ...). For mocap bodies, the number of values for each body follows.
 _WRITABLE = {"time": "TIME", "qpos": "QPOS", "qvel": "QVEL", "act": "ACT", "ctrl": "CTRL", "userdata": "USERDATA"}
 _MOCAP = {"mocap_pos": ("MOCAP_POS", 3), "mocap_quat": ("MOCAP_QUAT", 4)}
 

@@ -78,7 +78,7 @@ class FreeMotion:
         return met
 
     def obeys(self, command: np.ndarray) -> np.ndarray:
-        """Return whether these commands (n, 2) do not saturate the servos, (n,) bool."""
+        """Return a mask of the commands (n, 2) that do not saturate the servos, (n,) bool."""
         obeys: np.ndarray = (np.abs(command) <= self.strongest).all(axis=-1)
         return obeys
 

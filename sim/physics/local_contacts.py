@@ -49,7 +49,9 @@ class LocalContacts:
     def few(self, met: np.ndarray) -> np.ndarray:
         """Return the obstacles of each agent's small model, (n, obstacle) bool.
 
-        They are the obstacles within reach, `met`. If these are too many for a small model, there are none.
+        They are all obstacles within reach, or none if a small model has too few boxes for all of them.
+
+        met: obstacles within reach of each agent, (n, obstacle) bool
         """
         few: np.ndarray = met & (met.sum(axis=1, keepdims=True) <= len(self._slots))
         return few

@@ -117,7 +117,7 @@ class MujocoWorlds:
 
     def get_state(self) -> dict[str, np.ndarray]:
         if self.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-            raise RuntimeError("get_state: the model has <flag sleep>, which no state contains: must be disabled")
+            raise RuntimeError("get_state: the model enables <flag sleep>, which no state contains: must be disabled")
         physics = np.empty((self.n, mujoco.mj_stateSize(self.model, _ALL)))
         for row, data in zip(physics, self.datas, strict=True):
             mujoco.mj_getState(self.model, data, row, _ALL)

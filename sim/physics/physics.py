@@ -21,7 +21,7 @@ class Physics(Protocol):
     n: number of worlds
     seconds: duration of one action [s]
     frames: number of moments of an action at which receptors with dynamics see the worlds, 1 or a divisor of `substeps`
-    passed: poses at the moments of the last action before its end, `frames` - 1 of them
+    passed: poses at the `frames` - 1 moments of the last action that precede its end
     substeps: number of physics steps per action
     chance: random streams of the worlds, set whenever the worlds are seeded
     varied: names of geoms whose size, colour or material differs between worlds, with the materials that they may have

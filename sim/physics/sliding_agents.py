@@ -154,8 +154,11 @@ class SlidingAgents:
         return broken
 
     def _between(self, before: WorldState, after: WorldState, share: float, broken: list[int]) -> Poses:
-        """Return the poses when this share of the action has passed. The heading changes when an action begins.
+        """Return the poses at a moment between the beginning and the end of an action.
 
+        The heading changes when the action begins.
+
+        share: elapsed fraction of the action
         broken: worlds whose physics broke down; their poses are already those after the action
         """
         assert self.motion is not None

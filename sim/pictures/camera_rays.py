@@ -1,9 +1,9 @@
 """The rays of an image as one frozen Dr.Jit kernel, and the direct light along them.
 
 A ray is specified by a whole number: 8 times the number of its pixel, plus the number of its sample within the pixel.
-Every light is sampled once per ray, whereas Mitsuba's `direct` draws one of them at random. Points and directional
-lights therefore cause no noise. Skies and glowing geoms cause noise, but the samples of a pixel are fixed, so the noise
-is the same in every frame.
+Every light is sampled once per ray, whereas Mitsuba's `direct` draws one of them at random. Point lights and
+directional lights therefore cause no noise. Skies and glowing geoms cause noise, but the samples of a pixel are fixed,
+so the noise is the same in every frame.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ SRGB = np.array(  # linear sRGB per radiance at these wavelengths, (3, wavelengt
 # A pixel's samples, relative to its middle [pixels], which is the first sample. If a pixel is divided into five rows
 # and five columns, no two samples are in the same row or column.
 SAMPLES = np.array([[0, 0], [0.2, 0.4], [0.4, -0.2], [-0.2, -0.4], [-0.4, 0.2]])
-CODES = 8  # codes per pixel
+CODES = 8  # numbers of rays that are reserved for each pixel
 NESTED = 64  # largest number of nested bodies that may enclose a camera
 # Rays of a packet go through neighbouring pixels, and then towards one sun, so Embree traverses its tree once for all.
 COHERENT = True
 WANTED = int(mi.RayFlags.UV) | int(mi.RayFlags.ShadingFrame)  # properties of hits; textures need no derivatives
-_VIEW = 5  # rows of four floats of a view: position, columns of the rotation, (half, near, width, height)
+_VIEW = 5  # rows of four floats: position, columns of the rotation, (tan(fovy / 2), near, width, height)
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class RayLight:
 class CameraInputs:
     """Inputs of kernels that are the same for every image of a mirror.
 
-    samples: positions within a pixel, in twos [pixels]
-    weights: irradiance from each directional light, in fours
+    samples: positions of the samples relative to a pixel's middle [pixels], two floats each
+    weights: irradiance from each directional light, four floats each (one per wavelength)
     closed: for each shape, True if a camera inside it sees through it
     bsdfs: not used by the kernel; a recording includes textures only if their BSDFs are among the inputs
     """
@@ -106,7 +106,10 @@ class CameraRays:
             self._inside: Any = dr.freeze(lambda *args: self._trace(True, *args), enabled=may_record)
 
     def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
-        """Return the light along rays of an image of size (height, width)."""
+        """Return the light along rays of an image of size (height, width).
+
+        codes: numbers of the rays, see the module's docstring, (ray,)
+        """
         traced = self._inside if self.mirror.surrounds(view.position) else self._outside
         suns = {k: self.mirror.towards(name, view) for k, name in self._suns.items()}
         with variant(self.mirror.variant), garbage_kept():
@@ -150,7 +153,7 @@ class CameraRays:
                 drawn = mi.Point2f(mi.sample_tea_float32(codes, 2 * k), mi.sample_tea_float32(codes, 2 * k + 1))
                 sample, weight = light.sample_direction(si, drawn, valid)
                 towards, reaches, shadow = sample.d, valid & (sample.pdf != 0), si.spawn_ray_to(sample.p)
-            # New arrays, because Dr.Jit's `&=` would change the array of both names.
+            # `reaches & ...` creates a new array. Dr.Jit's `&=` would also change `valid`, which may be the same array.
             if reflected is not None:
                 value = reflected * dr.abs(dr.dot(si.sh_frame.n, towards))
                 reaches = reaches & (dr.dot(si.n, towards) * seen_from > 0)
@@ -172,7 +175,7 @@ def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Ar
         return out & (dr.gather(mi.UInt32, closed, shape, out) == 1)
 
     def further(si: Array, ray: Array, turn: Array) -> tuple[Array, ...]:
-        # As in `sim.scene.rays`, the step is along the ray only.
+        # As in `sim.scene.rays`, the origin moves along the ray only, not sideways like Mitsuba's `spawn_ray`.
         step = si.t * (1 + 1e-5) + 4e-6 * (1 + dr.max(dr.abs(ray.o)))
         next_ray = mi.Ray3f(ray(step), ray.d)
         return scene.ray_intersect(next_ray, WANTED, COHERENT), next_ray, turn + 1
@@ -214,7 +217,7 @@ def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarra
 def _pose(
     view: Viewpoint, size: tuple[int, int], near: float, suns: Mapping[int, np.ndarray], n_lights: int
 ) -> np.ndarray:
-    """Return all numbers that change between frames, in rows of four."""
+    """Return the view and the directions to suns, which change between frames, in rows of four floats, flat."""
     rows = aligned(4 * (_VIEW + n_lights), np.float32).reshape(-1, 4)
     rows[0, :3], rows[1:4, :3] = view.position, view.rotation.T
     rows[4] = np.tan(np.radians(view.fovy_deg) / 2), near, size[1], size[0]
@@ -224,7 +227,7 @@ def _pose(
 
 
 def _closed(mirror: MergedMirror) -> np.ndarray:
-    """Return, in the order of the shapes' ids, whether a camera inside a shape sees through it."""
+    """Return for each shape id 1 if a camera inside the shape sees through it, otherwise 0, (id,) uint32."""
     names = mirror.shape_names
     return np.array([names.get(i, "") in mirror.closed for i in range(max(names) + 1)], np.uint32)
 

@@ -43,7 +43,7 @@ def with_eyes(
 
 
 def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: float) -> np.ndarray | None:
-    """Return a point's (x, y) in an image; None behind the camera."""
+    """Return the position (x, y) of a point in an image [pixels]; None if it is behind the camera."""
     right, up, back = (point - view.position) @ view.rotation
     if -back < NEAREST * reach:
         return None
@@ -52,7 +52,7 @@ def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: flo
 
 
 def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distance of the pixels' centres from a line [pixels], (y, x)."""
+    """Return the distances of the pixels' centres from a line segment [pixels], (y, x)."""
     y, x = np.indices(size) + 0.5
     along = end - start
     length = float(along @ along)
@@ -62,6 +62,11 @@ def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarra
 
 
 def _paint(shown: np.ndarray, off: np.ndarray, radius: float, color: np.ndarray) -> None:
-    """Paint a line or dot into an image, with smooth edges. off: distance of the pixels' centres from it [pixels]"""
+    """Paint a line or dot into an image, with smooth edges.
+
+    shown: the image (y, x, 3), changed in place
+    off: distances of the pixels' centres from the line or dot [pixels], (y, x)
+    radius: radius of the dot, or half the width of the line [pixels]
+    """
     opacity = OPACITY * np.clip(radius + 0.5 - off, 0, 1)[..., None]
     shown += opacity * (color - shown)

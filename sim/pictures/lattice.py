@@ -48,11 +48,11 @@ class Lattice:
         return Lattice(size, pixels, nearest.ravel(), pairs)
 
     def between(self, differ: np.ndarray) -> np.ndarray:
-        """Return the indices of pixels outside the lattice that are near an edge of the image.
+        """Return the indices of pixels outside the lattice that may lie on an edge.
 
-        An edge is where the nearest pixel of the lattice differs from a neighbour in the lattice.
+        Such a pixel's nearest lattice pixel differs in colour from one of its neighbours in the lattice.
 
-        differ: True for pairs of neighbours that differ, (m,)
+        differ: True for the pairs of neighbours whose colours differ, (m,)
         """
         rough = np.zeros(len(self.pixels), bool)
         rough[self.pairs[:, differ]] = True
@@ -62,7 +62,7 @@ class Lattice:
 
 
 def _shifted(place: np.ndarray, dx: int, dy: int) -> np.ndarray:
-    """Return place at (x + dx, y + dy); -1 beyond the border."""
+    """Return the array whose entry (y, x) is place[y + dy, x + dx], or -1 beyond the border."""
     height, width = place.shape
     padded = np.pad(place, 1, constant_values=-1)
     return padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]

@@ -33,7 +33,7 @@ Progress = Callable[[float], None]
 
 
 def read_photograph(path: str | Path) -> np.ndarray:
-    """Read an image file as sRGB values (y, x, 3) in [0, 1], upright as its EXIF orientation says.
+    """Read an image file as sRGB values (y, x, 3) in [0, 1], rotated according to its EXIF orientation.
 
     Raises:
         ValueError: the file is no image, is damaged or too large, has one channel, or has transparent pixels.
@@ -186,7 +186,12 @@ def _field(animal: str, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def _by_angle(plane: np.ndarray, width: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """Return the radiance (y, x) as a function of angles [rad] to the right and up. The edges continue outside."""
+    """Return a function that interpolates the radiance `plane` (y, x) at angles [rad] to the right and up.
+
+    Outside the photograph, it returns the values at the edges.
+
+    width: angular width of the photograph [rad]
+    """
     from scipy.ndimage import map_coordinates
 
     per_tangent = plane.shape[1] / (2 * math.tan(width / 2))
@@ -223,7 +228,7 @@ def _camera(
 
 
 def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the means of the photograph over cells, (y, x, 3)."""
+    """Return the means of a photograph over the cells of a grid of this size, (y, x, 3)."""
     from PIL import Image
 
     planes = [Image.fromarray(plane.astype(np.float32)) for plane in np.moveaxis(linear, -1, 0)]
@@ -231,7 +236,10 @@ def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def _nearest(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distance in the middle of each cell (y, x). Means would lie between the distances of two surfaces."""
+    """Return the distance in the middle of each cell of a grid of this size, (y, x).
+
+    Means over cells would lie between the distances of two surfaces.
+    """
     rows, columns = (
         ((np.arange(wanted) + 0.5) * known / wanted).astype(int)
         for wanted, known in zip(size, depth.shape, strict=True)

@@ -28,7 +28,7 @@ from sim.tracing.areas.patch import Area
 class BorderInputs:
     """Horizontal directions to the borders between columns of areas.
 
-    lanes: numbers of the borders of all eyes
+    lanes: index of each border of each eye
     sizes: number of borders of an eye, and number of eyes
     along: directions to the borders
     sides: numbers of each area's left and right border
@@ -45,7 +45,7 @@ class AreaInputs(KernelInputs):
     """Inputs of an area kernel that are the same in every call, in addition to `KernelInputs`.
 
     extent: width and height of areas on the tangent plane
-    borders: None: areas share no borders
+    borders: directions to the borders that areas share; None: areas share no borders
     places: numbers of the points on the bodies of all worlds at which illumination is computed; None: bodies reflect no
         light onto other surfaces
     """
@@ -111,7 +111,7 @@ class AreaKernel(RayKernel):
         return self._areas.radiance(area, met, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
-        """Return the fraction of each light that reaches each point of each world's bodies, flat (world, point)."""
+        """Return the fractions of the lights that reach each point on the bodies of each world, flat (world, point)."""
         if inputs.places is None:
             return []
         world = inputs.places // self._areas.places

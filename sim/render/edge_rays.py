@@ -76,7 +76,9 @@ class EdgeRays:
         return light.ravel()
 
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
-        """Return the receptors, flat, that differ strongly from a neighbour. An edge may pass between their first rays.
+        """Return a mask of the receptors that differ strongly from a neighbour, flat (view, receptor).
+
+        An edge may pass between the first rays of such receptors.
 
         light: (component, view, receptor or square beyond the rim)
         """
@@ -122,7 +124,7 @@ def _sums(components: list[Array], rays: int) -> tuple[Array, ...]:
 def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
     """Return whether adaptive edge sampling is likely to save rays.
 
-    The first rays, including those beyond the rim, must be at most half of the rays without adaptive sampling. With
-    more first rays, nothing would be saved once a few receptors need all rays.
+    The first rays, including those beyond the rim of the retina, must be at most half of the rays without adaptive
+    sampling. With more first rays, nothing would be saved once a few receptors need all rays.
     """
     return 2 * FIRST * beyond_rim_of(resolution).size <= rays * resolution[0] * resolution[1]

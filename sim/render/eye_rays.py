@@ -58,7 +58,7 @@ class EyeRays(Protocol):
         """Write the eyes of these worlds to the kernel's buffer."""
 
     def array(self) -> Array:
-        """Return the array that the kernel reads."""
+        """Return the buffer of the eyes on the device, which the kernel reads."""
 
     def directions(self, ways: np.ndarray, origins: np.ndarray | None = None) -> Directions:
         """Return the directions of samples (ray, 3), given in an eye's frame.

@@ -50,7 +50,7 @@ class EyeRenderer:
     fidelity: samples, depth layers and light; its number of bands must equal that of the scene
     eye, mounts, model: the scene's eye, mounts and model
     sensor: the sampled directions
-    tracer: the method of tracing rays, with its name, why, light and basis
+    tracer: the method of tracing rays, see `sim.tracing.tracer.Tracer`
     brightest: signal of a white surface that faces all directional lights at once, or of veiling light if it is larger
 
     One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
@@ -157,7 +157,8 @@ class EyeRenderer:
     def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
         """Start rendering only some of the worlds; the signals are (len(worlds), eye, channel, height, width).
 
-        Up to FEW worlds are rendered in separate buffers, while a frame of all worlds may be pending.
+        Up to FEW worlds are rendered in separate buffers, so that a frame of all worlds may be pending at the same
+        time.
         """
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
@@ -167,7 +168,7 @@ class EyeRenderer:
 
     @cached_property
     def _few(self) -> Self:
-        """Renderer of a few of the worlds."""
+        """Renderer of FEW worlds with the same eyes, for `launch_some`."""
         return self.resized(FEW)
 
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
@@ -273,14 +274,14 @@ class EyeRenderer:
 
     @cached_property
     def _has_components(self) -> bool:
-        """True if the components of light are not the bands."""
+        """True if light is traced in components other than the bands."""
         return not np.array_equal(self.tracer.basis, np.eye(self.eye.bands))
 
     @cached_property
     def _sums_of_bands(self) -> Any:
-        """Function that returns signals from light in bands."""
+        """Function that maps light in the bands to signals, see `sim.eyes.receptor_sums`."""
         return self.sensor.receptor_sums(self._mixing, np.eye(self.eye.bands))
 
     def _components(self, found: np.ndarray) -> np.ndarray:
-        """Return a kernel's output as (layer, component, n). n counts the rays of all views, or their sums."""
+        """Return a kernel's flat output as (layer, component, n), with n rays of all views, or n sums over rays."""
         return found.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)

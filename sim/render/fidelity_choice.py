@@ -60,7 +60,7 @@ class Allowed:
 class Shares:
     """Fractions of the tolerance that the stages before the samples may use.
 
-    Squares of errors add up. The samples may use the rest.
+    The squares of the errors of all stages add up. The samples may use the remainder.
     """
 
     bands: float
@@ -68,7 +68,9 @@ class Shares:
     light: float
 
     def left(self, allowed: float, has_layers: bool, light: float) -> Allowed:
-        """Return the rest of an allowed error, which the samples may use.
+        """Return the remainder of an allowed error, which the samples may use.
+
+        allowed: allowed error of all stages together
 
         has_layers: True if the eye has depth layers
         light: error due to the omitted light
@@ -118,7 +120,7 @@ def cheapest(stages: Stages) -> Fidelity:
     levels = [level for level in (stages.bands(), depth_level, samples.light, samples.level) if level is not None]
     bands = stages.eye.bands
     found = Fidelity(samples.number, bands, depth, allowed, tuple(levels), samples.light.level, samples.kind)
-    # The bands are omitted: only an upper bound on their error is known, which may be much larger than the error.
+    # The error of the bands is not included: only an upper bound is known, which may be much larger than the error.
     _warn_if_worse(levels[1:], allowed, together=shares is not None)
     return found
 

@@ -84,14 +84,14 @@ class FidelityTrials:
             errors = []
             for p, truth in zip(populations, truths[level], strict=True):
                 trial = sampling.trial(rays_per_receptor, p.receptors)
-                size = len(trial.directions) * len(truth)  # at most the reference's views
+                size = len(trial.directions) * len(truth)  # limits the trial to the views of its reference
                 errors.append(p.rms(self._signals(trial, sampling.depth, light, p.views, size) - truth))
             return max(errors)
 
         return error
 
     def have_areas(self, *lights: str) -> bool:
-        """Return whether area sampling is possible in this world for all of these parts of the light."""
+        """Return whether area sampling is possible in this world for all of these levels of light."""
         if self._eye.lattice is not None:
             return False
         try:
@@ -102,7 +102,10 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """Return the same function for areas per receptor. Its errors include the noise of the reference."""
+        """Return a function that maps areas per receptor to errors, see `errors`.
+
+        The errors include the noise of the reference.
+        """
         populations = self._populations(sampling)
         truths = [
             self._signals(self._truth(sampling, p.receptors), sampling.depth, light, p.views, TRUE_RAYS)
@@ -120,7 +123,7 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether receptors that share areas, with this number per receptor, still have different signals."""
+        """Return whether neighbouring receptors have different signals if this number of areas is used per receptor."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:
@@ -129,7 +132,7 @@ class FidelityTrials:
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
     def _truth(self, sampling: EyeSampling, receptors: np.ndarray) -> Trial:
-        """Return the reference's rays for areas. Behind a pupil, the rays are drawn for these receptors only."""
+        """Return many rays as a reference for areas. Behind a pupil, they are drawn for these receptors only."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
             return sampling.trial(int(np.clip(of_a_view // len(receptors), *TRUE_AREA)), receptors)
@@ -188,9 +191,13 @@ class FidelityTrials:
     def _signals(
         self, trial: Trial, depth: DepthLayers, light: str, views: RandomViews | None = None, most: int = RAYS
     ) -> np.ndarray:
-        """Return signals (view, channel, receptor) in the first views.
+        """Return signals (view, channel, receptor) in as many of the views as the number of rays allows.
 
-        most: largest number of rays, which limits the number of views
+        trial: samples of each eye, and their weights
+        depth: layers among which light is divided
+        light: level of light
+        views: None: the views of the trials
+        most: largest number of rays in all views together
         """
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
@@ -206,8 +213,11 @@ class FidelityTrials:
         return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
 
     def _factors(self, light: str, trial: Trial) -> np.ndarray:
-        """Return factors mixing[c, b] basis[k, b], (channel, component, band), of signals_c = sum_b mixing[c, b] sum_l
-        sum_k basis[k, b] sum_p W_lb[r, p] light_lk[p]."""
+        """Return the contribution of a component k in band b to channel c: mixing[c, b] basis[k, b].
+
+        The shape is (channel, component, band). With weights W of ray p, receptor r and depth layer l, the signals are
+        signal_c[r] = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p] light_lk[p].
+        """
         basis = (self._scene.areas if trial.extent else self._scene.tracers.tracer_for)(light).basis
         return self._eye.aperture_throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
 
@@ -237,8 +247,10 @@ class FidelityTrials:
         return tracer.body_light(place, [_points(b, tracer.places) for b in bodies], tracer.inputs)
 
     def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Array], Array]:
-        """Return the components of light along a trial's rays of each view's eye, and the distance to the visible
-        surface along the eye's axis [m]: Dr.Jit, flat (view, ray)."""
+        """Return the components of light along a trial's rays, and the depth of the visible surface [m].
+
+        All are Dr.Jit arrays, flat (view, ray). The depth is measured along the axis of each view's eye.
+        """
         origins, world = views.in_agents(self._eyes, trial.directions)
         rays, tracer = len(trial.directions), self._scene.tracers.tracer_for(light)
         with variant(self._scene.variant):
@@ -259,7 +271,7 @@ class FidelityTrials:
 
 
 def _in_fours(trial: Trial) -> np.ndarray:
-    """Return bounce samples, and the same number of samples for a second reflection."""
+    """Return four numbers per ray: its bounce sample, and a sample for a second reflection, (ray, 4)."""
     return np.concatenate([trial.bounce_samples, np.random.default_rng(SECOND).random(trial.bounce_samples.shape)], 1)
 
 
@@ -268,5 +280,5 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _points(points: np.ndarray, rays: int) -> Array:
-    """Return points that are the same for all rays of a view."""
+    """Return the points (view, 3) on the device, repeated for all rays of each view (Point3f)."""
     return mi.Point3f([floats(np.repeat(column, rays)) for column in points.T])

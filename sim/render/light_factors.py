@@ -9,7 +9,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LightFactors:
-    """Factors by which all lights of each world are multiplied. bands: one per band and world, (env, band) float32."""
+    """Factors by which all lights of each world are multiplied.
+
+    bands: factors in each band, (env, band) float32
+    """
 
     bands: np.ndarray
 
@@ -31,7 +34,7 @@ class LightFactors:
 
     @property
     def level(self) -> np.ndarray:
-        """Factors for signals of the shape (env, eye, channel, height, width)."""
+        """Common factor of all bands in each world, in the shape of signals (env, eye, channel, height, width)."""
         return self.bands[:, :1, None, None, None]
 
     def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:

@@ -30,8 +30,8 @@ class Demand:
     worlds: number of worlds
     eyes: number of eyes of one agent
     resolution: receptors (height, width) of an eye
-    planes: components of light times depth layers, along every ray
-    weights: planes of weights behind a pupil (bands times depth layers); 0 without a pupil
+    planes: number of components of light times number of depth layers, which are stored for every ray
+    weights: number of bands times number of depth layers, for each of which weights are stored; 0 without a pupil
     """
 
     rays_per_receptor: float
@@ -120,6 +120,6 @@ def _of_files(statistics: Path, prefix: str) -> int:
 
 
 def _rounded_down(value: float) -> float:
-    """Round down to two digits."""
+    """Round down to two significant digits."""
     digit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return math.floor(value / digit) * digit

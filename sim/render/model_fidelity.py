@@ -115,7 +115,7 @@ class ModelStages:
         self._cached_signals = cache(self._signals)
 
     def _signals(self, rays: float, light: str) -> np.ndarray:
-        """Return the signals at the moments, without noise."""
+        """Return the noise-free signals at all moments, with this number of rays and this level of light."""
         fidelity = _with(rays, self.eye, self.allowed, light)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MirrorWarning)  # the final renderer repeats the warnings
@@ -153,7 +153,10 @@ class ModelStages:
 
 
 def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Level:
-    """Return the level of light. truth: function that maps "direct" or "bounce" to signals with many rays"""
+    """Return the level of light: the requested one or, for "auto", the one that the allowed error requires.
+
+    truth: function that returns signals with many rays in "direct" or "bounce" light
+    """
     if asked != AUTO:
         return Level("light", asked, None, "as requested")
     off = np.abs(truth(lighting.BOUNCE) - truth(lighting.DIRECT)).max(axis=2)
@@ -204,5 +207,5 @@ def _is_perfect(eye: WorldEye) -> bool:
 
 
 def _shares_rays(eye: WorldEye) -> bool:
-    """Return whether the receptors share all rays: behind a pupil. Ommatidia and squares have their own rays."""
+    """Return whether receptors share all rays, as they do behind a pupil; ommatidia have their own rays."""
     return isinstance(eye, optics.Eye) and eye.pupil is not None

@@ -44,7 +44,10 @@ def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarr
 
 
 def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> np.ndarray:
-    """Return the viewing direction of a receptor's centre, (3,). axis: axis of the eye, (3,). Row 0 is at the top."""
+    """Return the viewing direction of a receptor's centre, (3,); row 0 is at the top.
+
+    axis: optical axis of the eye, (3,)
+    """
     height, width = eyes.resolution
     right, up = np.array([axis[1], -axis[0], 0]), np.array([0, 0, 1])
     across = np.tan(np.radians(eyes.fov_deg) / 2) * ((2 * column + 1) / width - 1)
@@ -54,7 +57,10 @@ def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> n
 
 
 def radiance(scene: MitsubaObject, ray: Array, wavelengths_nm: np.ndarray) -> np.ndarray:
-    """Return the radiance along a ray, ρ/π sum_l E_l cos θ_l over all unobstructed lamps l, (band,)."""
+    """Return the radiance along a ray, ρ/π sum_l E_l cos θ_l over all unobstructed lamps l, (band,).
+
+    ρ is the reflectance of the surface, E_l the irradiance from lamp l, and θ_l its angle of incidence.
+    """
     hit, total = scene.ray_intersect(ray), np.zeros(len(wavelengths_nm))
     for b, wavelength in enumerate(wavelengths_nm if hit.is_valid() else ()):
         hit.wavelengths = mi.Spectrum(float(wavelength))
@@ -67,5 +73,5 @@ def radiance(scene: MitsubaObject, ray: Array, wavelengths_nm: np.ndarray) -> np
 
 
 def cosine(normal: Array, towards: Array) -> float:
-    """Return Lambert's cosine. A surface that is turned away from a lamp receives no light from it."""
+    """Return the cosine of the angle between a normal and the direction towards a lamp, but at least 0."""
     return max(0.0, float(np.dot(np.ravel(normal), np.ravel(towards))))

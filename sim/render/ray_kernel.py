@@ -32,7 +32,7 @@ SECOND = 3  # seed of the samples for a second reflection
 class KernelInputs:
     """Inputs of a kernel that are the same in every call.
 
-    lanes: numbers of the lanes
+    lanes: index of each lane
     sizes: number of samples of an eye, number of eyes of a world, and number of lanes
     along: directions of the samples
     tables: the tracer's inputs
@@ -63,12 +63,12 @@ class Moving:
         self._eyes, self._things = eyes, things
 
     def fill(self, poses: Poses) -> None:
-        """Write the eyes and the rows of these worlds."""
+        """Write the eyes and the tracer's rows of these worlds to the buffers."""
         self._eyes.fill(poses)
         self._things.fill(poses)
 
     def frame(self) -> Frame:
-        """Return the inputs on the device."""
+        """Return the buffers as arrays on the device."""
         return Frame(self._eyes.array(), self._things.arrays())
 
 

@@ -102,7 +102,11 @@ class _Kernel:
     def launch(
         self, keys: np.ndarray, frames: np.ndarray, frame_of: Callable[[list[Array]], np.ndarray]
     ) -> PendingFrame:
-        """Start drawing with these keys. frame_of: function that converts the device's arrays to the frame's values"""
+        """Start drawing normal numbers.
+
+        keys, frames: key and frame number of each world
+        frame_of: function that converts the arrays on the device to the values of the frame
+        """
 
         def launch() -> Callable[[], np.ndarray]:
             self._keys.values[:], self._frames.values[:] = keys, frames
@@ -133,7 +137,9 @@ class NoiseModel:
         return cls(eye.noise_sigma, photons.astype(np.float32))
 
     def in_frames(self, share: float) -> tuple[NoiseModel | None, NoiseModel | None]:
-        """Return the shot noise of a frame that lasts this share of the integration time, and the remaining noise.
+        """Return the shot noise of a frame that lasts a part of the integration time, and the remaining noise.
+
+        share: duration of the frame, as a fraction of the integration time
 
         Receptors with dynamics sum the photons of their frames. Only the shot noise passes their filters.
         """

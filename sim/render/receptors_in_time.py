@@ -37,7 +37,7 @@ class ReceptorsInTime:
         self._low, self._delayed = slice(0, low), slice(low, low + self._delay)
         self._others = (
             low + self._delay
-        )  # mean for adaptation, or reference and count of events; then the motion's mean
+        )  # first the adaptation's mean, or the events' reference and count; then the mean of the motion detectors
         self._moved = self._others + (2 if dynamics.event_threshold else int(dynamics.adaptation != "none"))
         self.state = np.zeros((n, self._moved + int(dynamics.motion != "none"), *shape), np.float32)
         self._before = self.state.copy()

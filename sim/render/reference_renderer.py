@@ -73,7 +73,7 @@ class ReferenceRenderer:
         self._has_depth = depths is not None
         z: Any = np.array(depths) if depths else math.inf
         sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
-        self.sight = replace(sight, parallax=0.0)  # rays of renderers pass the middle of the pupil, so edges hide none
+        self.sight = replace(sight, parallax=0.0)  # rays only pass the middle of the pupil, where there is no parallax
         self._data = mujoco.MjData(world.model)
         spectra, off = lights_in_bands(world.model, world.spectra, self.eye.spectral_bands, self.eye.receptors)
         for words in off:

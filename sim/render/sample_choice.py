@@ -68,8 +68,10 @@ def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, 
 
 
 def _left(light: Level, allowed: Allowed) -> float:
-    """Return the part of the allowed error that omitted light leaves. If nothing is left, no number of rays is
-    enough."""
+    """Return the part of the allowed error that remains for the samples, because omitted light uses the rest.
+
+    If nothing remains, the result is so small that no number of rays is enough.
+    """
     left_out = light.predicted_error or 0
     return math.sqrt(max(allowed.without_light**2 - left_out**2, (1e-6 * allowed.without_light) ** 2))
 

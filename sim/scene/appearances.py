@@ -41,14 +41,17 @@ class Appearance:
 
     @property
     def alpha(self) -> float:
-        """Opacity."""
+        """Opacity of the geom, from 0 (invisible) to 1."""
         return float(surfaces.rgba(self.model, self.geom)[3])
 
 
 def appearances_of(
     model: mujoco.MjModel, geoms: Sequence[int], materials: Mapping[int, Sequence[int]]
 ) -> list[Appearance]:
-    """Return all visible appearances of these geoms; materials: ids of the materials that may be drawn, by geom."""
+    """Return all visible appearances of these geoms.
+
+    materials: ids of the materials that may be drawn for a geom, by its id
+    """
     found = []
     for geom in geoms:
         if geom in materials:

@@ -93,7 +93,7 @@ def matt_white(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None
 
 
 def has_gloss(model: mujoco.MjModel, material: int) -> bool:
-    """Return whether a material is more than Lambertian."""
+    """Return whether a material has gloss, so that it is not Lambertian."""
     if model.mat_metallic[material] >= 0 or model.mat_roughness[material] >= 0:
         return True
     specular, shininess = float(model.mat_specular[material]), float(model.mat_shininess[material])

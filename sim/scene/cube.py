@@ -28,7 +28,10 @@ _HALVINGS = 12
 
 
 def padded(pixels: np.ndarray) -> np.ndarray:
-    """Return faces, stacked vertically (n w, w, 3), with a border around each: (n (w + 2), w + 2, 3)."""
+    """Return the image of a cube texture with a border around each of its n faces, (n (w + 2), w + 2, 3).
+
+    pixels: the n square faces of width w, stacked vertically, (n w, w, 3)
+    """
     width = pixels.shape[1]
     faces = pixels.reshape(-1, width, width, 3)
     margin = (BORDER, BORDER)
@@ -66,7 +69,7 @@ def laid(triangles: Triangles, towards: np.ndarray, width: int, n_faces: int) ->
     """Return the triangles, cut along the seams, with texture coordinates in the padded image.
 
     towards: directions of the vertices, (n, 3)
-    width: texels of a face
+    width: width of a face in texels
     n_faces: 6, or 1 if all sides share a face
     """
     corners = np.concatenate([triangles.vertices, towards], axis=1)

@@ -23,7 +23,7 @@ _NAMED = 4  # largest number of elements of one kind that a message names; it on
 
 
 def left_out(model: mujoco.MjModel, geoms: Sequence[int], groups: Sequence[int]) -> list[str]:
-    """Return messages about features without a counterpart.
+    """Return messages about features that have no counterpart in a model's mirror.
 
     They may belong to the visible geoms, to their materials, or to other elements that MuJoCo draws in these groups.
     """

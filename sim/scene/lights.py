@@ -192,7 +192,7 @@ def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: S
 
 
 def _profile(cutoff_deg: float, exponent: float) -> Description:
-    """Return cosᵉ of the angle from a spot's axis, as the image that it projects over its cone."""
+    """Return the image that a spot projects over its cone: cos(θ)**exponent at the angle θ to its axis."""
     tangent = np.tan(np.radians(cutoff_deg)) * (2 * (np.arange(_PROFILE) + 0.5) / _PROFILE - 1)
     cosine = 1 / np.sqrt(1 + tangent[:, None] ** 2 + tangent[None, :] ** 2)
     bitmap = mi.Bitmap(np.ascontiguousarray(cosine**exponent, dtype=np.float32)[..., None])

@@ -228,7 +228,7 @@ class Mirror:
         return lights.glow(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
 
     def _bsdf(self, geom: int, mirrors: bool = True) -> MitsubaObject:
-        """Return a BSDF object, shared by all geoms of the same appearance."""
+        """Return the BSDF of a geom; geoms of the same appearance share one object."""
         to_uv = shapes.uv_transform(self.model, geom)
         key = (
             self.model.geom_matid[geom],

@@ -108,7 +108,7 @@ class ModelSnapshot:
         return f"{kind} {getattr(self._model, kind)(index).name or str(index)!r}"
 
     def _differing(self, poses: Poses, name: str) -> list[int]:
-        """Return the ids of elements that differ in any world."""
+        """Return the ids of the elements whose field `name` of `Poses` differs from the model's in any world."""
         own, here = self._own[name], getattr(poses, name)
         if here is None:
             return []

@@ -21,5 +21,5 @@ class PoseSnapshot:
 
     @classmethod
     def from_data(cls, data: mujoco.MjData) -> PoseSnapshot:
-        """Copy the current values."""
+        """Return copies of the current poses."""
         return cls(**{field.name: getattr(data, field.name).copy() for field in fields(cls)})

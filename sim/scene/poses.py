@@ -118,7 +118,7 @@ class Poses:
         return self.geom_xmat[:, geoms]
 
     def take(self, worlds: np.ndarray) -> Poses:
-        """Return only these worlds."""
+        """Return the poses of these worlds only."""
         arrays: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         taken: dict[str, Any] = {name: None if array is None else array[worlds] for name, array in arrays.items()}
         return Poses(**taken)
@@ -130,7 +130,7 @@ class Poses:
 
 
 def of_models(models: Sequence[mujoco.MjModel], name: str) -> np.ndarray:
-    """Return one of OF_MODELS from the current state of these models, (world, ...)."""
+    """Return the field `name`, one of OF_MODELS, from the current state of these models, (world, ...)."""
     if all(model is models[0] for model in models):
         field = of_model(models[0], name).copy()  # copied, since the model may be changed later
         return np.broadcast_to(field, (len(models), *field.shape))
@@ -138,7 +138,7 @@ def of_models(models: Sequence[mujoco.MjModel], name: str) -> np.ndarray:
 
 
 def of_model(model: mujoco.MjModel, name: str) -> np.ndarray:
-    """Return one of OF_MODELS from the current state of a model."""
+    """Return the field `name`, one of OF_MODELS, from the current state of a model."""
     if name == "heights":
         return _heights(model)
     if name == "others":

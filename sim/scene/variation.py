@@ -92,14 +92,17 @@ class Variation:
         return found
 
     def blank(self, n: int) -> dict[str, np.ndarray]:
-        """Return arrays for drawn values, by name: (n,) or (n, 3), numbers or names."""
+        """Return arrays for the drawn values of n worlds, by name: numbers (n,) or (n, 3), or names (n,)."""
         return {
             name: np.array(given)[np.zeros(n, int)] if kind_of(name) == MATERIAL else np.ones((n, *np.shape(given[0])))
             for name, given in self.ranges.items()
         }
 
     def of_things(self, what: str) -> dict[str, str]:
-        """Return the names of ranges by the names of their objects; what: one of OF_THINGS."""
+        """Return the names of the ranges of one quantity, by the names of the objects.
+
+        what: the quantity, one of OF_THINGS
+        """
         return {name.rpartition(".")[0]: name for name in self.ranges if kind_of(name) == what}
 
     @property
@@ -109,7 +112,7 @@ class Variation:
 
     @property
     def of_appearances(self) -> bool:
-        """True if sizes, colours or materials differ."""
+        """True if sizes, colours or materials differ between episodes."""
         return any(kind_of(name) in (SIZE, COLOR, MATERIAL) for name in self.ranges)
 
     def light(self, values: Mapping[str, np.ndarray], wavelengths: np.ndarray) -> np.ndarray | None:
@@ -189,7 +192,7 @@ def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
-    """Return the ratio of Planck's spectra, whose common factor λ⁻⁵ cancels."""
+    """Return the ratio of the Planck spectra at `kelvins` and at DAYLIGHT, (band,)."""
     x = h * c / (k * np.asarray(wavelengths))
     found: np.ndarray = np.expm1(x / DAYLIGHT) / np.expm1(x / kelvins)
     return found

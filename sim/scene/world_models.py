@@ -126,12 +126,12 @@ class WorldModels:
             getattr(data, where)[address] = drawn[name]
 
     def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
-        """Return the ids of materials, by name."""
+        """Return the ids of the materials that may be drawn for a geom, by the names of the materials."""
         assert variation is not None
         if geom in self._colors:
             raise ValueError(f"vary: {name} and {self._colors[geom]}: must be one of them; materials have colours")
         if not np.array_equal(self.model.geom_rgba[geom], surfaces.UNSET_RGBA):
-            raise ValueError(f"vary: {name}: the geom's own rgba takes the place of its materials': must have none")
+            raise ValueError(f"vary: {name}: the geom's own rgba replaces the colours of its materials: must have none")
         return {each: material_of(self.model, each, f"vary: {name}") for each in variation.ranges[name]}
 
     def _prepare_sizes(self, given: Any) -> None:

@@ -144,7 +144,7 @@ class BatchTask(TaskSettings):
         return Outcome(RewardTerms(list(terms), stacked), terminated, success, failure)
 
     def first_info(self, worlds: Any, chosen: np.ndarray) -> Sequence[Mapping[str, Any]] | None:
-        """Return additional entries of `info` at the start of an episode, for each chosen world, or None."""
+        """Return additional entries of `info` at the start of an episode for each chosen world; None: no additions."""
         return None
 
     def commands(self) -> tuple[Command, ...]:

@@ -23,6 +23,9 @@ def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: 
     Every object moves at SPEED, and its heading drifts randomly. A step must not lead out of `bounds` (x_min, y_min,
     x_max, y_max), nor to a point closer than SEPARATION to the present or next position of another object. If a step
     would break these rules, the object stays at its position and turns to a random heading.
+
+    chance: random numbers for drift and turns
+    seconds: duration of an action [s]
     """
     drift, turn = chance.next(state.objects.shape[1])
     heading = wrap_angle(state.object_heading + TURN * drift)

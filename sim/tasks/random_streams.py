@@ -140,8 +140,7 @@ class MotionNoise:
         """Restore the state of these worlds from the return value of `get_state`.
 
         Raises:
-            ValueError: not all worlds are restored, and the number of remaining numbers differs from that of the other
-                worlds.
+            ValueError: only some worlds are restored, and they have fewer or more numbers left than the other worlds.
         """
         _set_states(self._generators, state["motion"], worlds)
         ahead = np.asarray(state["motion_ahead"])
@@ -150,7 +149,9 @@ class MotionNoise:
             self._drawn = np.ascontiguousarray(np.transpose(ahead[:, AHEAD - left :], (1, 2, 0, 3)))
             return
         if left != len(self._drawn):
-            raise ValueError("state: objects are at another action than elsewhere: must be set for all worlds at once")
+            raise ValueError(
+                "state: objects of other worlds have moved another number of times: must be set for all worlds at once"
+            )
         self._drawn[:, :, worlds] = np.transpose(ahead[worlds, AHEAD - left :], (1, 2, 0, 3))
 
 

@@ -73,7 +73,7 @@ class Simulation:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Start an episode in one world, which shows the proprioception and whether the task changes the model."""
+        """Start an episode in one world to find the shapes of proprioception and whether the task changes the model."""
         first = np.zeros(1, int)
         self._start(first)
         while self.physics.adopt_changed_model():

@@ -37,7 +37,11 @@ ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's colum
 
 @dataclass(frozen=True)
 class _Hit:
-    """First hits of rays. is_lit: True if a ray hits the front of a surface. reflectance: one array per component"""
+    """First hits of rays.
+
+    is_lit: True if a ray hits the front of a surface
+    reflectance: one array per component
+    """
 
     t: Array
     point: Array
@@ -62,7 +66,10 @@ class ClosedFormTables:
 
 @dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """Spheres and tables for one lane. centres: centres of the visible spheres in the lane's world (Point3f)"""
+    """Spheres and tables for one lane.
+
+    centres: centres of the visible spheres in the lane's world (Point3f)
+    """
 
     centres: list[Array]
     tables: ClosedFormTables
@@ -253,7 +260,10 @@ def _check_tops(scene: UprightScene) -> None:
 
 
 def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
-    """Return rows (face, ROW): column and row of the texel as affine functions of the point, the texture's place, 0."""
+    """Return a row of ROW numbers for each face, from which the texel at a point is computed.
+
+    They are two affine functions of the point, which give the texel's column and row, the texture's place, and 0.
+    """
     rows = np.zeros((len(uv), ROW))
     for i, (affine, texture) in enumerate(zip(uv, place, strict=True)):
         to_texel = atlas.to_texels[texture] @ np.vstack([affine, [0, 0, 0, 1]])

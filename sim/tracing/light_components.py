@@ -13,7 +13,9 @@ GREY = 1e-4
 
 @dataclass(frozen=True)
 class Components:
-    """Factors of radiance_b = sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
+    """Factors of the radiance in band b: sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
+
+    The index k counts components, and l counts lights with the angle of incidence θ_l.
 
     reflectance: (texel, component)
     levels: levels of the lights, (light, component)

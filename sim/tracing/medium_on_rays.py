@@ -20,8 +20,10 @@ LEAST = 1e-6  # [1/m] smallest coefficient; a path of length FARTHEST is then op
 class MediumOnRays:
     """A medium in the components of a tracer, each of which is one band.
 
+    A surface of radiance L appears at the distance d with the radiance L exp(-c d) + V (1 - exp(-c d)).
+
     attenuation: coefficient c of each component [1/m]
-    veil: radiance of a path of infinite length, per component
+    veil: veiling light V, the radiance of a path of infinite length, per component
     """
 
     attenuation: tuple[float, ...]
@@ -29,21 +31,21 @@ class MediumOnRays:
 
     @classmethod
     def from_bands(cls, medium: BandMedium, basis: np.ndarray) -> MediumOnRays:
-        """Return the medium for a diagonal basis (component, band): radiance_b = basis[b, b] component_b."""
+        """Return the medium for a tracer whose `basis` (component, band) is diagonal: components are scaled bands."""
         veil = medium.veil / np.diag(basis)
         return cls(tuple(map(float, np.maximum(medium.attenuation, LEAST))), tuple(map(float, veil)))
 
     def through(self, radiance: Sequence[Array], distance: Array) -> list[Array]:
-        """Return the radiance L exp(-c d) + V (1 - exp(-c d)) of surfaces at these distances [m], per component.
+        """Return the radiance that arrives from surfaces of this radiance at these distances [m], per component.
 
-        An infinite distance, behind which there is no surface, gives V.
+        A ray that hits no surface has an infinite distance, and the result is V.
         """
         return [v + more for v, more in zip(self.veil, self.contrasts(radiance, [distance]), strict=True)]
 
     def contrasts(self, radiance: Sequence[Array], distances: Sequence[Array], share: Array | float = 1) -> list[Array]:
-        """Return the contrasts (L - V) exp(-c d) between surfaces and the veiling light, per component.
+        """Return share · (L - V) exp(-c d), the contrast of surfaces with the veiling light, per component.
 
-        radiance: share · L
+        radiance: share · L, where L is the radiance of the surface
         distances: distances d [m], over which exp(-c d) is averaged
         share: fraction of an area that the surface fills
         """

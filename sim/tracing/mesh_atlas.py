@@ -26,7 +26,11 @@ PITCH, BALL = 2.5, 1.1
 
 @dataclass(frozen=True)
 class MeshAtlas:
-    """Moving meshes in one scene (None without meshes). cells: centre of each mesh's cell, (mesh, 3)"""
+    """Moving meshes in one scene.
+
+    scene: None without meshes
+    cells: centre of each mesh's cell, (mesh, 3)
+    """
 
     cells: np.ndarray
     scene: MitsubaObject | None

@@ -31,7 +31,7 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class Scenes:
-    """Mitsuba scenes. still: static geoms and the sky · meshes: moving meshes (`MeshAtlas`), or None"""
+    """Mitsuba scenes of the static geoms and the sky, and of the moving meshes (`MeshAtlas`), if there are any."""
 
     still: MitsubaObject
     meshes: MitsubaObject | None
@@ -41,8 +41,9 @@ class Scenes:
 class Tables:
     """Arrays that are the same in all worlds.
 
-    bsdfs: BSDFs of all movers · ends: see `Movers` · painted: see `Paint`
-    sky: an emitter, or None · glows: BSDFs of glowing geoms, or None · glowing: for each mover, its index in `glows`
+    bsdfs, ends, painted: BSDFs of all movers; `ends` of `Movers`; `painted` of `Paint`
+    sky, glows: the sky's emitter, and the BSDFs of glowing geoms; None if there are none
+    glowing: for each mover, its index in `glows`
     """
 
     bsdfs: Array
@@ -101,9 +102,11 @@ class RowBuffers:
 class _SurfaceHit:
     """First hits of rays.
 
-    si: interaction for the BSDF · colors, glow: factors of reflectance and emission, per LANES bands
-    which: index of the mover, or the number of movers without a hit on one · seen: True for a hit · active: traced rays
-    point, normal: in the world; the normal points to the ray's origin · t: distance [m] · direction: of the ray
+    si: interaction for the BSDF
+    colors, glow: factors of reflectance and emission, one spectrum for every LANES bands
+    which: index of the mover, or the number of movers if the ray hits none of them
+    seen, active: True for rays that hit a surface, and for rays that are traced
+    point, normal, t, direction: hit point, normal towards the ray's origin, distance [m], and direction of the ray
     """
 
     si: Array
@@ -157,10 +160,8 @@ class ModelTracer:
 
     def around(self, scenes: Scenes, rows: Rows, tables: Tables, world: Array) -> Surroundings:
         """Return the surroundings of a lane in this world."""
-        movers, lights, paint = (
-            world * n
-            for n in (self._scene.movers.n_rows, max(len(self._scene.lights), 1) * LIGHT_ROWS, self._scene.paint.n_rows)
-        )
+        sizes = self._scene.movers.n_rows, max(len(self._scene.lights), 1) * LIGHT_ROWS, self._scene.paint.n_rows
+        movers, lights, paint = (world * n for n in sizes)
         return Surroundings(
             scenes.still,
             MoverRows(rows.movers, movers, tables.ends),
@@ -170,8 +171,7 @@ class ModelTracer:
         )
 
     def radiance(self, seen: EyeRay, there: Surroundings, samples: Array) -> tuple[list[Array], Array]:
-        """Return the light along each ray, per band, and the distance to the visible surface [m]. The samples of a ray,
-        two points on the unit square, determine its bounce rays (`lighting.spawn_bounce_ray`)."""
+        """Return the light along each ray, per band, and the distance to the visible surface [m], see `Tracer`."""
         met = self._first_hits(seen.ray, there)
         arrives = self._irradiance(met, seen.axis, there)
         if self.light == lighting.BOUNCE:
@@ -182,8 +182,7 @@ class ModelTracer:
         return sent if self._medium is None else self._medium.through(sent, met.t), met.t
 
     def _returned(self, met: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
-        """Return the light that reaches each visible surface from a random direction (Lambert's cosine). It comes from
-        the sky, from a glowing geom, or from a second surface that reflects light of lamps, sky and glowing geoms."""
+        """Return the light that a bounce ray collects for each visible surface, see the module's docstring."""
         bounce_ray = lighting.spawn_bounce_ray(met.point, met.normal, mi.Point2f(samples.x, samples.y))
         second = self._first_hits(bounce_ray, there, met.seen)
         arrives = self._irradiance(second, axis, there)
@@ -230,9 +229,10 @@ class ModelTracer:
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return the number of the surface that each ray hits first. It is a mover's number, or the number of movers
-        plus the Mitsuba id of a static shape (0 for none). Every static geom has its own shapes, see
-        `ModelScene.one_shape_per_geom`."""
+        """Return the number of the surface that each ray hits first, in `ModelScene.one_shape_per_geom`.
+
+        It is a mover's number, or the number of movers plus the Mitsuba id of a static shape (0 for none).
+        """
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)

@@ -35,9 +35,10 @@ MESH = "mesh"
 
 @dataclass(frozen=True)
 class Hit:
-    """First hit of a ray. t: distance [m], infinite without a hit · which: number of the mover
+    """First hit of a ray.
 
-    normal: unit vector in the world's frame · uv: texture coordinates of meshes and planes
+    t, which: distance [m] (infinite without a hit), and number of the mover
+    normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
     """
 
     t: Array
@@ -48,9 +49,10 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """A mover's frame. axes, origin: axes (3 Vector3f) and origin (Vector3f) of the frame in the world
+    """A mover's frame.
 
-    size: half sizes of the mover · reach: largest distance of its surface from the origin
+    axes, origin: axes (three Vector3f) and origin (Vector3f) of the frame in the world
+    size, reach: half sizes of the mover, and largest distance of its surface from the origin
     """
 
     axes: tuple[Array, Array, Array]
@@ -69,7 +71,7 @@ class _Frame:
 
 @dataclass(frozen=True)
 class MoverRows(WorldRows):
-    """Rows of one world: a sphere around all movers, then ROWS rows for each mover. ends: see `Movers`."""
+    """Rows of one world: a sphere around all movers, then ROWS rows for each mover (`ends`: see `Movers`)."""
 
     ends: Array
 
@@ -77,8 +79,9 @@ class MoverRows(WorldRows):
 class Movers:
     """The moving geoms ("movers") of a model: primitives by kind, then meshes. Each appearance of a geom is a mover.
 
-    looks: appearance of each mover · geoms: geom id of each mover, (mover,)
-    atlas: the movers that are meshes · lifts: distances by which surfaces are moved outwards [m], by geom
+    looks, geoms: appearance and geom id of each mover
+    atlas: the movers that are meshes
+    lifts: distances by which surfaces are moved outwards [m], by geom
     ends: number of the first mover of each kind, for the kernel
     """
 
@@ -98,9 +101,8 @@ class Movers:
         self._sizes[self._of_kind(PLANE), :2] = np.reshape(planes, (-1, 2))
         reach = self._mesh_reach = model.geom_rbound[self.geoms[self._of_kind(MESH)]]
         lift = np.array([lifts.get(geom, 0.0) for geom in self.geoms.tolist()])
-        self._grown = np.array([shapes.lifted_size(*pair) for pair in zip(self._types, lift, strict=True)]).reshape(
-            -1, 3
-        )
+        grown = [shapes.lifted_size(*pair) for pair in zip(self._types, lift, strict=True)]
+        self._grown = np.array(grown).reshape(-1, 3)
         self._raised = np.where(self._types == _TYPES.mjGEOM_PLANE, lift, 0)[:, None]
         parts = [shapes.parts(look.model, look.geom, lifts.get(look.geom, 0.0)) for look in by_kind[-1]]
         self.atlas = MeshAtlas.from_parts(parts, reach, bsdf)
@@ -154,8 +156,7 @@ class Movers:
         return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-        """Return the movers' half sizes (world or 1, mover, 3), three radii for a sphere, and the largest distance of
-        each surface from its origin [m], (world or 1, mover)."""
+        """Return the half sizes (world or 1, mover, 3) and reaches (world or 1, mover) of movers [m], see `_Frame`."""
         if poses.geom_size is None:
             sizes = self._sizes[None].copy()
         else:
@@ -264,9 +265,9 @@ def _of_primitive(primitive: Primitive) -> Callable[..., Array]:
 
 
 def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
-    """Return the distance to mover k along a ray [m]. A branch skips the intersection if a ray misses the sphere around
-    the mover, which most rays do. The origin of an absent mover is NaN, so all rays miss it."""
+    """Return the distance to mover k along a ray [m]; infinite for a miss, and for absent movers (origin NaN)."""
 
+    # A branch skips the intersection for rays that miss the sphere around the mover, as most rays do.
     def within() -> Array:
         frame = _frame(there, k)
         return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), frame)
@@ -294,7 +295,6 @@ def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
 
 def _loop(kind: int, there: MoverRows, step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:
     """Run a step for each mover of a kind."""
-    end = dr.gather(mi.UInt32, there.ends, kind + 1)
-    start = dr.gather(mi.UInt32, there.ends, kind)
+    start, end = (dr.gather(mi.UInt32, there.ends, kind + i) for i in (0, 1))
     found: tuple[Array, ...] = dr.while_loop((start, *state), lambda k, *_: k < end, step, label="movers")
     return found

@@ -26,7 +26,10 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class PaintRows(WorldRows):
-    """Rows of one world: reflectances of the painted geoms. painted: see `Paint`"""
+    """Rows of one world: reflectances of the painted geoms.
+
+    painted: see `Paint`
+    """
 
     painted: Array
 

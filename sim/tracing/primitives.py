@@ -25,7 +25,7 @@ PARALLEL = 1e-9
 
 @dataclass(frozen=True)
 class Primitive:
-    """Functions for one kind of primitive. size: MuJoCo's sizes
+    """Functions for one kind of primitive, which all receive MuJoCo's sizes (`size`).
 
     hit: (origin, direction, size) -> distance
     normal: (point, size) -> outward normal, not normalised

@@ -136,6 +136,6 @@ def surface_point(spheres: Spheres, centres: list[Array], which: Array, normal: 
 
 
 def _quadratic(ray: Array, centre: Array, radius: float) -> tuple[Array, Array]:
-    """Return half the linear and the constant coefficient of |o + t d - centre|² = radius² (|d| = 1)."""
+    """Return half the linear and the constant coefficient of |o + t d - centre|² = radius² as an equation for t."""
     from_centre = ray.o - centre
     return dr.dot(from_centre, ray.d), dr.squared_norm(from_centre) - radius * radius

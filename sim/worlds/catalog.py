@@ -12,10 +12,10 @@ from types import MappingProxyType
 TASKS: Mapping[str, str] = MappingProxyType(
     {
         "navigation": "follow a course between striped walls to its end",
-        "detection": "reach the goal sphere, avoid two adversaries that differ in stripe orientation only",
-        "tracking": "detection with goal and adversaries that move",
+        "detection": "reach the goal sphere and avoid two adversaries, whose stripes have another orientation",
+        "tracking": "reach a moving goal sphere and avoid moving adversaries, whose stripes have another orientation",
         "maze": "get as far as possible through a maze of striped corridors",
-        "foraging": "reach the goal sphere, avoid two adversaries that differ below 400 nm only",
+        "foraging": "reach the goal sphere and avoid two adversaries, which differ only below 400 nm",
     }
 )
 

@@ -171,7 +171,10 @@ def _layout(spec: mujoco.MjSpec, task: str, rng: np.random.Generator, mazes: int
 
 
 def _check_layouts(task: str, layouts: Any, alone: bool) -> None:
-    """Check that these are layouts, for a task that has some, and that they are given alone."""
+    """Check the type of `layouts`, and that the task has layouts.
+
+    alone: True if no other argument, such as `mazes`, defines the layouts; this is required
+    """
     of_kind("build_world: layouts", layouts, LayoutSet, "sim.LayoutFamily(seed=0).training")
     if task not in TASKS_WITH_LAYOUTS:
         tasks = " and ".join(map(repr, TASKS_WITH_LAYOUTS))

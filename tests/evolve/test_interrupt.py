@@ -39,9 +39,7 @@ def interrupted_after(seconds, arguments):
 
 @pytest.mark.slow
 def test_ctrl_c_while_it_loads(tmp_path):
-    """Interrupts occur while its own modules are loaded, arguments are read, and the heavy libraries are loaded. The
-    last case is rarer, because all other steps take milliseconds.
-    """
+    """The command is interrupted while it loads its own modules, reads its arguments, or loads the heavy libraries."""
     chance = random.Random(0)
     found = []
     for number in range(24):

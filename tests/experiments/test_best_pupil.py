@@ -47,10 +47,13 @@ def test_with_little_noise_the_best_hole_is_rayleighs_pinhole():
 
 @pytest.mark.slow
 def test_stripes_are_seen_best_where_a_disk_of_blur_takes_least():
-    """Behind a pinhole, light falls on a disk as wide as the pinhole: T MTF = a² 2 J1(x) / x with x = π a L f is
-    greatest at J0's first zero. For a pinhole of three Fresnel zones the disk is brighter in its middle, hence 8 %. For
-    less than one zone, diffraction sets the width of the disk, hence 25 % for the narrowest stripes. Stripes of another
-    of these widths have their optimum at half or twice the aperture."""
+    """Behind a pinhole, light falls on a disk as wide as the pinhole. With the relative aperture a, the width L of the
+    retina and the frequency f of the stripes, their amplitude is a² 2 J1(x) / x, where x = π a L f. It is greatest at
+    the first zero of J0. The tolerance is 8 %, because the disk behind a pinhole of three Fresnel zones is brighter in
+    its middle. It is 25 % for the narrowest stripes, because diffraction determines the width of the disk if the
+    pinhole contains less than one zone. If the width of the stripes were wrong by a factor of two, so would be the
+    aperture.
+    """
     backend.require()
     rows = computed(tuple(np.geomspace(0.06, 0.9, 25)), (0.01,))
     for width, tolerance in ((1, 0.25), (2, 0.08), (4, 0.08)):

@@ -70,7 +70,9 @@ def test_a_shortfall_is_between_the_worst_and_the_best_life():
 
 @pytest.mark.parametrize(("least", "found"), [(1, 1), (16, 16), (1000, None)])
 def test_the_brain_that_fine_eyes_need(least, found):
-    """Error falls with acuity for brains that are large enough; with 4 units it falls by less than half."""
+    """For brains that are large enough, the error decreases with acuity. For brains of 4 units, it decreases by less
+    than half.
+    """
     lives = of_law(lambda acuity, units: 0.01 / acuity if units >= least else 0.9 - 0.3 * acuity * (units == 4))
     assert needed(lives) == found
 

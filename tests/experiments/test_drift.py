@@ -47,7 +47,9 @@ def test_random_fitness_moves_genes_that_are_open_and_no_others():
 
 @pytest.mark.slow
 def test_every_phase_has_an_end():
-    """Each end covers only the generations of its phase: the last three, though the first phase has only two."""
+    """Each end covers the last three generations of its phase. The first phase has only two generations, so its end
+    covers two.
+    """
     config = assemble(preset="lens", assignments=("genome.doe.opens_at=2", "genome.refractive_index.opens_at=2"))
     drift = drifted(config, "lens", {"a": lambda row: row.relative_aperture, "n": lambda row: row.refractive_index}, 6)
     ends = {(one.quantity, one.generation): one for one in drift if one.ends}
@@ -65,7 +67,9 @@ def test_p_counts_searches_that_came_as_far_on_either_side():
 
 
 def test_runs_that_agree_have_a_smaller_p_than_one():
-    """For a null model uniform in [0, 1], the mean of two draws is triangular, and a mean m has p = 2 x 2 m²."""
+    """The mean of two draws from a null model that is uniform in [0, 1] has a triangular distribution. A mean m < 1/2
+    therefore has p = 4 m².
+    """
     end = Drift("a", "x", 5, 0.0, 0.5, 1.0, " ".join(f"{(i + 0.5) / 1000:.4f}" for i in range(1000)))
     assert end.p(0.1, 0.1) == pytest.approx(4 * 0.1**2, rel=0.15), "three standard errors of this number of draws"
     assert end.p(0.1) == pytest.approx(2 * 0.1, rel=0.02)

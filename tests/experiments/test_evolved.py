@@ -143,7 +143,7 @@ def test_each_factor_has_its_exponent():
 
 
 def test_in_a_maze_what_is_missing_of_a_full_return_is_the_error():
-    """Straight paths of 63 to 67 m at 1.5 per metre, plus 10 for the goal."""
+    """The full return is 1.5 per metre of the straight paths of 63 to 67 m, plus 10 for the goal."""
     full = full_return("maze")
     assert 1.5 * 63 + 10 < full < 1.5 * 67 + 10
     assert math.isnan(full_return("detection"))

@@ -52,7 +52,7 @@ def test_records_name_the_machines_that_made_them(tmp_path):
         (tmp_path / name / "versions.json").write_text(json.dumps(starts))
     origin = Origin.from_runs([tmp_path / name for name in made], 30.0)
     assert origin.sentence() == (
-        f"30 worker hours on Old Processor, 4 cores; New Processor, 8 cores; rhabdom at {'a' * 10}, Python 3.9."
+        f"30 worker hours on Old Processor, 4 cores; New Processor, 8 cores; rhabdom at commit {'a' * 10}, Python 3.9."
     )
     assert origin.machine != Origin.here(1.0).machine
 
@@ -62,7 +62,7 @@ def test_records_of_former_versions_name_no_processor(tmp_path):
     assert Origin.from_runs([tmp_path], 1.0).machine == "riscv64, processor not recorded"
     (tmp_path / "versions.json").unlink()
     assert Origin.from_runs([tmp_path], 1.0).sentence() == (
-        "1 worker hours on an unknown machine; rhabdom at unknown, Python unknown."
+        "1 worker hours on an unknown machine; rhabdom at commit unknown, Python unknown."
     )
 
 
@@ -76,4 +76,4 @@ def test_rows_of_several_versions_name_them_all(tmp_path):
     for commit in ("a" * 40, "b" * 40 + "+", "b" * 40 + "+", "c" * 40):
         Origin(1.0, "a machine", {"python": "3", "commit": commit}).after(path).write(path)
     said = Origin.read(path).sentence()
-    assert f"rhabdom at {'a' * 10}, {'b' * 10} with changes, {'c' * 10}, Python" in said
+    assert f"rhabdom at commit {'a' * 10}, {'b' * 10} with changes, {'c' * 10}, Python" in said

@@ -79,7 +79,9 @@ def test_every_animal_is_an_animal_of_a_run():
 
 
 def test_stored_runs_are_recognised(tmp_path):
-    """A noise that does not survive the file's six digits would be trained again in every call."""
+    """A design whose noise changed when it was stored with six digits would not be found in the file, and would be
+    trained again in every call.
+    """
     some = [trained(design, 1.0) for design in designs() if design.seed == 0]
     write_rows(some, tmp_path / "rows.csv")
     assert [row.design for row in read_rows(Trained, tmp_path / "rows.csv")] == [row.design for row in some]

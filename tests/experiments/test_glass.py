@@ -24,7 +24,9 @@ ANIMAL = Phenotype(
 
 
 def paraboloid(strength, radius, index=1.6):
-    """Genes of the paraxial lens (exactly a patch) with `strength` times the power that focuses far objects."""
+    """Genes of the paraxial lens with `strength` times the power that focuses distant objects; a patch represents it
+    exactly.
+    """
     distance = EYE.sensor_width / (2 * math.tan(math.radians(FOV) / 2))
     relief = BSplineRelief.paraboloid(0.5, strength / ((index - 1) * distance * EYE.relief_height), radius)
     return tuple(relief.control_points.ravel())

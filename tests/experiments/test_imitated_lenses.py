@@ -11,7 +11,7 @@ from evolve.store.directory import Run
 from experiments import imitated_lenses
 from experiments.designed import Design
 from experiments.fitness_landscape import SPREAD, Landscape, Life, behind_glass, fitted, holes, opening
-from experiments.imitated_lenses import Check, Told, page, searched
+from experiments.imitated_lenses import Check, Contents, page, searched
 from experiments.store import RECORDS, Origin
 
 TRUE = Landscape(5.0, 300.0, 0.3, 2.5, 1.2, 1.5)
@@ -81,8 +81,8 @@ def test_page(tmp_path, lives):
     rows = [searched("3 genes, 18 generations", seed, TRUE) for seed in (0, 1)]
     land = fitted(lives)
     lived = [*lives, Life(0.3, 0.5, 50.0)]
-    told = Told(rows, lived, land, Check.from_runs(lives, land), Origin.here(1.0), "Yes.")
-    page(told).publish(tmp_path)
+    contents = Contents(rows, lived, land, Check.from_runs(lives, land), Origin.here(1.0), "Yes.")
+    page(contents).publish(tmp_path)
     text = (tmp_path / "imitated_lenses.md").read_text()
     assert "| 3 genes, 18 generations |" in text
     assert "r = " in text

@@ -25,7 +25,9 @@ def through_holes(peak, noise, group="0.001"):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("peak", [0.15, 0.25])
 def test_the_best_width_is_found_with_an_interval_that_holds_it(peak):
-    """Animals are spread evenly over a, not over log a, which would shift a kernel's mean to the wider side."""
+    """The relative apertures of the animals are spread evenly, not on a logarithmic scale. A kernel mean would
+    therefore be biased towards wide pupils.
+    """
     found, p = learning_through_holes.best_width(through_holes(peak, 0.1))
     assert found.low <= peak <= found.high
     assert found.mean == pytest.approx(peak, rel=0.25)

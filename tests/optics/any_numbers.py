@@ -19,7 +19,7 @@ def logarithmic(low, high):
 
 
 def or_odd(usual):
-    """Mostly usual values, sometimes values that no user should pass."""
+    """Return a strategy that usually draws values of `usual`, and sometimes values that no user should pass."""
     odd = st.sampled_from([0.0, -1e-6, math.nan, math.inf, -math.inf, 1e-300, 1e-16, 1e16, 1e300])
     return st.one_of(*[usual] * 8, odd)
 

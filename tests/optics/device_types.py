@@ -1,4 +1,4 @@
-"""Dr.Jit's types in float64, on the requested device: `drjit.auto` always takes a GPU if there is one."""
+"""Dr.Jit's types in float64, on the requested device. (`drjit.auto` always uses a GPU if there is one.)"""
 
 from optics.numerics.precision import precision
 

@@ -82,7 +82,7 @@ def reliefs(draw):
 
 @st.composite
 def requests(draw, radius=(3e-7, 5e-5)):
-    """The pupil and arguments of `psf`, each sensible on its own."""
+    """Draw a pupil and arguments of `psf`, each of which is sensible by itself."""
     pupil = {
         "aperture_radius": draw(logarithmic(*radius)),
         "height": draw(reliefs()),
@@ -109,7 +109,7 @@ def requests(draw, radius=(3e-7, 5e-5)):
 
 
 def answer(pupil, asked):
-    """The result, or None if the request is refused in one line."""
+    """Return the result, or None if the request is refused in one line."""
     try:
         return optics.psf(Pupil(**pupil), **asked)
     except ValueError as error:  # AccuracyError is a subclass

@@ -17,7 +17,9 @@ from validation.reference import relative_l2
 
 @st.composite
 def fields(draw):
-    """u and its pitch in wavelengths: noise, spots, tilted waves, single samples; real, complex or whole numbers."""
+    """Draw a field and its pitch [wavelengths]: noise, spots, tilted waves or single samples, of real, complex or whole
+    numbers.
+    """
     shape = draw(st.integers(1, 24)), draw(st.integers(1, 24))
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     y, x = (np.arange(n) - n // 2 for n in shape)
@@ -38,7 +40,7 @@ def fields(draw):
 
 @st.composite
 def smooth_fields(draw):
-    """Tilted spots that fit their samples, in space and in frequency, so that u's own sampling adds no error."""
+    """Draw tilted spots that are well sampled in space and in frequency, so that the sampling adds no error."""
     height, width = draw(st.integers(28, 36)), draw(st.integers(28, 36))
     y, x = np.arange(height) - height // 2, np.arange(width) - width // 2
     waist = draw(st.floats(2.8, 3.0))
@@ -48,8 +50,10 @@ def smooth_fields(draw):
 
 
 def brute_force(u, dx, wavelength, distance, out_dx, out_shape):
-    """The samples' sinc interpolant by its own definition: ∫ Û(f) H(f) e^{2πi f·x} df over the samples' band by
-    Gauss-Legendre, with a decaying evanescent part. It is written out, so that nothing repeats or wraps around."""
+    """Return the propagated sinc interpolant of the samples by definition: ∫ Û(f) H(f) e^{2πi f·x} df over the band of
+    the samples, by Gauss-Legendre quadrature, where evanescent waves decay. Without a discrete transform, nothing is
+    periodic.
+    """
     band = 0.5 / dx
     reach = abs(distance) / wavelength + (max(u.shape) * dx + max(out_shape) * out_dx) / wavelength
     count = int(60 + 8 * reach * min(1, band * wavelength))

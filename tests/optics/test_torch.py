@@ -73,7 +73,9 @@ def spread(name, value, **options):
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in FAST else pytest.mark.slow) for n in INPUTS])
 def test_gradients_of_every_input(name):
-    """Differences are of PSFs without derivatives, which may have another method, so the tolerance is small."""
+    """The reference is a difference of PSFs without derivatives, which may be computed by another method. The tolerance
+    is therefore small.
+    """
     value = asking(INPUTS[name][0])
     step = 1e-5 * max(1.0, float(value.detach().abs().max()))
     assert torch.autograd.gradcheck(lambda v: spread(name, v) * 1e-9, (value,), eps=step, **CHECK)
@@ -125,7 +127,7 @@ def test_axes_of_pupils_distances_and_wavelengths():
 
 @pytest.mark.parametrize(("shape", "dx", "centre"), [((4, 3), 4e-6, (2e-6, -1e-6)), ((5, 6), 0.4e-6, (0.0, 0.0))])
 def test_means_over_pixels(shape, dx, centre):
-    """An odd number of samples per pixel fills each pixel; their mean is nearly that of the pixel."""
+    """An odd number of samples covers each pixel, and their mean is close to the mean over the pixel."""
     n, pupil, z = 61, lens(height=BSplineRelief(RNG.random((4, 4)) * 1e-6)), 160e-6
     x, y = (at - dx / n * (n - 1) / 2 * (side % 2 == 0) for at, side in zip(centre, shape[::-1], strict=True))
     fine = {"dx": dx / n, "shape": (n * shape[0], n * shape[1]), "centre": (x, y)}

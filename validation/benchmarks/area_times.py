@@ -22,8 +22,8 @@ from sim.tasks.simulation import Simulation
 from sim.worlds.state import WorldState
 
 WORLDS, STEPS, LOOKS, WARM_UP = 64, 40, 9, 2
-TRUE, SIGMA = 256, 0.003  # rays per receptor; noise, relative to white
-SEEN = 0.01  # relative to white behind the pupil: change of a signal that counts as seeing an object
+TRUE, SIGMA = 256, 0.003  # rays per receptor of the reference; receptor noise relative to the signal of white
+SEEN = 0.01  # smallest change of a signal that counts as seeing an object, relative to white behind the pupil
 EYES = sim.Eyes(n_eyes=2, resolution=(15, 15), placement_range_deg=45.0, noise_sigma=SIGMA)
 
 
@@ -37,9 +37,9 @@ def behind(a: float, focus: float | None = None) -> sim.Eyes:
 
 
 CASES = {
-    "hole, a = .9": behind(0.9),
-    "hole, a = .55": behind(0.55),
-    "hole, a = .3": behind(0.3),
+    "pinhole, a = 0.9": behind(0.9),
+    "pinhole, a = 0.55": behind(0.55),
+    "pinhole, a = 0.3": behind(0.3),
     "lens out of focus, a = 0.55": behind(0.55, 1.5),
     "lens nearly in focus, a = 0.55": behind(0.55, 1.1),
     "lens in focus, a = 0.55": behind(0.55, 1.0),
@@ -60,7 +60,7 @@ def moments(world: sim.World) -> WorldState:
 
 
 def seen_in(renderer: sim.BatchedRenderer, state: WorldState, truth: np.ndarray) -> np.ndarray:
-    """Return the mask of the signals that contain an object, which change if all objects are moved away."""
+    """Return the mask of the signals with light from an object: those that change if all objects are moved away."""
     away = replace(state, objects=state.objects + np.array([100.0, 0.0, 0.0]))
     found: np.ndarray = np.abs(renderer.signals(away) - truth) > SEEN * renderer.eye.throughput
     return found

@@ -45,7 +45,7 @@ def rate(venv: EyesVecEnv, actions: np.ndarray, seconds: float) -> float:
 
 
 def rates(worlds: int, rounds: int, seconds: float) -> dict[str, list[float]]:
-    """Measure both tasks in turn: steps per second by task, a number for each round."""
+    """Measure both tasks in turn; return steps per second by task, one number per round."""
     venvs = {name: sim.make_vec_env(task(name), n_envs=worlds, seed=0) for name in TASKS}
     actions = np.random.default_rng(0).uniform(-1, 1, (50, worlds, 1)).astype(np.float32)
     for venv in venvs.values():

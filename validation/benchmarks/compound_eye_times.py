@@ -29,7 +29,7 @@ PLACE = (0.27, 0.0, 0.1)
 
 
 class Ant(AntSeeks):
-    """The ant with compound eyes."""
+    """The task of the ant, with compound eyes."""
 
     eye = sim.CompoundEye(sim.hexagonal_patch(15, 5.0, 70.0), OMMATIDIUM, noise_sigma=SIGMA).with_mirror_image()
     mounts = (sim.Mount("torso", offset=PLACE),)

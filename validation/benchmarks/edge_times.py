@@ -17,7 +17,7 @@ import optics
 import sim
 
 WORLDS, LOOKS, WARM_UP = 32, 7, 2
-TRUE, SIGMA, APART = 2048, 0.01, 0.05  # rays per receptor; noise, relative to white; threshold in σ
+TRUE, SIGMA, APART = 2048, 0.01, 0.05  # rays of the reference; noise relative to white; error [σ] at an edge
 EYE = optics.Eye(resolution=(15, 15), fov_deg=50, bands=4, noise_sigma=SIGMA)
 FIDELITIES = [sim.Fidelity(n, EYE.bands, samples=how) for how in ("rays", "edges") for n in (16, 64, 128)]
 BALL = """

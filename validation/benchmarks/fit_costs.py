@@ -125,7 +125,7 @@ def _fourier(n: int, types: Precision) -> None:
 
 
 def _fft_sample(n: int) -> float:
-    """Return the predicted seconds per sample of n x n, as in `fourier.predicted_seconds`."""
+    """Return the predicted seconds per sample of an FFT of n x n samples, as in `fourier.predicted_seconds`."""
     return 2 * (5 * np.log2(n + 1) / cost.FFT_FLOPS + cost.FFT_LINE_SAMPLE) + 2 * cost.FFT_COPY
 
 
@@ -169,7 +169,7 @@ def seconds(run: Callable[[], object], repeats: int) -> float:
 
 
 def fitted(operation: Operation, repeats: int) -> tuple[float, float]:
-    """Return seconds per call and per unit: the line through the times, each weighted by its size."""
+    """Return the seconds per call and per unit, from a line that is fitted to the times with least relative errors."""
     times = np.array([seconds(lambda n=n: operation.run(n), repeats) for n in operation.sizes])
     counts = np.array([operation.count(n) for n in operation.sizes], dtype=np.float64)
     terms = np.column_stack([np.ones_like(counts), counts]) / times[:, None]

@@ -43,7 +43,7 @@ class Case:
 
 
 def relief(radius: float) -> Any:
-    """Control points near a lens that focuses at FOCUS."""
+    """Return control points [m] close to those of a lens that focuses at FOCUS."""
     import optics
 
     exact = optics.BSplineRelief.paraboloid(0.0, 2 / FOCUS, radius).control_points

@@ -34,7 +34,7 @@ def eyes(count: int, fov_deg: float, scale: str, seed: int) -> list[optics.Eye]:
 
 
 def seconds(eye: optics.Eye) -> float | None:
-    """Return the CPU time; None if refused."""
+    """Return the CPU time [s] of an eye's kernel; None if the eye is refused."""
     start = time.process_time()
     try:
         eye.kernel(cells_for(eye))

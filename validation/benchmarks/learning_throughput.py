@@ -30,7 +30,7 @@ from validation.benchmarks.sim_throughput import (  # sets OpenGL before MuJoCo 
 )
 
 NEURONS = 64
-BARS = {"detection": 12.0, "maze": 50.0}  # ratios to mujoco.Renderer
+BARS = {"detection": 12.0, "maze": 50.0}  # smallest ratios of the training rate to that of mujoco.Renderer
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def training_rate(learner: Learner, steps: int, seed: int) -> float:
 
 
 def machine_rate(learner: Learner, steps: int) -> float:
-    """Return agent-steps per second of one such training per core, side by side."""
+    """Return agent-steps per second of one training per core, all of which run in parallel."""
     cores = os.cpu_count() or 1
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(cores, mp_context=context, initializer=prepare_device) as pool:

@@ -17,13 +17,13 @@ import sim
 from sim.envs.follow_camera import FollowCamera
 from sim.worlds.state import WorldState
 
-QUICK, SLOW, WARM_UP = 15, 3, 2  # images
+QUICK, SLOW, WARM_UP = 15, 3, 2  # numbers of fast, slow and uncounted images
 SAMPLES = 12  # of slow renderings
 EYES = {"maze": sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_range_deg=300)}
 
 
 def walk(task: str, eyes: sim.Eyes) -> tuple[sim.World, list[WorldState]]:
-    """Return the states of an agent that turns slowly as it moves."""
+    """Return a world, and the states of an agent in it that turns slowly as it moves."""
     env = sim.make_env(task, eyes, rays_per_receptor=1)
     env.reset(seed=1)
     states = []

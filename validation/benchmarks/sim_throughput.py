@@ -66,10 +66,10 @@ BARS = {
 }
 OVERHEAD = 0.15
 # Length of a loop of steps, and of the loop of their parts right after it. Each loop has caches warmed by its own
-# previous pass, and both are short # enough for the machine to be in the same state.
+# previous pass, and both are short enough for the machine to be in the same state.
 BLOCK = 8
 WARM_UP = 3  # calls
-SETTLED = 256  # steps: an episode. Before, physics touches new walls and builds models of them
+SETTLED = 256  # steps of an episode; until then, agents touch walls for which physics first builds models
 
 
 def with_pupil(eyes: sim.Eyes) -> sim.Eyes:
@@ -162,7 +162,7 @@ class _Step:
         self._note(sight, "launch", lambda *asked: alone.launch(*asked).wait())
 
     def _note(self, owner: Any, name: str, alone: Callable[..., Any]) -> None:
-        """Record the step's call of this method, to repeat it separately."""
+        """Record the step's call of this method, so that the call can be repeated on its own."""
         method = getattr(owner, name)
 
         def noted(*asked: Any) -> Any:

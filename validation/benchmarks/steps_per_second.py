@@ -4,11 +4,12 @@ How many steps per second do worlds and models reach, and what fraction of a ste
 detection reaches 11701 steps per CPU second and the humanoid 1107. Rendering takes 49 % to 71 % of the time of physics
 and rendering together.
 
-**Method.** The benchmark uses two built-in tasks and two of Gymnasium's models (ant, humanoid; MIT). Each agent has two
-eyes of 15 x 15 receptors and 60°, with 4 rays per receptor in direct light, 4 bands, and noise. Actions are random, and
-episodes restart when they end. Rates are steps per CPU second of one thread, as the median of a few rounds in one
-process. Each round measures physics and rules alone, rendering alone, and whole steps, one after the other. Other work
-on the machine therefore affects all three in the same way, and hardly changes their ratios.
+**Method.** The benchmark uses two built-in tasks and two models of Gymnasium (ant and humanoid, with the MIT licence).
+Each agent has two eyes of 15 x 15 receptors, which are 60° wide. Eyes have noise, and are rendered with 4 rays per
+receptor in direct light and 4 bands. Actions are random, and episodes restart when they end. Rates are steps per CPU
+second of one thread, as the median of a few rounds in one process. Each round measures physics with the rules of the
+task, rendering alone, and whole steps, one after the other. Other work on the machine therefore affects all three in
+the same way, and hardly changes their ratios.
 
 **Table.** "render" is the rate of rendering alone and "step" is the rate of whole steps. "share" is the fraction of the
 time of physics and rendering that is spent on rendering. "step/sum" is the time of a whole step relative to the sum of
@@ -75,7 +76,11 @@ class Body(sim.Task):
 
 @dataclass(frozen=True)
 class Row:
-    """Steps of one world per CPU second, by part; worlds: number of worlds stepped together."""
+    """Rates of a model.
+
+    worlds: number of worlds that are stepped together.
+    rates: steps of one world per CPU second, for each part.
+    """
 
     name: str
     worlds: int
@@ -83,7 +88,7 @@ class Row:
 
     @property
     def overhead(self) -> float:
-        """Time of a whole step relative to physics and rendering one after the other."""
+        """Time of a whole step, relative to the sum of the times for physics and for rendering."""
         return 1 / self.rates["both"] / (1 / self.rates["physics"] + 1 / self.rates["sight"])
 
     @property
@@ -108,7 +113,7 @@ def environments() -> dict[str, Callable[[int], EyesVecEnv]]:
 
 
 def parts_of(env: EyesVecEnv) -> dict[str, Callable[[], object]]:
-    """Return the measured parts: one step of all worlds each."""
+    """Return functions that run the measured parts of one step of all worlds, by name."""
     random = np.random.default_rng(0)
 
     def action() -> np.ndarray:
@@ -137,7 +142,7 @@ def timed(part: Callable[[], object], steps: int) -> float:
 
 
 def measured(name: str, env: EyesVecEnv) -> Row:
-    """Measure the parts in turns."""
+    """Measure the parts of a step in turn, and return their rates."""
     with contextlib.closing(env), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         env.reset()

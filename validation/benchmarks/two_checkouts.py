@@ -58,7 +58,7 @@ def _humanoid() -> Any:
 
 
 def cases() -> dict[str, Callable[[], Any]]:
-    """Return environments to step, by name."""
+    """Return functions that make the environments to step, by name."""
     import optics
     import sim
 
@@ -86,7 +86,7 @@ def cases() -> dict[str, Callable[[], Any]]:
 
 
 def serve() -> None:
-    """Measure on requests of the parent process: a line with the name of a case opens it, an empty line is a turn."""
+    """Measure on request of the parent process: a line with a case's name opens it, an empty line requests a turn."""
     import numpy as np
 
     import sim
@@ -124,7 +124,7 @@ class Checkout:
         self.folder, self._child = folder, subprocess.Popen(command, cwd=folder, env=environment, **pipes)
 
     def asked(self, line: str = "") -> float:
-        """Open a case, or measure one turn of it: steps per second."""
+        """Let the process open the case `line` or, if it is empty, measure one turn; return the steps per second."""
         assert self._child.stdin
         assert self._child.stdout
         print(line, file=self._child.stdin, flush=True)

@@ -13,14 +13,14 @@ evolutionary run, but no animal is stopped at a rung.
 **First table.** The table compares the order of the animals after each rung with their order after the last rung. Cells
 state Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over animals. In the column "32
 episodes", the fitness of both rungs comes from the 32 evaluation episodes that a run uses. In the column "128
-episodes", it comes from 128 episodes of the same policies in other worlds. The last line compares the two measures of
-fitness after the last rung.
+episodes", it comes from 128 episodes of the same policies in other worlds. The last line states the correlation between
+the two measures of fitness after the last rung.
 
 **Second table.** The table lists possible schedules of successive halving, applied to these animals as one generation.
-"CPU time" is relative to training all animals to the end. The last two columns state the final rank of the animal that
-the schedule selects as the best. The final rank is the rank after the last rung by the fitness in 128 episodes. The
-schedule decides which animals continue, from the fitness in 32 episodes (first of these columns) or in 128 episodes
-(second).
+"CPU time" is relative to training all animals to the end. "0.5 promoted" means that half of the animals continue to the
+next rung. The last two columns state the final rank of the animal that the schedule selects as the best. The final rank
+is the rank after the last rung by the fitness in 128 episodes. In the column "by 32 episodes", the schedule decides
+from the fitness in 32 episodes which animals continue, and in the last column from the fitness in 128 episodes.
 
 **Result.** Two rungs save a fifth of the time if half of the animals continue to the second rung. Schedules that select
 animals earlier save more time but may lose the best animal. Successive halving is off by default. Thirty-two episodes
@@ -77,7 +77,7 @@ RAYS = 96  # rays of an eye, and at least one per receptor
 
 @dataclass(frozen=True)
 class Row:
-    """One animal on one rung: fitness from FEW and MANY episodes; steps, below the budget after early stopping."""
+    """One animal on one rung, with its fitness in FEW and in MANY episodes. Early stopping makes `steps` < `budget`."""
 
     animal: int
     eyes: int
@@ -116,9 +116,8 @@ def config(animal: Phenotype) -> RunConfig:
     rays = max(1, RAYS // (animal.resolution[0] * animal.resolution[1]))
     settings = (f"learning.total_steps={TOTAL}", f"learning.eval_interval={TOTAL // 2 ** (RUNGS - 1)}")
     optics = ("eye.optics=false", f"eye.rays_per_receptor={rays}")
-    return assemble(
-        "detection", assignments=[*settings, *optics, f"search.rungs={RUNGS}", f"evaluation.episodes={FEW}"]
-    )
+    more = (f"search.rungs={RUNGS}", f"evaluation.episodes={FEW}")
+    return assemble("detection", assignments=[*settings, *optics, *more])
 
 
 def climbed(number: int, animal: Phenotype) -> list[Row]:
@@ -205,8 +204,8 @@ def _of_ranks(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 class Halving:
     """Successive halving of the stored animals as one generation.
 
-    cost: CPU seconds relative to all full training runs.
-    place: rank of the animal that it selects, in the order after full training by MANY episodes; 1 is the best.
+    cost: CPU time relative to full training of all animals.
+    place: final rank of the selected animal, by its fitness in MANY episodes after full training; 1 is the best.
     """
 
     rungs: int
@@ -216,9 +215,10 @@ class Halving:
 
 
 def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") -> Halving:
-    """Apply successive halving with stored budgets; `by`: "fitness" or "fitness_many" decides on promotion.
+    """Apply successive halving to the stored results.
 
-    share: promoted share, 1/2, or 1/4 with every other rung.
+    share: promoted fraction of the animals: 1/2 at every stored rung, or 1/4 at every other one.
+    by: fitness that decides on promotion, "fitness" (FEW episodes) or "fitness_many".
     """
     fitness, many, spent = (columns(rows, name) for name in (by, "fitness_many", "cpu_seconds"))
     search = replace(SearchConfig(), population=len(fitness), rungs=rungs, promoted=share)

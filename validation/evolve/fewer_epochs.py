@@ -4,12 +4,13 @@ Do fewer epochs late in training save time without loss of return? Yes: they sav
 in tracking and 16 % in navigation. The mean returns in these tasks change by +4.2 ± 1.6, +6.9 ± 3.0 and -0.0 ± 0.2,
 respectively.
 
-**Method.** An epoch is one pass over the samples of an update. After `decay_after` training steps, the change of the
-weights per update has to fall in inverse proportion to the number of steps. There are two ways to achieve this: smaller
-optimiser steps in the same number of epochs, or optimiser steps of the same size in fewer epochs. The second way moves
-the weights about as far in less time. Both ways first reduce the optimiser step. After 150,000 training steps, it is
-half as large as at first. Until then both ways are bit-identical. From then on, the first way reduces the optimiser
-step further. The second way reduces the number of epochs instead, from 10 to 3 (`least_epochs`).
+**Method.** An epoch is one pass over the samples of an update. After `decay_after` training steps, learning slows down:
+the change of the weights per update has to fall in inverse proportion to the number of steps so far. There are two ways
+to achieve this: smaller optimiser steps in the same number of epochs, or optimiser steps of the same size in fewer
+epochs. The second way moves the weights about as far in less time. Both ways first reduce the optimiser step. After
+150,000 training steps, the optimiser step is half as large as at the start, and until then both ways give bit-identical
+results. From then on, the first way reduces the optimiser step further. The second way reduces the number of epochs
+instead, from 10 to 3 (`least_epochs`).
 
 Each row compares the same training runs (task, seed, eyes) with a constant and with a falling number of epochs. All
 runs have 500,000 steps, a receptor noise of σ = 0.01, eyes 45° wide with perfect lenses, and networks of 64 units. In
@@ -23,7 +24,8 @@ falling number of epochs. Differences have standard errors over the training run
 training run, evaluations included. The figure shows CPU time within a training run, computed from the two totals and
 the number of epochs.
 
-**Bounds.** No task's mean return falls by more than two standard errors, and CPU time falls by at least a twentieth.
+**Bounds.** In no task does the mean return fall by more than two standard errors. In every task, CPU time falls by at
+least a twentieth.
 
 **Limits.** The saving is limited, because only three of ten epochs are omitted over a whole training run of this
 length. Everything else takes as long as before, including the ten evaluations of a training run. In navigation, the
@@ -69,7 +71,10 @@ LEAST_SAVED = 0.05  # share of the CPU time
 
 @dataclass(frozen=True)
 class Life:
-    """A training run; curve: mean returns of its evaluations, one every INTERVAL steps."""
+    """A training run.
+
+    curve: mean returns of its evaluations, one every INTERVAL steps.
+    """
 
     task: str
     seed: int
@@ -135,7 +140,13 @@ def pairs(lives: Sequence[Life], task: str) -> list[tuple[Life, Life]]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Results of a task's training runs in both ways: returns, difference with standard error, goals first, CPU."""
+    """Results of a task's training runs with constant and with fewer epochs.
+
+    returns: mean returns.
+    gain, error: mean difference of the returns, and its standard error.
+    goals: fractions of episodes in which the goal was reached first.
+    cpu: CPU times [s].
+    """
 
     returns: tuple[float, float]
     gain: float
@@ -145,7 +156,7 @@ class Comparison:
 
 
 def compared(both: Sequence[tuple[Life, Life]]) -> Comparison:
-    """Compare two or more pairs."""
+    """Compare two or more pairs of training runs."""
     areas = np.array([[np.mean(life.curve) for life in pair] for pair in both])
     gains = areas[:, 1] - areas[:, 0]
     goals, cpu = (
@@ -202,7 +213,8 @@ def passes_until(task: str, least_epochs: int, evaluations: int) -> np.ndarray:
 def seconds(task: str, cpu: tuple[float, float], evaluations: int) -> np.ndarray:
     """Return the CPU time until each evaluation, (way, evaluation).
 
-    All epochs are assumed to take the same time, and so is all other work per step.
+    The ways are constant and fewer epochs. All epochs are assumed to take the same time, and so is all other work per
+    step.
     """
     passes = np.array([passes_until(task, least, evaluations) for least in (THROUGHOUT, FEWER)])
     (old, new), saved = passes.mean(axis=1), cpu[0] - cpu[1]

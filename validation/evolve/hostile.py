@@ -38,7 +38,7 @@ class Promise:
     """A guarantee with its trial.
 
     trial: returns the failure of one trial, or None.
-    share: share of all trials.
+    share: fraction of all trials that test it.
     """
 
     text: str

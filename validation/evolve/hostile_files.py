@@ -62,7 +62,7 @@ def _in_time(read: Callable[[], object], refusals: tuple[type[Exception], ...], 
     began = time.process_time()
     try:
         read()
-        wrong = "was taken for what it is not" if must else None
+        wrong = "was read without an error" if must else None
     except refusals as error:
         wrong = None if "\n" not in str(error) else f"said {str(error)!r}"
     except Exception as error:
@@ -112,7 +112,7 @@ def broken_picture(chance: random.Random, stage: Stage) -> str | None:
     def read() -> None:
         views = sim.read_exr(spoilt)
         if any(not np.array_equal(a.radiance, b.radiance) for a, b in zip(views, whole, strict=True)):
-            raise AssertionError("other images than were written")
+            raise AssertionError("the images differ from those that were written")
 
     return _in_time(read, (ExrError,), must=False)
 

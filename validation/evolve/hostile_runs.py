@@ -129,7 +129,7 @@ def refusal(stage: Stage, *arguments: Any) -> str | None:
 
 
 def strange_file(chance: random.Random, stage: Stage) -> str | None:
-    """Replace a file or folder by something else, for any command, including `run --out`."""
+    """Replace a file or folder of the run by something else, which any command must refuse, even `run --out`."""
     run, name = stage.copy(), chance.choice(FILES + FOLDERS)
     kind = chance.choice([kind for kind in KINDS if kind != ("directory" if name in FOLDERS else "file")])
     place = run / name

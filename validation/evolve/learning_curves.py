@@ -10,16 +10,19 @@ the agent reaches the goal first in 80 % of the episodes. An agent that reaches 
 finds the goal first in a third of the episodes. Eyes with many receptors use one ray per receptor (four in mazes), and
 the single receptor uses 96 rays.
 
-**First table.** "CPU s" is the CPU time of one thread, for rollouts and updates but without the evaluations. "update"
-is the fraction of this time that the updates take. Brackets contain the 95 % confidence interval (Wilson) of the
-fraction in the last evaluation. "return" is the undiscounted return per training episode. The animal with a single
+**First table.** "80 % after" is the number of steps after which the task counts as solved, and "CPU s" is the CPU time
+of one thread until then, for rollouts and updates but without the evaluations. "update" is the fraction of the CPU time
+that the updates take. "steps" is the length of the whole training run. "goal first" and "adversary" are the fractions
+of episodes of the last evaluation in which the goal or an adversary is reached first. Brackets contain the 95 %
+confidence interval (Wilson). "return" is the undiscounted return per training episode. The animal with a single
 receptor often reaches no object. If it reaches one, this object is the goal in one of three cases, as expected by
 chance.
 
-**Second table.** For the maze, the table states the distance from the start at which an episode ends, and the return of
-the episode. The return is 0.25 per metre of this distance, minus 1 for every action in contact with a wall. The fitness
-is 1.5 per metre, minus 2 for every such action. Means have 95 % confidence intervals. The stated interval of the
-fitness may be wider than the actual one, because only an upper bound of its width is known.
+**Second table.** This table is for the maze, where the distance travelled measures success. It states the distance from
+the start at which an episode ends, the number of actions in contact with a wall, and the return of the episode. The
+return is 0.25 per metre of this distance, minus 1 for every action in contact with a wall. The fitness is 1.5 per
+metre, minus 2 for every such action. Means have 95 % confidence intervals. For the interval of the fitness, only an
+upper bound of the width is known, and the table states this bound.
 
 An animal that stands still has a return of 0, and an animal with one eye learns little more than to stand still.
 Animals with ten eyes learn to travel through the maze. For comparison, a hand-written controller receives the true
@@ -43,9 +46,9 @@ based, is above 0.
 the maze, animals with ten eyes have a higher fitness and travel farther than animals with one eye.
 
 **Limits.** Some rows have few steps because the training run was stopped early, and not because learning was finished.
-In the rows "with tanh" for tracking and the maze, the learner did not limit the means of actions. In the maze row "with
-tanh", contact had its full cost only after 500,000 steps. `docs/measurements/learning.md` lists other settings that
-were tried.
+In the rows "with tanh" for tracking and the maze, the learner did not limit the mean of the policy's distribution of
+actions. In the maze row "with tanh", contact had its full cost only after 500,000 steps.
+`docs/measurements/learning.md` lists other settings that were tried.
 
 Training runs take minutes each, so their results are stored (`docs/validation/data/learning_curves.csv`). The page is
 written from the stored results.
@@ -234,8 +237,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the requested training, then write the page of all stored results."""
     options_parser = parser(__doc__ or "")
     options_parser.add_argument("--train", nargs="+", default=[], choices=CASES, metavar="CASE", help=" | ".join(CASES))
-    options_parser.add_argument("--seeds", nargs="+", type=int, default=[0], help="of the trainings")
-    options_parser.add_argument("--steps", type=int, default=600_000, help="of each training")
+    options_parser.add_argument("--seeds", nargs="+", type=int, default=[0], help="seeds of the training runs")
+    options_parser.add_argument("--steps", type=int, default=600_000, help="steps of each training run")
     options_parser.add_argument("--interval", type=int, default=50_000, help="steps between evaluations")
     options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored training runs")
     options = options_parser.parse_args(arguments)

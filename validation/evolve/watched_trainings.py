@@ -78,9 +78,10 @@ class Row:
 
     @property
     def fitness_error(self) -> float:
-        """Upper bound on the standard error of the fitness, without goals.
+        """Upper bound on the standard error of the fitness in a maze without goals.
 
-        The contacts follow from the difference between return and distance, and errors are added as in the worst case.
+        The number of contacts is computed from the difference between return and distance. Errors are assumed to add
+        up.
         """
         contacts_error = TRAINING.progress * self.distance_error + self.return_error
         return EVALUATION.progress * self.distance_error - EVALUATION.contact * contacts_error
@@ -159,7 +160,7 @@ def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
 
 
 def steps_to(rows: Iterable[Row], threshold: float) -> Row | None:
-    """Return the first evaluation of a training run with the goal first in this share of the episodes."""
+    """Return the first evaluation in which the goal was reached first in at least this share of the episodes."""
     return next((row for row in rows if row.goals >= threshold * row.episodes), None)
 
 
@@ -173,7 +174,7 @@ def read_rows(path: Path) -> list[Row]:
 
 
 def write_rows(rows: Iterable[Row], path: Path) -> None:
-    """Write the file atomically."""
+    """Write the rows to a CSV file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(".tmp")
     with unfinished.open("w", encoding="utf-8", newline="") as file:

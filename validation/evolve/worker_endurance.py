@@ -7,9 +7,9 @@ last quarter is 1.00 times the memory in the second quarter, and the ratio of op
 from the whole genome, so that eyes, kernels and brains differ between them. Each candidate is trained for a few steps
 and evaluated. After each candidate, the worker's resident memory and its open files are read from the system.
 
-**Table.** Candidates differ in size, so only the trend matters. It is measured by the median over the last quarter of
-the candidates, relative to the median over the second quarter. (During the first quarter, libraries are still being
-loaded and kernels compiled.)
+**Table.** Candidates differ in size, so only the trend matters. The trend is the median over the last quarter of the
+candidates, relative to the median over the second quarter. (During the first quarter, libraries are still being loaded
+and kernels compiled.) A candidate fails if the PSF of its eye would need too many samples or too much time.
 
 **Bounds.** Memory in the last quarter is at most 1.25 times that in the second, and the number of open files does not
 grow.

@@ -1,8 +1,8 @@
 """Pytest plugin for `validation.mutants`: fast tests run first, slow ones are omitted, and failures are recorded.
 
-MUTANTS names a file of JSON: {"times": {test: seconds} or null, "measured": [tests], "seconds": budget, "report":
-file}.
-Without times, all tests run that have not been measured yet, until the budget is spent. The report contains the
+The environment variable MUTANTS names a JSON file: {"times": {test: seconds} or null, "measured": [tests], "seconds":
+budget, "report": file}.
+If the times are null, all tests that have not been measured yet run until the budget is spent. The report contains the
 duration of each test and the failed tests.
 """
 

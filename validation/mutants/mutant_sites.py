@@ -57,7 +57,9 @@ ORDERED = ("arctan2", "atan2", "cross", "divmod", "meshgrid", "where", "searchso
 class Site:
     """A change to one place of a file: bytes from `start` to `end`, which read `before`, become `after`.
 
-    line: counted from 1; kind: kind of mistake; same: number of earlier sites with an equal change of an equal line
+    line: number of the line, counted from 1.
+    kind: kind of mistake.
+    same: number of earlier sites with an equal change of an equal line.
     """
 
     path: str
@@ -86,7 +88,7 @@ class Site:
         return source[: self.start] + self.after.encode() + source[self.end :]
 
     def chance(self, seed: int) -> str:
-        """Return the hash that defines the place in a random order, independent of other files and lines."""
+        """Return a hash that determines the place in a random order, whatever other files and lines contain."""
         return hashlib.sha256(f"{seed} {self.path} {self.kind} {self.change}".encode()).hexdigest()
 
 
@@ -239,7 +241,7 @@ class _Finder:
         return self._site("axes", start, end, swapped)
 
     def _between(self, kind: str, left: ast.AST, right: ast.AST, before: str, after: str) -> Iterator[Site]:
-        """Yield the operator between two operands."""
+        """Yield the site of the operator between two operands."""
         low, high = self._end(left), self._start(right)
         pattern = r"\b" + before.replace(" ", r"\s+") + r"\b" if before[0].isalpha() else re.escape(before)
         match = re.search(pattern, self.source[low:high].decode())

@@ -30,7 +30,11 @@ DATA_BYTES = 6 * 2**30  # memory limit of a mutant
 
 @dataclass(frozen=True)
 class Trial:
-    """Outcome of a mutant: verdict, "killed" or "survived"; by, the test that failed, "time limit" or "crash"."""
+    """Outcome of a mutant.
+
+    verdict: "killed" or "survived".
+    by: the test that failed, "time limit" or "crash".
+    """
 
     verdict: str
     by: str
@@ -38,7 +42,7 @@ class Trial:
 
 
 def nearest_tests(root: Path, path: str) -> list[str]:
-    """Test files that the folder of tests lists for a module, relative to the tree."""
+    """Return the test files of a module, relative to the tree. The docstring of their folder lists them."""
     package, *folders, name = Path(path).with_suffix("").parts
     if not folders:
         own = f"tests/{package}/test_{name}.py"
@@ -125,7 +129,7 @@ class Copy:
     def _pytest(
         self, files: list[str], times: dict[str, float] | None, limit: float
     ) -> tuple[dict[str, Any], int | None]:
-        """Report and exit code of a run of the tests in `times`, up to the first failure.
+        """Run the tests in `times` up to the first failure, and return their report and the exit code.
 
         With times=None all tests run and are measured. The code is None if the run was ended at its limit.
         """

@@ -12,8 +12,9 @@ of these tests fails, hangs or crashes.
 
 The first mutants are those in `validation/mutants/named_mutants.py`, which contain mistakes that no test had noticed at
 first. The others are drawn evenly from all places in the three packages where such a mistake can be made. Some mutants
-do not change results, but only the time of the computation or an invisible detail. The table lists them as "alike",
-with the reason, and does not count them as mistakes.
+do not change results, but only the time of the computation or an invisible detail. The table calls them "alike" and
+does not count them as mistakes. Below the table, each mutant that survived or is alike is listed with its file and
+line, the change, the original line of code, and the reason.
 
 **Bounds.** At least 90 % of the mutants that are mistakes are killed. Every mutant that survived or is alike has a
 stated reason.
@@ -80,7 +81,7 @@ class Row:
 
 
 def stored(path: Path) -> list[Row]:
-    """Return the trials so far."""
+    """Return all stored trials."""
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", newline="") as file:
@@ -146,7 +147,7 @@ def share(rows: Sequence[Row]) -> float:
 
 
 def broken(rows: Sequence[Row]) -> list[str]:
-    """Return bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     found = [
         f"{row.path}: {row.change}: not killed, without a reason"
         for row in rows

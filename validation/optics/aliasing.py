@@ -104,7 +104,10 @@ def _sampled(n: int, distance: float, exact: np.ndarray) -> tuple[float, float]:
 
 
 def wrap_around(period: float) -> tuple[float, float]:
-    """Return errors of intensity of a spread beam, for the textbook and optics.propagate; period in beam radii."""
+    """Return the errors of the intensity of a beam after it has spread, by the textbook's method and optics.propagate.
+
+    period: period of the samples, in radii of the beam.
+    """
     rayleigh = np.pi * WAIST**2 / WAVELENGTH
     distance, width = rayleigh * np.sqrt(SPREAD**2 - 1), SPREAD * WAIST
     n, dx = round(period * width / (WAIST / 4)), WAIST / 4

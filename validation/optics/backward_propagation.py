@@ -12,7 +12,8 @@ Samples with a pitch of λ/4 represent such a wave along their diagonal. At larg
 With a negative distance, `optics.propagate` only reverses phases. It omits waves beyond f = 1/λ (evanescent waves), and
 `result.evanescent_power` reports their fraction of the input's power. Waves that have decayed cannot be recovered. The
 recovered field therefore lacks the evanescent part of the original, and its error equals the square root of the
-evanescent fraction. Forward propagation reports this fraction, so the error of the recovered field is known in advance.
+evanescent fraction. Forward propagation also reports the evanescent fraction, so the error of the recovered field is
+known in advance.
 
 **Tables.** Both tables use Gaussian spots exp(-r²/w²). The exact field of such a spot at the distance z is summed from
 its closed-form spectrum. In the first table w is 2 λ. This spot has almost no evanescent part, so the table shows only
@@ -51,7 +52,11 @@ HOPELESS = 1e3
 
 @dataclass(frozen=True)
 class Row:
-    """Relative L2 errors of the field recovered from `distance` [wavelengths]; the textbook's in two dtypes."""
+    """Relative L2 errors of the field recovered from `distance` [wavelengths].
+
+    float64, float32: by the textbook's method in these types.
+    ours: by optics.propagate.
+    """
 
     distance: float
     float64: float
@@ -63,7 +68,7 @@ class Row:
 class Spot:
     """A Gaussian spot.
 
-    waist: [wavelengths].
+    waist: radius [wavelengths] at which the amplitude has fallen to 1/e.
     share: exact evanescent share.
     said: share reported by optics.propagate.
     error: error of the recovered field.

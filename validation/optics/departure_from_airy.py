@@ -23,7 +23,7 @@ import optics
 from validation import reference
 
 WAVELENGTH = 550e-9
-FRESNEL_NUMBER = 100.0  # large enough to make its own contribution, below 1 / N², negligible
+FRESNEL_NUMBER = 100.0  # so large that its contribution to the difference, below 1/N², is negligible
 APERTURES = (0.01, 0.02, 0.04, 0.08, 0.12, 0.17, 0.24, 0.35, 0.5, 0.6, 0.7)
 RINGS = 5
 TOLERANCE = 1e-5
@@ -33,7 +33,10 @@ LEADING_ORDER = 0.24
 
 @dataclass(frozen=True)
 class Row:
-    """One lens; relative L2 of intensity over the first five rings, area-weighted."""
+    """Results for one lens.
+
+    Misfits and errors are relative L2 differences of the intensity over the first five rings, weighted by area.
+    """
 
     aperture: float
     radius: float
@@ -73,7 +76,7 @@ def measure(aperture: float) -> Row:
 
 
 def orders(rows: list[Row]) -> tuple[float, float, float]:
-    """Return the exponents of NA in both misfits and in the loss of the peak, over the lenses of small aperture."""
+    """Return the powers of NA with which both misfits and the loss of the peak grow, for lenses of small aperture."""
     small = [row for row in rows if row.aperture <= LEADING_ORDER]
     apertures = [row.aperture for row in small]
     return (

@@ -2,8 +2,8 @@
 
 Phases are proportional to the distance, and float32 has only seven digits. Up to which distance are phases in float32
 accurate, and when does `optics.psf` need float64? With float32 phases, the error of the textbook angular spectrum
-method exceeds 1e-5 beyond 2 mm, 1e-3 beyond 0.1 m and 1 beyond 3 m. `optics.psf` in float32 stays below 1e-5 at every
-distance. It needs float64 only for windows far from the focus that receive very little light.
+method exceeds 1e-5 beyond a distance of 2 mm, 1e-3 beyond 0.1 m and 1 beyond 3 m. `optics.psf` in float32 stays below
+1e-5 at every distance. It needs float64 only for windows far from the focus that receive very little light.
 
 **First table.** A phase kz in float32 has a rounding error of up to kz 2^-24. For light of 550 nm, this is 7e-4 rad at
 a distance of 1 mm and 0.7 rad at 1 m. The lenses have Fresnel number 20 and focus at 0.1 mm to 10 m. The textbook's
@@ -16,10 +16,11 @@ below one wave, is converted to float32. Long distances alone therefore do not r
 **Second table.** In `optics`, float32 is not accurate enough for dark windows. The rounding error is a fixed fraction
 of the pupil's light, and a window far from the focus receives so little of that light that the error is large in
 comparison. Here the source in front of an ideal lens (R = 50 µm, f = 0.5 mm) moves off the axis while the window stays
-on the axis. Every PSF is compared with the direct sum at a few of its points. If the error at these points exceeds the
-tolerance, the PSF is computed again with a smaller tolerance or by an exact method. If the error is still too large, an
-`AccuracyError` is raised, whose message recommends another dtype ("refused" in the table). With float64, the tolerance
-is still reached in these windows.
+on the axis. "window / focus" is the brightness in the window relative to that in the focus (root mean squares). Every
+PSF is compared with the direct sum at a few of its points. If the error at these points exceeds the tolerance, the PSF
+is computed again with a smaller tolerance or by an exact method. If the error is still too large, an `AccuracyError` is
+raised, whose message recommends another dtype ("refused" in the table). With float64, the tolerance is still reached in
+these windows.
 
     python -m validation.optics.float32_precision [--out DIR] [--docs DIR]
 """
@@ -74,7 +75,8 @@ class Dark:
     """Results for one window.
 
     brightness: root mean square of the window over that of the focus.
-    errors, predicted: NaN if refused; per DARK_TOLERANCES in float32, last in float64.
+    errors, predicted: actual and predicted errors, one for each of DARK_TOLERANCES in float32, then one in float64. NaN
+        if the PSF is refused.
     """
 
     angle: float
@@ -119,7 +121,7 @@ def dark(angle: float) -> Dark:
 
 
 def breaking_distances(rows: list[Distant]) -> list[float]:
-    """Return distances at which naive phases exceed each of BREAKS, interpolated by power laws."""
+    """Return distances at which errors of float32 phases exceed each of BREAKS, interpolated by power laws."""
     errors = np.maximum.accumulate([row.naive for row in rows])
     return [float(np.exp(np.interp(np.log(b), np.log(errors), np.log(DISTANCES)))) for b in BREAKS]
 

@@ -79,7 +79,7 @@ def _power(illuminant: str) -> np.ndarray:
 
 
 def _at(spectrum: Any, wavelengths: np.ndarray) -> np.ndarray:
-    """Entries of the table itself, 0 where missing; indexing in colour-science would interpolate and round."""
+    """Return entries of the table itself, 0 where missing; indexing in colour-science would interpolate and round."""
     known = dict(zip(spectrum.wavelengths, spectrum.values, strict=True))
     return np.array([known.get(float(nm), 0 * spectrum.values[0]) for nm in wavelengths])
 

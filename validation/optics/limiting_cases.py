@@ -1,7 +1,7 @@
 """Limiting cases: a known value or an error of one line
 
 Does every input at the edge of the domain give the right value or a clear error? Yes: all 12 inputs with a known result
-give this result within their tolerance, and all 26 invalid inputs are refused in one line.
+give this result within their tolerance, and all 26 invalid inputs are refused with an error of one line.
 
 **Method.** Each row of the table passes an input at the edge of the domain to `optics`, and has an expected outcome.
 For an accepted input, the correct result is known, mostly in closed form. The computed result must agree with it within
@@ -18,7 +18,7 @@ instead. The inputs are:
   light behind an aperture without a lens;
 - a window of one sample, compared with the closed form; a window far off the axis, compared with quadrature; and a
   source at grazing incidence, compared with a result in float64;
-- `optics.propagate` over a distance of 0, for an evanescent wave, and for a field of zeros.
+- `optics.propagate` over a distance of 0 and of 1e6 m, for an evanescent wave, and for a field of zeros.
 
 **Refused inputs.** These inputs raise an error:
 
@@ -85,6 +85,8 @@ def propagated(u: Any, **more: Any) -> optics.PropagationResult:
 def lobe(radius: float) -> float:
     """Return the error relative to the closed form of a tiny pinhole's PSF, πa² z² / (λρ²)² for ka << 1.
 
+    a is the radius of the pinhole, and ρ the distance from it.
+
     It follows from the kernel ik z / (2πρ²) e^{ikρ}.
     """
     distance, side = 1e-3, 17
@@ -101,7 +103,7 @@ def same(pupil: Pupil, other: Pupil, **more: Any) -> float:
 def on_axis() -> float:
     """Return the error of one sample on the axis, relative to the closed form of a bare aperture.
 
-    The closed form is |1 - (z/L) e^{ik(L - z)}|².
+    The closed form is |1 - (z/L) e^{ik(L - z)}|², where L is the distance from the rim.
     """
     exact = circular_aperture_on_axis(RADIUS, DISTANCE, LAMBDA) / (math.pi * RADIUS**2)
     return abs(float(psf(Pupil(RADIUS), shape=(1, 1))[0, 0]) / exact - 1)
@@ -139,7 +141,7 @@ def evanescent_wave() -> float:
 
 
 def far_away() -> float:
-    """Return the error over a window far smaller than the first zero: there |U| is the integral of u, divided by λz."""
+    """Return the error over a window far inside the first dark ring: there |U| is the integral of u, divided by λz."""
     distance, side = 1e6, 5
     found = np.abs(propagated(np.ones((side, side)), distance=distance).u)
     return relative_l2(found, np.full((side, side), (side * 1e-6) ** 2 / (LAMBDA * distance)))

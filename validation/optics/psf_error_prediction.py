@@ -22,8 +22,8 @@ that PSFs are computed more accurately than necessary, which costs time. With `-
 first N cases. In 80 % of these cases, the chosen method must take at most twice the time of the fastest method whose
 actual error is below the tolerance.
 
-**Limits.** If no method can reach the tolerance, an `AccuracyError` states what is possible. The table counts those
-cases by reason.
+**Limits.** If no method can reach the tolerance, `optics.psf` raises an `AccuracyError` that states what is possible.
+The lines below the table count these refused cases by reason.
 
     python -m validation.optics.psf_error_prediction [--cases N] [--seed N] [--methods N] [--out DIR] [--docs DIR]
 """
@@ -185,7 +185,7 @@ def reason(refusal: str) -> str:
 
 
 def shares(rows: Sequence[Row]) -> dict[str, float]:
-    """Return quantities on which the bounds are set."""
+    """Return the quantities that the bounds limit, by name."""
     answered = [row for row in rows if row.runs]
     ratios = np.array([row.ratio for row in answered])
     # Refused cases are not timed; a chosen method above the tolerance counts as too slow.

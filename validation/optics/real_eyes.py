@@ -12,22 +12,23 @@ waveguide modes. All rhabdoms have the refractive index 1.363 in a medium of 1.3
 Acuity is that of a hexagonal lattice.
 
 **Sources.** The last column states which part of the source was read: the article, a table, an appendix, the caption of
-a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible: the value comes
-from a later article, or from the proposal for this page. "Closed form" means that it comes from a formula.
+a figure, the abstract, or a press release ("press"). "Quoted" means that the source was not accessible, and that the
+value comes from a later article or from our notes. "Closed form" means that it comes from a formula.
 
 - Honeybees: Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1. The published Δρ is d/f, which ignores
   diffraction. The computed angles are therefore larger, by 20 to 65 %. Angles measured by electrophysiology agree
   better with the computed ones: 2.6° on average in dark-adapted eyes, and less than 1.9° in the acute zone of
   light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017). A closed pupil removes the higher modes
-  (Stavenga 2004), so the light-adapted angle is computed from the first mode. *Apis cerana* has V = 2.55 at 540 nm,
-  just above the cut-off of the second mode at 2.405. Its angle is therefore sensitive to the refractive indices. For
-  *Apis dorsata*, the table's S differs by 9 % from the value that follows from its other columns (D, f, Δρ and l).
+  (Stavenga 2004), so the light-adapted angle is computed from the first mode. The rhabdom of *Apis cerana* has a
+  waveguide parameter of V = 2.55 at 540 nm, just above the cut-off of the second mode at 2.405. Its angle is therefore
+  sensitive to the refractive indices. For *Apis dorsata*, the table's S differs by 9 % from the value that follows from
+  its other columns (D, f, Δρ and l).
 - *Drosophila*: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1.
 - Blowfly: Stavenga, J. Exp. Biol. 207, 1703, 2004, caption of fig. 4. Dark-adapted angles approach d/f, and
   light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves between
   these limits could not be read, so the column "published" contains the limits. The curves are for tapered rhabdomeres,
   whereas the model has straight ones.
-- *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The inputs are quoted.
+- *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The dimensions of the eye are quoted.
 - *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. According to geometrical optics, the
   acceptance angle of the receptor is 45°. The row shows by how much the PSF of the lens increases this angle.
 - Humans: Curcio et al., J. Comp. Neurol. 292, 497, 1990, abstract (199,000 cones per mm², 100,000 to 324,000 in
@@ -82,16 +83,16 @@ from validation.pages.page import Page, parser
 
 GREEN, MIDDLE = 540e-9, 500e-9
 LUMINANCES = (3.4, 34.0, 340.0)  # [cd/m²], Banks et al. 1987
-FREQUENCIES = np.array([5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0])  # [cycles/degree], the same
+FREQUENCIES = np.array([5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0])  # [cycles/degree], Banks et al. 1987
 CYCLES, SECONDS, PUPIL_AREA, D_PRIME = 7.5, 0.1, math.pi * 1e-6, 0.77  # 70.7 % correct
-TRANSMISSION, EFFICIENCY, COVERED = 0.68, 0.5, 0.9  # Geisler 1984: ocular media, cones; share of the fovea
+TRANSMISSION, EFFICIENCY, COVERED = 0.68, 0.5, 0.9  # Geisler 1984: of ocular media, of cones; fraction of the fovea
 IDEAL_AT_5 = 1000.0, 10_000.0
 MINUTE = math.radians(1 / 60)
 
 
 @dataclass(frozen=True)
 class Row:
-    """A published value, the computed one, and the range of computed/published."""
+    """A published and a computed value, and the range in which their ratio must lie."""
 
     name: str
     unit: str
@@ -214,7 +215,7 @@ def limits() -> list[Row]:
 def geisler_photons() -> float:
     """Return photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
 
-    The budget's light is daylight. The ratio of its luminance to that of its light at 555 nm converts it.
+    The photons of daylight near 555 nm are divided by the luminance of daylight in a band 1 nm wide.
     """
     narrow = optics.Receptors((optics.Spectrum((554.0, 555.0, 556.0), (0.0, 1.0, 0.0)),), range_nm=(550.0, 560.0))
     budget = optics.PhotonBudget(math.pi, integration_time=1.0, quantum_efficiency=1.0)
@@ -222,7 +223,7 @@ def geisler_photons() -> float:
     lumens_per_watt = 683.0
     luminance = (
         budget.spectral_irradiance / math.pi * float(daylight(np.array(555e-9))) * lumens_per_watt * 1e-9
-    )  # of 1 nm
+    )  # of a band 1 nm wide
     return float(photons / luminance)
 
 

@@ -1,4 +1,7 @@
-"""Rays through a real surface z = h(x), glass below, vacuum above, light along +z: effects beyond a thin element."""
+"""Rays through a real surface z = h(x), which show effects that a thin element omits.
+
+Glass lies below the surface and vacuum above it. Light travels along +z.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,13 @@ __all__ = [
 
 @dataclass(frozen=True)
 class RealLens:
-    """strehl: Strehl ratio of the real surface at its best focus; spread: (paraxial minus marginal focus) / (λ/NA²)."""
+    """A relief whose mask is an ideal lens, and the focus of its real surface.
+
+    aperture: NA of the ideal lens.
+    height: height [m] of the relief.
+    strehl: Strehl ratio of the real surface at its best focus.
+    spread: distance between the paraxial and the marginal focus, divided by λ/NA².
+    """
 
     aperture: float
     height: float
@@ -33,7 +42,12 @@ class RealLens:
 
 @dataclass(frozen=True)
 class Corrugation:
-    """Shares of the light; the mask transmits all of it once."""
+    """Effects of a corrugation on rays, all of which its mask transmits.
+
+    depth: depth of the corrugation, relative to its period.
+    reflected: fraction of the rays that are totally reflected.
+    caught: fraction of the rays that hit the surface again.
+    """
 
     depth: float
     reflected: float
@@ -106,14 +120,14 @@ def caught_again(height: Callable[[np.ndarray], np.ndarray], slope: np.ndarray, 
 
 
 def real_lens(aperture: float, focal_length: float, n: float, wavelength: float) -> RealLens:
-    """Return the relief whose mask is an ideal lens, flat side towards the light, rim in the plane z = 0."""
+    """Return results for the relief whose mask is an ideal lens. Light enters its flat side; its rim has z = 0."""
     radius = focal_length * aperture / np.sqrt(1 - aperture**2)
     height = (np.hypot(radius, focal_length) - focal_length) / (n - 1)
     nodes, weights = np.polynomial.legendre.leggauss(300)
     r2 = radius**2 * (nodes + 1) / 2
     h = height - (np.sqrt(r2 + focal_length**2) - focal_length) / (n - 1)
 
-    # |mean of exp(ikL)|² over the pupil's area, L the path through each point of the surface to a focus at z
+    # The Strehl ratio is |mean of exp(ikL)|² over the pupil's area, where L is the path to a focus at z.
     depth = wavelength / aperture**2
     z = focal_length + depth * np.linspace(-40, 40, 801)[:, None]
     path = n * h + np.sqrt(r2 + (z - h) ** 2)
@@ -125,7 +139,7 @@ def real_lens(aperture: float, focal_length: float, n: float, wavelength: float)
 
 
 def corrugation(depth: float, n: float) -> Corrugation:
-    """Return h = (d/2) sin(2πx), period 1."""
+    """Return the effects of a corrugation h = (d/2) sin(2πx) with the depth d and the period 1."""
     x = (np.arange(4000) + 0.5) / 4000
     slope = np.pi * depth * np.cos(2 * np.pi * x)
     lost = np.isnan(refract(slope, n)[0])

@@ -1,4 +1,4 @@
-"""Textbook angular spectrum in NumPy, whose failures these pages show. Time factor exp(-iωt)."""
+"""Textbook angular spectrum in NumPy, whose errors the proofs of this folder show. Time factor exp(-iωt)."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ def angular_spectrum(
 ) -> np.ndarray:
     """Return F⁻¹{F{u} H}, H = exp(2πi z √(1/λ² - fx² - fy²)), over the samples' own period (Goodman §3.10.2).
 
-    Backwards (z < 0), evanescent waves grow as they decay forwards. dtype: type of every intermediate number, including
-    kz.
+    In backward propagation (z < 0), evanescent waves grow as fast as they decay in forward propagation.
+
+    dtype: type of every intermediate number, including kz.
     """
     real = np.zeros(0, dtype).real.dtype.type
     fx, fy = (np.fft.fftfreq(n, dx).astype(real) for n in u.shape[::-1])

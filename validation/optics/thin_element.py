@@ -63,7 +63,13 @@ PRISM_RADIUS, PRISM_DISTANCE = 20e-6, 1e-3
 
 @dataclass(frozen=True)
 class Prism:
-    """Deviations [rad] at one angle; psf: from the peak of optics.psf (NaN: not computed)."""
+    """Deviations [rad] of a prism with one angle.
+
+    real, reversed: of the real prism, if light leaves it or enters it through the slope.
+    thin: of its mask.
+    transmitted: transmitted fraction of the power.
+    psf: position of the peak of optics.psf; NaN if it was not computed.
+    """
 
     angle_deg: float
     real: float
@@ -84,7 +90,7 @@ def prism(angle_deg: float, with_psf: bool = True) -> Prism:
 def psf_deviation(angle: float) -> float:
     """Return the direction [rad] of the brightest point behind a prism.
 
-    It is the top of a parabola through a cut of the PSF by optics.psf.
+    It is the vertex of a parabola through a cut of the PSF by optics.psf.
     """
     heights = np.tan(angle) * PRISM_RADIUS * (2 * np.arange(4) - 3)
     pupil = optics.Pupil(PRISM_RADIUS, optics.BSplineRelief(np.tile(heights, (4, 1))), n=N)
@@ -102,7 +108,7 @@ def _lens(aperture: float, focal_length: float = FOCAL_LENGTH) -> RealLens:
 
 
 def limits() -> dict[str, float]:
-    """Return the limits of the mask: given errors of its deviation, and effects that it omits."""
+    """Return the limits of the mask: slopes with given errors of the deviation, and onsets of omitted effects."""
 
     def off(angle: float, by: float) -> float:
         return 1 - thin_deviation(angle, N) / deviation_glass_first(angle, N) - by

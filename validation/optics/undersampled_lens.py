@@ -15,9 +15,9 @@ In `optics.psf`, the user does not choose the sampling of the pupil: the functio
 phase, or uses a method that needs no grid. Its PSFs of the same pupils are accurate to the requested tolerance.
 
 **Table.** The table shows the energy inside the first dark ring of the Airy pattern, as a fraction of the light through
-the pupil. "textbook" is the angular spectrum method on the grid of the pupil samples, with band-limited interpolation
-of the field. "exact" is the Rayleigh-Sommerfeld integral. The rows with f = 0.4 mm show the f/2 lens and its grid ten
-times smaller, with 16 to 512 samples.
+the pupil. "pitch / needed" is the pitch divided by λ / (2 NA). "textbook" is the angular spectrum method on the grid of
+the pupil samples, with band-limited interpolation of the field. "exact" is the Rayleigh-Sommerfeld integral. The rows
+with f = 0.4 mm show the f/2 lens and its grid ten times smaller, with 16 to 512 samples.
 
     python -m validation.optics.undersampled_lens [--out DIR] [--docs DIR]
 """
@@ -107,8 +107,8 @@ def true_psf(lens: Lens, dx: float, side: int = 65) -> optics.PSFResult:
 def energy_inside(u: np.ndarray, dx: float, radius: float) -> float:
     """Return ∫ |u|² over a disk about the centre, of the band-limited function through the samples.
 
-    Gauss-Legendre in radius, trapezoidal rule in angle. The points lie between the samples, so the Fourier sum is
-    evaluated directly.
+    The quadrature is Gauss-Legendre's in radius and the trapezoid rule in angle. The points lie between the samples, so
+    the Fourier sum is evaluated directly.
     """
     n = len(u)
     frequency = np.fft.fftshift(np.fft.fftfreq(n, dx))

@@ -66,6 +66,6 @@ def parser(text: str) -> argparse.ArgumentParser:
 
 
 def blanked(markdown: str) -> str:
-    """Replace the numbers of a page, since their last digits differ between machines."""
+    """Return a page with its numbers replaced, because their last digits differ between machines."""
     without = re.sub(r"[-+]?(\d[\d.]*(e[-+]?\d+)?|\binf\b|\bnan\b)", "#", markdown)
     return re.sub(r"[ -]+", " ", without)

@@ -42,7 +42,7 @@ class Design:
 
 @dataclass(frozen=True)
 class DesignRow:
-    """Milliseconds of CPU time for a PSF, and with its gradient; predicted and actual error; the same of the yardstick.
+    """CPU times [ms] and errors of a PSF, without and with its gradient, and of the yardstick.
 
     All values are medians over new pupils.
     """

@@ -69,7 +69,8 @@ def _single_precision(case: str, ours: Sequence[Point], peers: Sequence[Point]) 
 def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -> list[Verdict]:
     """Compare angular spectra with equal samples.
 
-    Errors are relative to the smallest of the peers', times to the fastest peer with a comparable error.
+    Errors are relative to the smallest error of the peers, and times to that of the fastest peer with a comparable
+    error.
     """
     found = []
     spectra = [[point for point in points if point.kind == "angular spectrum"] for points in (ours, peers)]

@@ -45,7 +45,7 @@ def one_thread() -> Iterator[None]:
 
 
 def median_seconds(compute: Callable[[], Any], repeats: int = REPEATS, least: float = 0.05) -> float:
-    """Return the median of at least `repeats` calls (three if one takes a second) and `least` seconds.
+    """Return the median duration of at least `repeats` calls (three if one takes a second) and `least` seconds.
 
     The call must have been made once before. If the second call is short, it is not counted, because it may still
     include warm-up.
@@ -74,7 +74,7 @@ def our_points(case: Case, machine: str) -> Iterator[Point]:
 
 
 def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator[Point]:
-    """Yield every method of these peers (with their versions), on every grid, in every precision."""
+    """Yield points of every method of these peers (with their versions), on every grid and in every precision."""
     for peer, version in peers.items():
         done = set()  # some grids are equal for methods that choose their own pitch
         for grid in grids(case):

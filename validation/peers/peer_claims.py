@@ -37,7 +37,7 @@ def cases() -> Iterator[Case]:
 
 
 def answered(asked: list[Case]) -> tuple[list[float], str, list[str]]:
-    """Return differences over their bounds, the table, and the claims that do not hold."""
+    """Return the differences divided by their bounds, the table, and the claims that do not hold."""
     shares, broken, lines = [], [], []
     source = ""
     for case in asked:

@@ -17,7 +17,7 @@ STORED = Path(__file__).with_name("measured.csv")
 class Point:
     """A measured point.
 
-    samples, dx: samples across the pupil and their pitch [m].
+    samples, pitch: samples across the pupil and their pitch [m].
     error: relative L2 error of intensity over the window.
     seconds: median on one thread.
     kind: see `problem.Run`.
@@ -39,7 +39,7 @@ class Point:
 
     @property
     def series(self) -> tuple[str, str, str, str, str]:
-        """Key that points of the same method with other samples share."""
+        """Key that is the same for all points of a method, whatever their samples."""
         return self.case, self.peer, self.method, self.dtype, self.detail
 
 
@@ -58,7 +58,7 @@ def read_points(path: Path = STORED) -> list[Point]:
 
 
 def write_points(points: Iterable[Point], path: Path = STORED) -> None:
-    """Write the file atomically."""
+    """Write the points to a CSV file atomically."""
     temporary = path.with_suffix(".tmp")
     with temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")

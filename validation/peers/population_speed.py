@@ -7,20 +7,21 @@ The fastest peer, prysm with 32 samples, computes 2871 with a median error of 6.
 **Method.** The eyes resemble the eyes in an evolutionary search: pupil radii of 15 to 40 µm, a relief of 4 x 4 control
 points that is close to that of a lens, a retina at a distance of 240 µm, and green light. A PSF has 65 x 65 samples
 with a pitch of 0.25 µm. Each code computes PSFs on one thread. `psf_batch` is timed on the whole population, and the
-other codes are timed on 24 new eyes. The time includes the computation of the relief's heights and of all matrices that
-an eye needs. The error of a PSF is its relative L2 distance from our direct sum over nodes, which is accurate to 1e-5.
-The table states the median and the largest error over every fifth eye.
+other codes are timed on 24 eyes that they have not computed before. The time includes the computation of the relief's
+heights and of all matrices that an eye needs. The error of a PSF is its relative L2 distance from our direct sum over
+nodes, which is accurate to 1e-5. The table states the median and the largest error over every fifth eye.
 
 **Table.** `psf_batch` runs with five tolerances and `psf` with three. The peers run with 32 to 256 samples across the
 pupil. The second table is for the design of lenses. The pupils have a radius of 1 mm, a focal length of 10 mm, and a
-map of heights or Zernike modes. The table states CPU times of single PSFs, without and with the gradient with respect
-to all heights or coefficients. The last two columns state the time and the error of a matrix Fourier transform in
-NumPy. Unlike `optics`, it does not predict its error.
+map of heights or Zernike modes. A map of heights is smooth, plus random deviations with the stated standard deviation
+("noise"). The table states CPU times of single PSFs, without and with the gradient with respect to all heights or
+coefficients, and the predicted and the actual error of the PSF. The last two columns state the time and the error of a
+matrix Fourier transform in NumPy. Unlike `optics`, it does not predict its error.
 
 **Limits.** The other codes cannot share a plan between the eyes of a population. Unlike `optics.psf`, they also have no
 exact propagator whose output grid can be chosen freely. Their matrix Fourier transform from the pupil to the focal
-plane is used instead. It equals Fresnel's integral if the phase kr²/2z is added to the field in the pupil. The errors
-of these codes therefore come from the paraxial model, and from the hard or grey edge of the sampled pupil.
+plane is used instead. This transform equals Fresnel's integral if the phase kr²/2z is added to the field in the pupil.
+The errors of these codes therefore come from the paraxial model, and from the hard or grey edge of the sampled pupil.
 
     python -m validation.peers.population_speed [--eyes N] [--without-peers] [--out DIR] [--docs DIR]
 """
@@ -56,7 +57,11 @@ GOAL = 3000.0  # PSFs per CPU second, at a tolerance of 1e-2
 
 @dataclass(frozen=True)
 class Row:
-    """code, with its setting; PSFs per CPU second; median and largest error over some of the eyes."""
+    """Results of a code with one setting.
+
+    rate: PSFs per CPU second.
+    median, worst: median and largest error over some of the eyes.
+    """
 
     code: str
     asked: str
@@ -112,7 +117,7 @@ def one(pupil: optics.Pupil, **asked: object) -> np.ndarray:
 
 
 def timed(code: str, asked: str, population: list[optics.Pupil], known: dict[int, np.ndarray], picture: Picture) -> Row:
-    """Compute the eyes that are compared, then time the code on new eyes."""
+    """Return the errors of a code for the eyes in `known`, and its speed for new eyes."""
     errors = [relative_l2(picture(population[i]), image) for i, image in known.items()]
     seconds = []
     for again in range(AGAIN):
@@ -126,9 +131,9 @@ def timed(code: str, asked: str, population: list[optics.Pupil], known: dict[int
 
 
 def pupil_field(pupil: optics.Pupil, n: int, parts: int = 1) -> tuple[np.ndarray, float]:
-    """Return samples (n, n) of the pupil's field with the phase r²/2z that a focus lacks, and their pitch [m].
+    """Return samples (n, n) of the pupil's field with Fresnel's phase kr²/2z, and their pitch [m].
 
-    For even n the axis is at n//2.
+    Transforms to a focus lack this phase. For even n, the axis is at n//2.
 
     parts: subsamples of a cell at the edge along an axis.
     """
@@ -146,7 +151,7 @@ def pupil_field(pupil: optics.Pupil, n: int, parts: int = 1) -> tuple[np.ndarray
 
 
 def finished(amplitude: np.ndarray, pupil: optics.Pupil) -> np.ndarray:
-    """PSF from an amplitude in the code's own scale: Fresnel's |U|² has the power of the pupil's spectrum."""
+    """Return the PSF [1/m²] for Fresnel's amplitude U on the window."""
     image = np.abs(amplitude) ** 2
     found: np.ndarray = image / pupil.area
     return found
@@ -165,7 +170,7 @@ def prysm_picture(n: int) -> Picture:
 
 
 def _scale(field: np.ndarray, pitch: float, out: np.ndarray) -> float:
-    """Return the factor that gives the axis |Σ u| dξ²/λz, for any convention of a code."""
+    """Return the factor by which the output `out` of a code has Fresnel's amplitude on the axis, |Σ u| dξ²/λz."""
     axis = abs(out[N // 2, N // 2])
     return float(abs(field.sum()) * pitch**2 / (WAVE * Z) / axis)
 

@@ -23,7 +23,7 @@ WAVELENGTH = 550e-9
 POINTS = 129  # across the window
 FOCAL_LENGTH = 300e-6
 FEWEST, MOST = 128, 1080  # samples across a grid; 1080 is the first fast length with 8 samples per output
-MOST_WIDE = 640  # for wider grids; only codes without a band limit gain (near field: 7e-3, not 1.3e-2, at 1080)
+MOST_WIDE = 640  # for wider grids; with 1080, only codes without a band limit gain (near field: 7e-3 instead of 1.3e-2)
 PER_OUTPUT = (1 / 6, 1 / 4, 1 / 3, 1 / 2, 1, 2, 4, 8)  # samples per output pitch
 CONVERGED = 1e-10
 
@@ -54,7 +54,7 @@ class SampleGrid:
 
     @property
     def odd(self) -> SampleGrid:
-        """Without the first row and column of an even grid: symmetric about its centre sample."""
+        """This grid without the first row and column if their number is even, so that it has a centre sample."""
         return SampleGrid(self.n - 1 + self.n % 2, self.dx)
 
 
@@ -163,7 +163,10 @@ def grids(case: Case) -> list[SampleGrid]:
 
 
 def error(case: Case, intensity: np.ndarray, fitted: bool) -> float:
-    """Return the relative L2 error of intensity over the window; fitted: after the overall scale that minimises it."""
+    """Return the relative L2 error of an intensity over the window.
+
+    fitted: True to multiply the intensity first by the factor that minimises the error.
+    """
     exact = case.exact()
     image = np.asarray(intensity, np.float64)
     if image.shape != exact.shape or not np.isfinite(image).all():

@@ -19,7 +19,7 @@ LONGEST = 0.2  # predicted seconds above which a method selected by name is omit
 
 
 def psf_runs(case: Case) -> Iterator[Run]:
-    """Yield every possible tolerance, with the planner's choice and with each method of that accuracy."""
+    """Yield runs at every possible tolerance, by the planner's choice and by each method that reaches it."""
     focal_length = case.focal_length if case.has_lens else None
     pupil = optics.Pupil(aperture_radius=case.radius, thin_lens_focal_length=focal_length)
     for method in ("auto", *EXACT):

@@ -33,7 +33,7 @@ COLORS = {"float32": OURS, "float64": OURS_TOO}
 def measure(
     cases: Sequence[Case], machine: str, rounds: int, rivals: Mapping[Peer, str]
 ) -> tuple[list[Point], list[Point]]:
-    """Return points of this package and of the peers, measured in turns.
+    """Return points of this package and of the peers, measured alternately.
 
     The time of a point is the smallest of its medians over the rounds.
     """

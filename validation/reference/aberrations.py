@@ -43,7 +43,7 @@ def marechal_strehl(sigma: float) -> float:
 
 
 def strehl_defocus(w: float) -> float:
-    """Return sinc²(W020): [sin(πW)/(πW)]² (Born & Wolf §8.8.2, u = 4πW)."""
+    """Return [sin(πW)/(πW)]² for a peak defocus of W = W020 waves (Born & Wolf §8.8.2, u = 4πW)."""
     return float(np.sinc(w) ** 2)
 
 

@@ -1,6 +1,6 @@
 """Fourier transforms of apertures in closed form: ∫∫ exp(-2πi (fx x + fy y)) dx dy over the opening.
 
-Lengths in any unit, frequencies in cycles per that unit.
+Lengths may have any unit. Frequencies are in cycles per this unit.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ __all__ = ["annulus_spectrum", "disk_spectrum", "polygon_spectrum", "rectangle_s
 
 
 def disk_spectrum(fx: np.ndarray, fy: np.ndarray, radius: float = 1.0) -> np.ndarray:
-    """Return a J₁(2πaf)/f (Goodman, Introduction to Fourier Optics, §2.1.5)."""
+    """Return a J₁(2πaf)/f for a disk of radius a (Goodman, Introduction to Fourier Optics, §2.1.5)."""
     f = np.maximum(np.hypot(fx, fy), 1e-12)
     return np.asarray(radius * j1(2 * np.pi * radius * f) / f)
 
 
 def annulus_spectrum(fx: np.ndarray, fy: np.ndarray, inner: float, outer: float = 1.0) -> np.ndarray:
-    """Return the difference of two disks."""
+    """Return the spectrum of an annulus, the difference of two disks."""
     return disk_spectrum(fx, fy, outer) - disk_spectrum(fx, fy, inner)
 
 
@@ -30,8 +30,8 @@ def polygon_spectrum(fx: np.ndarray, fy: np.ndarray, vertices: np.ndarray) -> np
 
     Source: Lee & Mittra, IEEE Trans. Antennas Propag. 31, 99-103 (1983).
 
-    By Gauss's theorem, with the field f e^{-2πi f·x} / (-2πi f²), a sum over edges e = w - v with middle m of
-    (f x e) sinc(f·e) e^{-2πi f·m} / (-2πi f²).
+    By Gauss's theorem for the vector field f e^{-2πi f·x} / (-2πi f²), it is the sum of (f x e) sinc(f·e) e^{-2πi f·m}
+    / (-2πi f²) over all edges e, with their middles m.
     """
     fx, fy = np.asarray(fx, dtype=np.float64), np.asarray(fy, dtype=np.float64)
     total = np.zeros(np.broadcast(fx, fy).shape, dtype=np.complex128)

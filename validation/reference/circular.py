@@ -30,7 +30,10 @@ def airy_psf(r: np.ndarray, wavelength: float, radius: float, focal_length: floa
 
 
 def airy_encircled_energy(r: np.ndarray, wavelength: float, radius: float, focal_length: float) -> np.ndarray:
-    """Return 1 - J0(v)² - J1(v)² (Born & Wolf §8.5.2, eq. 18)."""
+    """Return the fraction of the power within the radius r, 1 - J0(v)² - J1(v)² (Born & Wolf §8.5.2, eq. 18).
+
+    v is that of `airy_psf`.
+    """
     v = 2 * np.pi * radius * np.asarray(r, dtype=np.float64) / (wavelength * focal_length)
     return 1 - j0(v) ** 2 - j1(v) ** 2
 
@@ -56,9 +59,9 @@ def circular_aperture_on_axis(radius: float, distance: float, wavelength: float)
 
 
 def converging_wave_at_focus(radius: float, distance: float, wavelength: float) -> complex:
-    """Return the field at the focus of exp(-ik(L(ρ) - z)), L = √(ρ² + z²), behind a circular aperture, exact:
+    """Return the exact field at the focus of exp(-ik(L(ρ) - z)), L = √(ρ² + z²), behind a circular aperture:
 
-    ∫ z/(2πL²) (1/L - ik) 2πρ dρ with ρ dρ = L dL is 1 - z/L - ikz ln(L/z), L at the edge
+    ∫ z/(2πL²) (1/L - ik) 2πρ dρ with ρ dρ = L dL is 1 - z/L - ikz ln(L/z), where L belongs to the edge
     (first Rayleigh-Sommerfeld integral, Goodman §3.5; Airy's peak is its limit |kR²/2z|² for R << z).
     """
     tangent2 = (radius / distance) ** 2

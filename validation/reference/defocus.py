@@ -26,11 +26,11 @@ def lommel_intensity(u: np.ndarray | float, v: np.ndarray | float) -> np.ndarray
 
 
 def defocused_psf(r: np.ndarray, wavelength: float, radius: float, focal_length: float, distance: float) -> np.ndarray:
-    """Return Fresnel's PSF of a thin lens exp(-ikρ²/2f) in a plane, unit power [1/m²], on the plane z = distance:
+    """Return Fresnel's PSF [1/m²], of unit power, behind a thin lens exp(-ikρ²/2f), on the plane z = distance.
 
-    πR²/(λz)² I(u, v) with u = kR²(1/z - 1/f), v = kRr/z: Lommel's integral without the Debye approximation, so that it
-    holds at any Fresnel number (Li & Wolf 1984, JOSA A 1:801). An infinite focal length is the bare aperture; for a
-    source at s take 1/f - 1/s in place of 1/f (`thin_lens_image_distance`).
+    It is πR²/(λz)² I(u, v) with u = kR²(1/z - 1/f), v = kRr/z, where I is `lommel_intensity`. Without the Debye
+    approximation, this holds at any Fresnel number (Li & Wolf 1984, JOSA A 1:801). An infinite focal length is the bare
+    aperture. For a source at the distance s, replace 1/f by 1/f - 1/s (`thin_lens_image_distance`).
     """
     k = 2 * np.pi / wavelength
     u, v = k * radius**2 * (1 / distance - 1 / focal_length), k * radius * np.asarray(r) / distance
@@ -38,7 +38,7 @@ def defocused_psf(r: np.ndarray, wavelength: float, radius: float, focal_length:
 
 
 def _shadow(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return U_n = Σ (-1)^s (u/v)^{n+2s} J_{n+2s}(v), for u < v."""
+    """Return (2/u)² (U1² + U2²) with U_n = Σ (-1)^s (u/v)^{n+2s} J_{n+2s}(v), for u < v."""
     total = np.zeros((2, *u.shape))
     for order in range(1, _orders(v)):
         total[(order - 1) % 2] += (-1) ** ((order - 1) // 2) * (u / v) ** (order - 1) * 2 / v * jv(order, v)
@@ -46,7 +46,7 @@ def _shadow(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _near_the_focus(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return the same with J_n(v) = (v/2)^n / n! 0F1(n + 1, -v²/4).
+    """Return the result of `_shadow`, computed with J_n(v) = (v/2)^n / n! 0F1(n + 1, -v²/4).
 
     For small u and v, this avoids quotients of small numbers.
     """
@@ -60,7 +60,7 @@ def _near_the_focus(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def _light(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return V_n = Σ (-1)^s (v/u)^{n+2s} J_{n+2s}(v)."""
+    """Return the intensity of `lommel_intensity` in the light, with V_n = Σ (-1)^s (v/u)^{n+2s} J_{n+2s}(v)."""
     v0, v1 = np.zeros(u.shape), np.zeros(u.shape)
     for s in range(_orders(v) // 2 + 1):
         v0 += (-1) ** s * (v / u) ** (2 * s) * jv(2 * s, v)

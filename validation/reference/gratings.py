@@ -56,7 +56,10 @@ def staircase_grating_efficiency(order: int, levels: int, depth: float = 1.0) ->
 
 
 def sinusoidal_grating_efficiency(order: int, depth: float) -> float:
-    """Return J_m(π depth)²: phase π depth sin(2πx/d), `depth` waves from crest to trough (Goodman §4.4.4)."""
+    """Return J_m(π depth)², the share of the light in order m of a sinusoidal phase grating (Goodman §4.4.4).
+
+    Its phase is π depth sin(2πx/d), which varies by `depth` waves from crest to trough.
+    """
     return float(jv(order, np.pi * depth) ** 2)
 
 

@@ -18,7 +18,7 @@ PINHOLE_FRESNEL_NUMBER = 0.742019
 
 
 def thin_lens_image_distance(focal_length: float, source_distance: float) -> float:
-    """Return z of 1/z = 1/f - 1/s (Born & Wolf §4.4); negative for a virtual image."""
+    """Return the image distance z, 1/z = 1/f - 1/s (Born & Wolf §4.4); negative for a virtual image."""
     return 1 / (1 / focal_length - 1 / source_distance)
 
 

@@ -28,12 +28,15 @@ def ideal_lens_field(
     """Return the field of an ideal lens exp(-ik(√(ρ² + f²) - f)) in a unit wave at radii r of the plane z = distance.
 
     The wave is plane, or exp(ik(√(ρ² + s²) - s)) of a point source at s = source_distance. An infinite focal length is
-    the bare aperture. First Rayleigh-Sommerfeld integral (Goodman §3.5), with D the distance from the aperture's point:
+    the bare aperture. The field is the first Rayleigh-Sommerfeld integral (Goodman §3.5), where D is the distance from
+    a point of the aperture:
 
         U = ∫∫ P z/(2πD²) (1/D - ik) e^{ik(D - z)} ρ dρ dφ
 
-    Gauss-Legendre in ρ, trapezoid in φ (half the circle by symmetry). nodes: (radial, angular); by default enough for
-    float64, from the gradient of the total phase of lens and path.
+    The quadrature is Gauss-Legendre's in ρ and the trapezoid rule in φ, over half the circle by symmetry.
+
+    nodes: numbers of nodes (radial, angular). None: enough for float64, from the gradient of the phase of lens and
+        path.
     """
     z = focal_length if distance is None else distance
     if not math.isfinite(z):
@@ -56,10 +59,11 @@ def ideal_lens_field(
 def ideal_lens_profile(
     r_max: float, wavelength: float, radius: float, focal_length: float = math.inf, distance: float | None = None
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """`ideal_lens_field` as a function of r in [0, r_max]: its Chebyshev interpolant in r², error 1e-11 of the peak.
+    """Return `ideal_lens_field` as a function of r in [0, r_max], interpolated with an error of 1e-11 of the peak.
 
-    The field is even and analytic in r, and band-limited by the steepest ray (Trefethen, Approximation Theory and
-    Approximation Practice, ch. 8). It saves time for windows with more than a few hundred radii.
+    The function is a Chebyshev series in r², because the field is even and analytic in r, and band-limited by the
+    steepest ray (Trefethen, Approximation Theory and Approximation Practice, ch. 8). It saves time for windows with
+    more than a few hundred radii.
     """
     z = focal_length if distance is None else distance
     steepest = (radius + r_max) / math.hypot(radius + r_max, z)
@@ -89,7 +93,7 @@ def _nodes(r: float, k: float, radius: float, focal_length: float, z: float, sou
     They follow from the largest gradient of the phase, and from the nearest complex singularity of the kernel. n
     Gauss-Legendre nodes integrate exp(iωx) on [-1, 1] as soon as 2n exceeds ω. A singularity on the Bernstein ellipse
     with the parameter ρ adds an error of ρ^-2n. 2m points around the circle integrate harmonics below 2m, and a
-    singularity at φ = is adds an error of e^{-2ms}.
+    singularity at φ = i s adds an error of e^{-2ms}.
     """
     rho = np.linspace(0, radius, 33)[:, None]
     angle = np.linspace(0, np.pi, 17)

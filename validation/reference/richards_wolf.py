@@ -1,8 +1,8 @@
 """The vector focus of symmetric light: Richards and Wolf's three integrals.
 
 B. Richards and E. Wolf, Proc. R. Soc. A 253, 358 (1959), eqs. 2.30 to 2.32. Each direction θ contributes a plane wave,
-whose field is rotated with the ray. With an amplitude a(θ) on the sphere about the focus, light polarised along x has
-there
+whose field is rotated with the ray. If the amplitude on the sphere about the focus is a(θ), the field of light
+polarised along x near the focus is
 
     E = (I₀ + I₂ cos 2φ, I₂ sin 2φ, -2i I₁ cos φ),   Iₘ = kz/2 ∫ a cₘ sin θ Jₘ(kρ sin θ) e^{ikW} dθ,
 
@@ -29,7 +29,7 @@ SPARE = 60  # choice: nodes beyond π per cycle, above which Gauss-Legendre quad
 class Light:
     """Light on the pupil.
 
-    at: θ to a(θ) e^{ikW(θ)}.
+    at: function that returns a(θ) e^{ikW(θ)} for angles θ.
     cycles: upper bound on the cycles of W between the rims.
     """
 
@@ -40,10 +40,12 @@ class Light:
 def focal_integrals(
     rho: np.ndarray, wavenumber: float, distance: float, ends: tuple[float, float], light: Light
 ) -> np.ndarray:
-    """Return I₀, I₁ and I₂ at the radii `rho` [m], and scalar theory's, (4, radius), complex.
+    """Return I₀, I₁ and I₂ at the radii `rho` [m], and the integral of scalar theory, (4, radius), complex.
 
-    wavenumber: k [1/m] in the medium. distance: z [m]. ends: θ of the pupil's inner and outer rim. light: amplitude
-    from each direction.
+    wavenumber: k [1/m] in the medium.
+    distance: z [m].
+    ends: θ of the pupil's inner and outer rim.
+    light: amplitude from each direction.
     """
     from scipy.special import jv, roots_legendre
 

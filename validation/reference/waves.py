@@ -42,9 +42,9 @@ def gaussian_beam(r: np.ndarray, wavelength: float, waist: float, z: float) -> n
 def gaussian_field(r: np.ndarray, wavelength: float, waist: float, z: float, *, nodes: int = 0) -> np.ndarray:
     """Return the exact field of exp(-r²/w0²) at distance z >= 0, summed from its angular spectrum.
 
-    ∫ πw0² e^{-π²w0²f²} H(f) J0(2πfr) 2πf df, H as in `plane_wave` (Goodman §3.10; the Hankel transform §2.1.5).
-    The propagating part is integrated over θ with f = sin θ / λ, and the evanescent part over t with f = cosh t / λ, so
-    that both integrands are smooth.
+    It is ∫ πw0² e^{-π²w0²f²} H(f) J0(2πfr) 2πf df, where H is the propagation of a plane wave over z, as in
+    `plane_wave` (Goodman §3.10; the Hankel transform §2.1.5). The propagating part is integrated over θ with f = sin θ
+    / λ, and the evanescent part over t with f = cosh t / λ, so that both integrands are smooth.
     """
     r = np.asarray(r, dtype=np.float64)
     top = min(np.pi / 2, float(np.arcsin(min(1, 6.1 * wavelength / (np.pi * waist)))))

@@ -1,8 +1,8 @@
-"""Cost of the automatic choice of samples over resolution, field of view and number of eyes
+"""Cost of the automatic choice of samples for different resolutions, fields of view and numbers of eyes
 
 Are there eyes for which a slight change makes the automatic choice ("auto") use many more samples? No. In every setting
 it chooses area sampling, in which each sample is the mean light on a receptor or a part of it (an area). One to six
-areas per receptor are enough for a predicted error within the tolerance.
+areas per receptor are enough for a predicted error within the tolerance, which is half of the receptor noise.
 
 **Method.** `sim.choose_fidelity` chooses samples for eyes with perfect lenses in detection, a maze and navigation. One
 property changes at a time: the number of receptors across, the field of view, or the number of eyes. Detection has
@@ -53,7 +53,7 @@ NEXT, FACTOR = 3, 3.0  # resolutions that differ by at most NEXT receptors take 
 class Choice:
     """Chosen samples of one setting.
 
-    sweep: property that differs from the setting before
+    sweep: property in which the setting differs from the preceding one
     error: predicted error relative to the tolerance
     time: CPU time of a frame per receptor [s]
     """
@@ -70,7 +70,7 @@ class Choice:
 
     @property
     def value(self) -> float:
-        """Value of the property that differs."""
+        """Value of the property `sweep`."""
         return {RECEPTORS: self.receptors, FIELD: self.fov_deg, EYES: self.eyes}[self.sweep]
 
 

@@ -7,7 +7,7 @@ signals from goal and adversary differ by at most 0.04 of the receptor noise, in
 30°, and an adversary has horizontal bands. Light comes from above. If all bands had the same width, adversaries would
 therefore be brighter or darker than goals, and one photoreceptor could distinguish them. To prevent this, the edges of
 the bands are fitted by least squares, so that an adversary is as bright as a uniformly grey sphere. The fit covers 24
-directions, and distances at which an eye of 45° sees (nearly) all of an object. It starts from edges that are 30°
+directions, and distances at which an eye of 45° sees (nearly) all of an object. The fit starts from edges that are 30°
 apart, and penalises deviations from them. The two lowest edges can hardly be seen and are not fitted.
 
 The light of one illuminated sphere is computed by tracing rays, without the renderer.
@@ -53,14 +53,15 @@ BEARINGS_DEG = (0.0, 10.0)  # of the object, relative to straight ahead
 DIRECTIONS = np.arange(24) * 2 * np.pi / 24
 BINS, RAYS = 720, 240  # bins of latitude and longitude; rays along either side of the receptor's field
 EVEN = tuple(20.0 + 30.0 * i for i in range(FITTED))  # [deg] initial edges
-STIFFNESS = 1.0  # a band 30° too wide has the weight of a difference of this share of the noise
+STIFFNESS = 1.0  # penalty: an edge 30° off counts as much as a difference of this fraction of the noise
 
 
 @cache
 def light_seen(distance: float, bearing_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the light of a white object in one receptor, by latitude (direction, BINS) and by longitude of its origin.
+    """Return the light of a white object in one receptor, by latitude and by longitude on the object.
 
-    Lambert's law under the world's directional lights; uniform over the receptor's square field.
+    Both arrays are (direction, BINS). The object reflects the world's directional lights by Lambert's law. The receptor
+    is equally sensitive over its square field.
     """
     edge = np.tan(np.radians(Eyes().fov_deg) / 2)
     along = (2 * (np.arange(RAYS) + 0.5) / RAYS - 1) * edge
@@ -97,7 +98,9 @@ def _lights() -> list[tuple[np.ndarray, float]]:
 
 
 def contrast(light: np.ndarray, edges: Sequence[float]) -> np.ndarray:
-    """Return the light of alternate stripes minus that of the mean reflectance.
+    """Return the light of a striped object minus that of an object with the mean reflectance, (direction,).
+
+    light: light of a white object (direction, BINS), see `light_seen`.
 
     edges: positions of the edges, as fractions of the whole
     """

@@ -3,14 +3,14 @@
 Do eyes on any MuJoCo model see the surfaces that MuJoCo's ray caster hits? In each of 53 third-party models, the two
 agree for at least 99.997 % of the receptors: both find the same depth to 1e-3, or both see nothing.
 
-**Method.** The models are all models of `scene_against_mujoco` with moving parts. One eye is mounted on an added camera
-that looks at the model from a random side. Up to three more eyes are mounted on cameras of the model itself. Five
-worlds with random poses are rendered at once. For the centre of every receptor, the depth from `sim.ModelRenderer` is
-compared with the depth from MuJoCo's ray caster.
+**Method.** The models are those of the page `scene_against_mujoco` that have moving parts. One eye is mounted on an
+added camera that looks at the model from a random side. Up to three more eyes are mounted on cameras of the model
+itself. Five worlds with random poses are rendered at once. For the centre of every receptor, the depth from
+`sim.ModelRenderer` is compared with the depth from MuJoCo's ray caster.
 
 **Table.** The columns state the number of moving geoms, the fraction of receptors with the same depth, and this
-fraction for the worst eye of any world. The last column states steps per CPU second. It was measured with 64 worlds of
-two eyes of 15 x 15 receptors and 4 rays per receptor, without physics.
+fraction for the eye and world in which it is smallest. The last column states steps per CPU second. This rate was
+measured without physics, in 64 worlds with two eyes of 15 x 15 receptors and 4 rays per receptor.
 
 **Bounds.** In every model, at least 99.5 % of the receptors have the same depth to 1e-3, or both see nothing.
 
@@ -51,7 +51,7 @@ MANY, ROUNDS = 64, 5
 
 @dataclass(frozen=True)
 class Row:
-    """One model.
+    """Results for one model.
 
     moving: number of moving geoms.
     same: share of receptors with the same depth.

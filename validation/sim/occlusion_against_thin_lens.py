@@ -6,9 +6,9 @@ wrong by up to 0.26.
 
 **Method.** A dark plate at 0.2 m covers the left half of the field. Horizontal stripes with radiances of 0.7 and 1 fill
 a plane at 2 m. The lens has a radius of 1.2 mm. It is focused at the plate, at the stripes, in front of both, or
-halfway between both in inverse distance. Its blur is up to five receptors wide. Its diffraction is more than ten times
-narrower than a receptor, so geometric optics holds. Mitsuba traces 10,000 rays per receptor through all parts of the
-lens. `Eye.see` receives an image with one distance per cell. This image contains no stripes behind the plate.
+halfway between both in inverse distance. The blur is up to five receptors wide. Diffraction blurs by less than a tenth
+of a receptor, so geometric optics holds. Mitsuba traces 10,000 rays per receptor through all parts of the lens.
+`Eye.see` receives an image with one distance per cell. This image contains no stripes behind the plate.
 
 **Table.** Errors are in units of the signal of white. In the column "no occlusion", the blurred light of both surfaces
 is added. If the lens is focused halfway between both distances, the blur of both surfaces is equally wide, and adding
@@ -46,7 +46,12 @@ LARGEST, MEAN, WITHOUT = 0.03, 0.01, 0.1  # bounds
 
 @dataclass(frozen=True)
 class Case:
-    """Signals (y, x) relative to white, for one focus."""
+    """Signals (y, x) relative to white, for one focus.
+
+    traced: by Mitsuba's thin lens.
+    seen: by the eye, with occlusion.
+    added: by the eye, without occlusion.
+    """
 
     name: str
     traced: np.ndarray

@@ -5,12 +5,12 @@ n^-0.51 wherever a slope can be fitted. The automatically chosen sampling has an
 noise σ.
 
 **Method.** Behind a pupil, all receptors of an eye use one set of rays, whose directions are drawn from the mean of
-their receptive fields. The signal of a receptor is a weighted sum over these rays. These signals are compared with the
-published method, in which an image of the scene is convolved with the PSF (`Eye.see`). The image extends beyond the
-field of view by the width of the kernel on every side. Its grid differs from the grid on which the receptive fields of
-the rays are tabulated. Each cell of the image is rendered with many rays or, if light may be reflected any number of
-times, with many areas ([area sampling](../concepts/rendering.md#area-sampling)). Rays and reference use the same light,
-so they differ only in sampling.
+their receptive fields. The signal of a receptor is a weighted sum over these rays. These signals are compared with
+those of `Eye.see`, which convolves an image of the scene with the PSF, as in the [published eyes](../results/paper.md).
+The image extends beyond the field of view by the width of the kernel on every side. Its grid differs from the grid on
+which the receptive fields of the rays are tabulated. Each cell of the image is rendered with many rays or, if light may
+be reflected any number of times, with many areas ([area sampling](../concepts/rendering.md#area-sampling)). Rays and
+reference use the same light, so they differ only in sampling.
 
 Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection world.
 They are in units of the receptor noise σ = 0.01, where white gives a signal of 1 behind a pupil as wide as the retina
@@ -24,11 +24,13 @@ They are in units of the receptor noise σ = 0.01, where white gives a signal of
 
 The perfect lens uses 24 states, because its errors differ much between views. The other pupils use 4 states.
 
-**Table.** Retinas are given as width x height. The last column shows the choice of `rays_per_receptor = "auto"`, which
-is a number of rays or of areas, and its error. No slope is given if fewer than three errors are above 0.01 σ.
+**Table.** Retinas are given as width x height. The slope is the exponent of n in the error. The last column shows the
+choice of `rays_per_receptor = "auto"` and its error. The choice is a number of rays or areas, and the light: direct
+light or all light. No slope is given if fewer than three errors are above 0.01 σ.
 
-**Bounds.** The error of the automatic choice is at most half of the noise. Down to 0.01 σ, errors fall at least like
-n^-0.5, as they do with independent rays. Below 0.01 σ, differences can come from the two different grids.
+**Bounds.** The error of the automatic choice is at most half of the noise. Errors above 0.01 σ fall at least like
+n^-0.5, as they do with independent rays. Errors below 0.01 σ can come from the two different grids, so they have no
+bound.
 
     python -m validation.sim.receptive_field_sampling [--out DIR] [--docs DIR]
 """
@@ -68,7 +70,7 @@ TABULATION = 0.01  # [σ] below which errors come from PSFs, not from rays (1 % 
 
 @dataclass(frozen=True)
 class Series:
-    """Errors [σ] of one pupil and retina by rays per receptor, and of the choice of "auto", in its light."""
+    """Errors [σ] with one pupil and retina, for numbers of rays per receptor and for the choice of "auto"."""
 
     pupil: str
     retina: str
@@ -81,7 +83,7 @@ class Series:
 
     @property
     def slope(self) -> float:
-        """Slope of errors above TABULATION over rays, both logarithmic; -inf for too few errors."""
+        """Slope of log error over log rays, for errors above TABULATION; -inf for too few errors."""
         kept = [(r, e) for r, e in zip(self.rays, self.errors, strict=True) if e > TABULATION]
         if len(kept) < 3:
             return -math.inf
@@ -123,7 +125,10 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
 
 
 def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
-    """Return the fidelity of the cells of the reference's image, which are whole receptors with a perfect lens."""
+    """Return the fidelity with which the reference's image is rendered before it is convolved.
+
+    Each cell of this image is rendered as a receptor. With a perfect lens, cells are whole receptors.
+    """
     perfect = eyes.optics is None
     if light == "all":
         return sim.Fidelity(PERFECT_AREAS if perfect else CELL_AREAS, eyes.bands, light=light, samples="areas")
@@ -131,7 +136,7 @@ def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
 
 
 def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: sim.Fidelity) -> tuple[np.ndarray, float]:
-    """Return the signals of the eyes by rays or areas, and their number per receptor."""
+    """Return the signals of the eyes, and the number of rays or areas per receptor."""
     renderer = sim.BatchedRenderer(world, eyes, 1, fidelity)
     rays = len(renderer.sensor.directions) / math.prod(eyes.resolution)
     return np.concatenate([renderer.signals(state.take(np.array([i]))) for i in range(state.n)])[:, 0], rays

@@ -60,7 +60,12 @@ COLLECTIONS = (
 
 @dataclass(frozen=True)
 class Row:
-    """One model: shares of pixels (all, and the worst image), and the features that the mirror reports as missing."""
+    """Results for one model.
+
+    same_geom, same_depth: fractions of all pixels that agree.
+    worst_picture: fraction of pixels with the same geom in the worst image.
+    lacks: features that the mirror reports as missing.
+    """
 
     name: str
     geoms: int

@@ -78,7 +78,7 @@ def lived_through(world: sim.World, n: int, steps: int = 20) -> WorldState:
 
 
 def facing_objects(world: sim.World, state: WorldState) -> WorldState:
-    """Return the same worlds, with each agent NEAR one of its objects and turned towards it."""
+    """Return the same worlds, with each agent at a distance in NEAR from one of its objects and turned towards it."""
     rng = np.random.default_rng(6)
     cells = np.concatenate([world.agent_spawn, world.object_spawn])
     position, heading = np.empty((state.n, 2)), np.empty(state.n)

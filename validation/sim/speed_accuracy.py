@@ -1,8 +1,8 @@
 """Speed against accuracy of rendering for agents' eyes
 
 How much accuracy does each rendering speed allow? The automatic choice of settings promises an error below σ/2, where σ
-is the receptor noise. Does it keep this promise? It does in all six scenes: its largest error is 0.399 σ. Its speed is
-0.95 to 1.00 times the speed of the fastest setting that is at least as accurate.
+is the receptor noise. Does it keep this promise? It does in all six scenes: its largest error is 0.399 σ. The speed of
+the automatic choice is 0.95 to 1.00 times the speed of the fastest setting that is at least as accurate.
 
 **Errors.** The error of a setting is the root mean square difference from a reference, over channels, eyes, states and
 receptors. Errors are in units of the receptor noise, σ = 0.01. Errors below σ/2 are small compared with the noise of
@@ -10,8 +10,8 @@ one receptor. (If many receptors have the same error, an agent could still learn
 two populations of receptors:
 
 - all receptors, in 4 states that agents reached;
-- the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead. With a perfect lens there are 8 views,
-  because the path-traced renderings take long. Mazes have no objects, so this population is empty there.
+- the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead (8 views with a perfect lens, because
+  the path-traced renderings take long). Mazes have no objects, so this population is empty there.
 
 The reference is Mitsuba's path tracer in 8 bands. Behind a lens, its image is convolved with the kernel of the eye
 (`Eye.see`).
@@ -34,13 +34,15 @@ All settings use float32, because Mitsuba's spectral variants are built for floa
 
 **Table.** "auto" is the choice of `choose_fidelity`, bands included. "front" marks settings on the Pareto front of
 speed against error: no other setting is both faster and more accurate. For this comparison, the error of a setting is
-the greater of the two populations' errors. "vs same light" is the error over all receptors relative to very many rays
-in the same light, so it contains only the effects of samples and bands.
+the greater of the two populations' errors. "on objects" is the error over the receptors that see an object. "vs same
+light" is the error over all receptors relative to a rendering with very many rays in the same light, so it contains
+only the effects of samples and bands. The lines above each table state how much direct light and "bounce" light differ
+from path-traced light, even with very many samples ("converged").
 
 **Bounds.** Compared with path-traced light, the error of "auto" must not exceed the promised σ/2 (plus the noise of the
 reference) in either population, unless a `FidelityWarning` was raised. If the promise is broken, the table states by
 how much. "auto" must also be on the Pareto front, or at most 20 % slower than settings of the front with the same
-error. "auto" was not tuned on any of these views.
+error. None of these views was used to tune "auto".
 
     python -m validation.sim.speed_accuracy [--out DIR] [--docs DIR] [--scenes N]
 """
@@ -67,10 +69,10 @@ from validation.sim.speed_accuracy_points import Chart, Errors, Point, Setting, 
 
 BANDS = 8  # of the references: error 0.7 % of a signal, since their weights are exact
 SPP = {"perfect lens": 96**2, "lens": 64}  # of each half of a reference: per receptor, and per cell of its image
-TO_THE_END = {"perfect lens": 4096, "lens": 64}  # rays per receptor
+TO_THE_END = {"perfect lens": 4096, "lens": 64}  # rays per receptor of converged renderings
 FEW, MANY = 8, 64  # worlds rendered at once: few for many rays
 # States that agents reached, and states with an object ahead. Over 8 of the latter, the standard deviation of the error
-# from chance is 0.06 σ behind a # lens with a = 0.25, where the error of "auto" is closest to its bound.
+# from chance is 0.06 σ behind a lens with a = 0.25, where the error of "auto" is closest to its bound.
 STATES = {"perfect lens": (4, 8), "lens": (4, 24)}
 SLACK = 0.8  # smallest speed relative to the front's
 REFERENCE_ERROR = 0.15  # [σ] largest standard error of the reference
@@ -103,7 +105,11 @@ BEHIND_LENS = (
 
 @dataclass(frozen=True)
 class Population:
-    """Receptors over which errors are computed: a mask (env, eye, height, width) for the crowd's first states."""
+    """Receptors over which errors are computed.
+
+    crowd: states of all worlds.
+    counted: mask (env, eye, height, width) of the receptors over which errors are computed, in the first worlds.
+    """
 
     crowd: WorldState
     counted: np.ndarray
@@ -124,7 +130,7 @@ class Population:
 
 
 def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[Population]:
-    """Return all receptors in states that agents reached, and receptors that see an object in states with one ahead."""
+    """Return two populations: all receptors of agents after random actions, and receptors that see an object ahead."""
     crowd = lived_through(world, MANY)
     found = [Population(crowd, np.ones((states[0], scene.eyes.n_eyes, *scene.eyes.resolution), bool))]
     if world.objects:
@@ -147,9 +153,11 @@ def converged(
 
 @dataclass(frozen=True)
 class Runner:
-    """A setting that renders `count` worlds.
+    """A setting, and how to render with it.
 
-    fidelity: None for the reference.
+    fidelity: fidelity of the renderer; None for the reference.
+    count: number of worlds that are rendered at once.
+    signals: function that renders them.
     warning: warning of the automatic choice.
     """
 
@@ -222,7 +230,7 @@ def to_the_end(scene: Scene, world: sim.World, judged: Sequence[Population], lig
 
 
 def timed(runners: Sequence[Runner], crowd: WorldState, rounds: int) -> list[float]:
-    """Return the CPU seconds of the fastest call of each runner; short calls are repeated for ROUND in every round."""
+    """Return the CPU seconds of each runner's fastest call. Short calls are repeated for ROUND seconds a round."""
     quickest = [np.inf] * len(runners)
     for _ in range(rounds):
         for i, mine in enumerate(runners):

@@ -45,12 +45,15 @@ class Errors:
 
     @classmethod
     def between(cls, found: Sequence[np.ndarray], true: Sequence[np.ndarray], unit: float) -> Errors:
-        """Return differences between signals and true signals, one array for each population."""
+        """Return the errors of signals, given as one array for each population.
+
+        unit: σ, in the unit of the signals.
+        """
         return cls(*(rms(a - b) / unit for a, b in zip(found, true, strict=True)))
 
     @property
     def worst(self) -> float:
-        """Larger of both errors, on which "auto" has a bound."""
+        """Larger of both errors, for which "auto" promises a bound."""
         return max(self.everywhere, self.on_objects or 0)
 
     def __str__(self) -> str:
@@ -81,7 +84,7 @@ class Point:
 
     @property
     def kind(self) -> str:
-        """Method; for auto the method that it chose."""
+        """Name of the method; for "auto", that of the chosen method."""
         f = self.fidelity
         return (
             self.setting.back_end
@@ -99,7 +102,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Chart:
-    """All points of a scene, in σ.
+    """All points of a scene, with errors in σ.
 
     reference_error: standard error of the reference.
     left: difference between converged light of each kind and the reference.
@@ -136,7 +139,7 @@ class Chart:
 
     @property
     def rival(self) -> Point:
-        """The fastest point at least as accurate as auto."""
+        """Fastest point that is at least as accurate as "auto"."""
         return max((p for p in self.points if p.error.worst <= self.auto.error.worst), key=lambda p: p.speed)
 
     @property

@@ -39,7 +39,7 @@ def genes(arguments: Namespace) -> int:
     if arguments.json:
         say(json.dumps([_record(gene) for gene in ordered], indent=1))
         return 0
-    header = ("gene", "cluster", "kind", "range", "unit", "open", "searched", "start", "mutation", "what it does")
+    header = ("gene", "cluster", "kind", "range", "unit", "open", "searched", "start", "mutation", "meaning")
     rows = [header, *(_row(gene) for gene in ordered)]
     rows = [tuple(spelled(cell, results()) for cell in row) for row in rows]
     widths = [max(len(row[column]) for row in rows) for column in range(len(header))]
@@ -48,9 +48,10 @@ def genes(arguments: Namespace) -> int:
     say(
         f"\n{len(GENES)} genes. Open or freeze a gene or a cluster: --set genome.NAME.open=true or false\n"
         "Open a gene from generation N: --set genome.NAME.opens_at=N\n"
-        "Use a relief of N x N genes: --set eye.relief_points=N. Mirror and rotate an eighth of them: --set\n"
-        "eye.relief_symmetric=true. Use one gene, resolution, for height and width: --set eye.square=true\n"
-        "Spectral genes need --set eye.receptors=genes; otherwise all eyes of a run have the receptors named there.\n"
+        "Use a relief of N x N genes: --set eye.relief_points=N\n"
+        "Use only an eighth of these genes, mirrored and rotated: --set eye.relief_symmetric=true\n"
+        "Use a single gene, resolution, for height and width: --set eye.square=true\n"
+        "Spectral genes need --set eye.receptors=genes; otherwise all eyes have the receptors that it names.\n"
         "Mutations apply to search.optimizer=mutation; CMA starts with Gaussian steps of the same size."
     )
     return 0

@@ -68,7 +68,7 @@ def resume(arguments: Namespace) -> int:
 
 
 def _refuse_without_run(arguments: Namespace) -> None:
-    """Refuse options that apply to a run that starts, and have no effect on a plan."""
+    """Refuse options that have no effect with `--dry-run`, because no run starts."""
     for name in ("open", "tensorboard", "quiet", "scheduler"):
         if getattr(arguments, name):
             raise ConfigError(f"--{name}: must be left out with --dry-run, which prints the plan for this machine only")
@@ -190,7 +190,7 @@ def _finish(run: Run, arguments: Namespace) -> int:
     """Write the report and the EXR files, and print their paths; return 1 if no candidate could be evaluated."""
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
-        print(f"evolve: every candidate failed; the last one: {failures[-1].failure}", file=sys.stderr)
+        print(f"evolve: every candidate failed; the last failure: {failures[-1].failure}", file=sys.stderr)
         return 1
     if not arguments.json:
         say("\n".join(_outcome(run, run.best, failures)))
@@ -212,7 +212,7 @@ def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
     lines = [f"best: candidate {best.id}, fitness {fitness}, success rate {best.success_rate:.0%}"]
     if failures:
         lines.append(
-            f"failed: {len(failures)} of {len(run.candidates)} candidates; the last one: {failures[-1].failure}"
+            f"failed: {len(failures)} of {len(run.candidates)} candidates; the last failure: {failures[-1].failure}"
         )
     lines += episode_failure_lines(episode_failures_of(run.candidates))
     changed = [names for candidate in run.candidates if (names := repaired(candidate.vector, run.config))]

@@ -53,7 +53,7 @@ def _read(arguments: Namespace) -> dict[str, Any]:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print one line for each run in a directory, the latest last. For an unreadable run, it states the reason."""
+    """Print one line for each run in a directory, the latest last; for an unreadable run, the line gives the reason."""
     # os.path.exists returns False for an unreadable folder, which cannot be a run of this user. pathlib would raise.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
@@ -61,7 +61,7 @@ def listing(arguments: Namespace) -> int:
         say(json.dumps(found, indent=1, allow_nan=False, default=vars))
         return 0
     if not found:
-        say(f"{arguments.directory}: holds no runs")
+        say(f"{arguments.directory}: contains no runs")
     width = max((len(one["directory"]) for one in found), default=0)
     for one in found:
         say(f"{one['directory']:<{width}}  {_in_one_line(one)}")
@@ -159,7 +159,7 @@ def standing_lines(now: dict[str, Any]) -> list[str]:
         f"{count['evaluated']} of {count['planned']} candidates evaluated{failed}, {now['steps']:,} steps trained",
     ]
     if unchecked := now["lines_without_checksum"]:
-        lines.append(f"checksums: none in the first {unchecked} lines of the record, which a former version wrote")
+        lines.append(f"checksums: the first {unchecked} lines of the record have none (written by a former version)")
     if now["last_failure"]:
         lines.append(f"last failure: {now['last_failure']}")
     lines += episode_failure_lines(now["mishaps"])

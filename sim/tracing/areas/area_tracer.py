@@ -172,8 +172,7 @@ class AreaTracer:
         return _in_layers(depth, piece.inverse_distance_at(piece.middle), sent_on)
 
     def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers) -> list[Array]:
-        """Return the floor's light, computed in bands of equal height in the area. On the floor, bands near the horizon
-        are longer."""
+        """Return the light of the floor, computed in horizontal bands that have equal heights in the area."""
         share = pieces[0].floor_share + pieces[1].floor_share
         a = sum(piece.middle * piece.floor_share for piece in pieces) / dr.maximum(share, LEAST_DIP)
 
@@ -198,7 +197,7 @@ class AreaTracer:
         return [sum_ * share / BANDS for sum_ in total]
 
     def _floor_patch(self, area: Area, a: Array, dip: Array, height: Array) -> Patch:
-        """Return the floor's patch in a band of the visual field. a, dip: middle of the band"""
+        """Return the floor's patch in a band of the visual field; a, dip, height: see `distances_to_floor`."""
         t = (area.origin.z - self._walls.floor) / dip
         level, across = area.level(a), area.level(a) * (t / dip * height)
         point = area.origin + mi.Vector3f(level.x, level.y, -dip) * t
@@ -214,10 +213,10 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return the fractions of the area in which a sphere hides the left wall, the right wall and the floor.
+        """Return the fractions of the area in which a sphere hides left wall, right wall and floor, and its light.
 
-        They are followed by the sphere's light times the fraction of the area that the sphere fills, per component.
-        Parts of the sphere that nearer spheres hide are omitted.
+        The light is multiplied by the fraction of the area that the sphere fills, per component. Parts of the sphere
+        that nearer spheres hide are omitted.
         """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
@@ -236,9 +235,9 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(self, area: Area, sphere: LitSphere, strip: Strip) -> list[Array]:
-        """Return the fraction of a strip that no other sphere hides.
+        """Return the fraction of a strip that no other sphere hides, and the strip's light.
 
-        It is followed by the strip's light times the fraction of the area that the strip fills, per component.
+        The light is multiplied by the fraction of the area that the strip fills, per component.
         """
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
         texture = self._sphere_textures[k]
@@ -263,8 +262,7 @@ class AreaTracer:
         return total
 
     def _not_hidden(self, area: Area, k: int, slice_: Slice, now: FrameState) -> Array:
-        """Return the fraction of a slice that no other sphere hides. The parts that several spheres hide are assumed to
-        overlap at random."""
+        """Return the fraction of a slice that no other sphere hides, if hidden parts overlap at random."""
         way = now.bodies[k] - area.origin
         bare = mi.Float(1)
         for j, other in enumerate(self._visible_bodies(now)):
@@ -286,12 +284,13 @@ def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) 
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
-    """Return eight numbers per face, from which its texture is looked up. They are the texel's column as an affine
-    function of (x, y, z), the texture's first texel and its number of columns. The floor's rim is invisible and has an
-    arbitrary texture."""
+    """Return eight numbers per face, from which the kernel finds the texture at a point, flat.
+
+    They are the texel's column as an affine function of (x, y, z), the texture's first texel and its number of columns.
+    """
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows
-    found[len(rows) :, 5] = 1
+    found[len(rows) :, 5] = 1  # the floor's rim is invisible, so its texture is arbitrary
     return found.ravel()
 
 

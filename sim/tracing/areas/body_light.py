@@ -36,7 +36,7 @@ class BodyLight:
 
     @classmethod
     def on_patch(cls, illumination: Illumination, body: int, patch: Patch, now: FrameState) -> BodyLight:
-        """Return the light on the visible part of a body, which `patch` represents. body: number of the body"""
+        """Return the light on the visible part of the body with the number `body`, which `patch` represents."""
         lit = illumination.visibility(patch, now, body)
         if not now.body_light:
             return cls(illumination, lit, [], [])

@@ -29,7 +29,11 @@ RIM = 4  # number of sides of the floor; its rim counts as a wall in directions 
 
 @dataclass(frozen=True)
 class Face:
-    """A face of a wall. index: number of the face. left, right: ends of the face, as seen from the front (Point2f)"""
+    """A face of a wall.
+
+    index: number of the face
+    left, right: ends of the face, as seen from the front (Point2f)
+    """
 
     index: Array
     left: Array
@@ -54,15 +58,15 @@ class Piece:
 
     @property
     def middle(self) -> Array:
-        """Middle of the columns."""
+        """Column in the middle of the piece."""
         return (self.start + self.end) / 2
 
     def inverse_distance_at(self, a: Array) -> Array:
-        """Return 1/t at a [1/m]."""
+        """Return the inverse distance 1/t of the face in column a [1/m]."""
         return dr.maximum(dr.fma(self.inverse_distance[1], a, self.inverse_distance[0]), LEAST_NEARNESS)
 
     def place(self, area: Area, a: Array) -> Array:
-        """Return the point at which the wall is hit at a (Point2f)."""
+        """Return the point of the wall that is visible in column a (Point2f)."""
         return area.origin.xy + area.level(a) / self.inverse_distance_at(a)
 
     def patch(self, area: Area, floor: float, top: float) -> Patch:

@@ -101,7 +101,7 @@ class IlluminatedBodies:
 
 
 def select(k: Array, values: list[Array] | list[float]) -> Array:
-    """Return the k-th value."""
+    """Return the k-th value, where k may differ between lanes."""
     found = values[-1]
     for i, value in reversed(list(enumerate(values[:-1]))):
         found = value if value is found else dr.select(k == i, value, found)

@@ -53,7 +53,7 @@ class FrameState:
     """Inputs that change between calls.
 
     bodies: centres of the moving spheres; the agent is the last one
-    inputs: tables
+    inputs: tables that are the same in all worlds
     world: number of the world of each area
     body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is neglected
     """
@@ -84,7 +84,7 @@ class Illumination:
         self.bodies = IlluminatedBodies(self._shadows, self._directions, self._radii)
 
     def irradiance(self, patch: Patch, now: FrameState) -> list[Array]:
-        """Return the irradiance per component: the sum over the lights of level · cos θ · visibility."""
+        """Return the irradiance per component: the sum of level · cos θ · visibility over the lights."""
         return self.arriving(patch.normal, self.visibility(patch, now))
 
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
@@ -100,7 +100,10 @@ class Illumination:
         return self._for_bodies(past, self._shadows.visibility(patch, self._directions, now.inputs.around))
 
     def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
-        """Return the irradiance per component: the sum over the lights of level · cos θ · fraction that arrives."""
+        """Return the irradiance per component: the sum of level · cos θ · fraction over the lights.
+
+        lit: fraction of each light that arrives
+        """
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
         for direction, level, share in zip(self._directions, self._levels, lit, strict=True):
             arrives = share * dr.maximum(dr.dot(normal, mi.Vector3f(*direction)), 0)

@@ -52,7 +52,7 @@ class Baking:
 
     @property
     def layout(self) -> dict[str, int]:
-        """The size of each table by name."""
+        """Number of values in each table, by the table's name."""
         nodes, count = self._nodes, range(len(self._tracer.basis))
         cells = int(nodes.grid.free.sum())
         sizes = {"floor": cells * nodes.across**2, "walls": cells * len(SIDES) * nodes.across * nodes.up}

@@ -63,7 +63,7 @@ class LightNodes:
         return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
 
     def body_margin(self, radius: float) -> float:
-        """Return the distance of a body's places from a cell's borders [m]. radius: radius of the body
+        """Return the distance of the places of a body with this radius [m] from a cell's borders [m].
 
         Walls may stand at the borders, and the centre of a body is at least its radius away from them.
         """
@@ -71,7 +71,7 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Numbers of the cells, float32, flat, for the kernel."""
+        """Numbers of all cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
         return self.grid.numbers.astype(np.float32).ravel()
 
 
@@ -79,7 +79,7 @@ class LightNodes:
 class NodeTables:
     """Reflected light at the nodes.
 
-    cells: numbers of the free cells
+    cells: see `CellGrid.numbers`
     floor, walls: light at their nodes, one array per component
     """
 

@@ -86,7 +86,10 @@ def _tables(baked: dict[str, np.ndarray], nodes: LightNodes, kinds: int) -> Ligh
 
 
 def sum_of(fours: list[Array], normal: Array) -> Array:
-    """Return the sum of spherical harmonics in the direction `normal`. fours: coefficients, in groups of four"""
+    """Return the sum of spherical harmonics in the direction `normal`.
+
+    fours: coefficients of the harmonics, in groups of four
+    """
     values = spherical_harmonics(normal.x, normal.y, normal.z)
     return sum((four[i] * v for four, i, v in _spread(fours, values)), mi.Float(0))
 

@@ -39,18 +39,21 @@ class Area:
         return cls(middle.o, middle.d.xy, right, middle.d.z, mi.Float(height))
 
     def level(self, a: Array) -> Array:
-        """Return the horizontal part of the direction at a."""
+        """Return the horizontal part of the directions in column a (Vector2f)."""
         return self.ahead + self.right * a
 
     def direction(self, a: Array, b: Array) -> Array:
-        """Return the direction at (a, b), not normalised."""
+        """Return the direction at column a and height b of the area, not normalised (Vector3f)."""
         level = self.level(a)
         return mi.Vector3f(level.x, level.y, self.up + self.height * b)
 
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A part of an area, in units of the area's sides. a, b: middle of the part"""
+    """A part of an area, in units of the area's sides.
+
+    a, b: middle of the part
+    """
 
     a: Array
     b: Array

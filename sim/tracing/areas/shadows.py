@@ -85,7 +85,11 @@ class WallShadows:
         self.around = floats(around)
 
     def visibility(self, patch: Patch, directions: list[list[float]], table: Array | None) -> list[Array]:
-        """Return the fraction of the patch that each light reaches."""
+        """Return the fraction of the patch that each light reaches.
+
+        directions: directions towards the lights
+        table: the attribute `around`, passed as an argument of the kernel
+        """
         if table is None:
             return [mi.Float(1) for _ in directions]
         clear = patch.point + patch.normal * BESIDE

@@ -59,7 +59,7 @@ class Slice:
     patch: Patch
 
     def inverse_distance(self, area: Area) -> Array:
-        """Return 1/z along the eye's axis [1/m]."""
+        """Return the inverse 1/z of the slice's distance along the eye's axis [1/m]."""
         found: Array = dr.norm(self.seen) * dr.rcp(dr.norm(self.patch.point - area.origin))
         return found
 
@@ -102,7 +102,7 @@ class SphereView:
         return self._between(mi.Float(0), mi.Float(1))
 
     def strip(self, number: Array) -> Strip:
-        """Return one of the strips."""
+        """Return the strip with this number, counted from 0."""
         per = dr.rcp(mi.Float(self.sides))
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
@@ -120,7 +120,7 @@ class SphereView:
         return Strip(length * width, seen, *sides, self._patch(seen, *sides), dr.select(self._upright, *upright))
 
     def slice(self, strip: Strip, number: Array) -> Slice:
-        """Return one slice of a strip."""
+        """Return the slice of a strip with this number, counted from 0."""
         per = dr.rcp(mi.Float(self.sides))
         seen = strip.seen + strip.along * ((mi.Float(number) + 0.5) * per - 0.5)
         sides = strip.along * per, strip.across
@@ -181,7 +181,10 @@ class _Outline:
 
 
 def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Array) -> _Outline:
-    """Return the outline. A direction v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|²."""
+    """Return the outline of the sphere with its centre at `way` from the eye.
+
+    A direction v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|².
+    """
     x, y, z = (dr.cross(way, v) for v in (across, along, ahead))
     square = radius * radius
 
@@ -250,7 +253,11 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
     """Return length and middle, in units of `side`, of the chord on which start + x side hits the sphere.
 
-    On the chord, q2 x² + 2 q1 x + q0 > 0, |x| is at most 1/2, and points lie ahead of the eye.
+    On the chord, q2 x² + 2 q1 x + q0 > 0 with the coefficients in the code, |x| is at most 1/2, and points lie ahead of
+    the eye.
+
+    way: vector from the eye to the sphere's centre
+    tangent: squared length of the tangents from the eye to the sphere
     """
     a, b = dr.dot(way, start), dr.dot(way, side)
     q2 = b * b - dr.squared_norm(side) * tangent
@@ -273,7 +280,7 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
-    """Return the patch around the point at which a direction hits the sphere."""
+    """Return the patch around the point at which a ray in the direction `seen` hits the sphere."""
     length = dr.squared_norm(seen)
     ahead = dr.dot(way, seen)
     t = (ahead - dr.sqrt(dr.maximum(ahead * ahead - length * tangent, 0))) / length

@@ -86,7 +86,7 @@ class Stripes:
         return Texture(mi.Float(first), mi.Float(columns), self._least_sides[int(first)])
 
     def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
-        """Return the mean reflectance, per component, over consecutive stretches of equal weight.
+        """Return the mean reflectance, per component, over consecutive stretches of a texture, which have equal weight.
 
         ends: ends of the stretches, in columns; texel centres are at whole numbers
         spread: additional width of each stretch, half of it on either side
@@ -121,12 +121,12 @@ class Stripes:
         return [dr.gather(mi.Float, tables.means[k], mi.UInt32(texture.first)) for k in range(self.components)]
 
     def _once(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the integral of the texture minus its mean, up to middle + beyond."""
+        """Return the integral of the texture minus its mean, up to the column middle + beyond."""
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma((row.w - row.z) / 2, past, row.z), past, row.y) for row in rows]
 
     def _twice(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the second integral of the texture minus its mean, up to middle + beyond."""
+        """Return the second integral of the texture minus its mean, up to the column middle + beyond."""
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 

@@ -31,7 +31,7 @@ def run(tmp_path):
 
 def test_they_are_added_up_over_candidates(run):
     assert episode_failures_of(run.candidates) == [EpisodeFailure(REWARDS, 42, 2), EpisodeFailure(FEELS, 30, 1)]
-    told = f"episodes that failed: 72; most often (42, of 2 candidates): {REWARDS}"
+    told = f"failed episodes: 72; most frequent failure (42 episodes of 2 candidates): {REWARDS}"
     assert episode_failure_lines(episode_failures_of(run.candidates)) == [told]
     assert told in _outcome(run, run.best, [])
     assert episode_failure_lines(episode_failures_of(run.candidates[1:2])) == []

@@ -148,7 +148,7 @@ def test_presets_say_what_they_are_for(call):
         "name": "lens",
         "task": "detection",
         "scales": ["laptop", "paper"],
-        "about": "Evolution of pupils, then lenses.",
+        "about": "Evolution of the pupil alone, then of pupil and lens.",
     }
     assert records["quick"]["task"] is None
     assert json.loads(call("tasks", "--json")[1]) == TASKS
@@ -196,4 +196,4 @@ def test_a_list_of_runs(call, finished, tmp_path):
     assert "unreadable: " in lines[str(tmp_path / "runs" / "bad")]
     found = {one["state"] for one in json.loads(call("list", tmp_path / "runs", "--json")[1])}
     assert found == {"finished", "unreadable"}
-    assert call("list", tmp_path / "runs" / "other")[1].endswith("holds no runs\n")
+    assert call("list", tmp_path / "runs" / "other")[1].endswith("contains no runs\n")

@@ -70,7 +70,9 @@ def test_the_slowest_of_many_lives_counts():
 
 
 class Clock:
-    """A machine on which starting takes 7 s, a step 0.001 s, a pass over it 0.0002 s, and an evaluation 3 s."""
+    """A machine on which starting takes 7 s, a step 0.001 s, a pass over the sample of a step 0.0002 s, and an
+    evaluation 3 s.
+    """
 
     now = 0.0
 

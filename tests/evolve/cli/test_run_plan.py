@@ -58,7 +58,7 @@ def test_successive_halving_costs_what_its_stages_cost(tmp_path, paced):
     first, second = 10 + 25 + (1 + 1) * 5, 10 + 75 + (3 + 1) * 5
     assert plan.hours["start"] == pytest.approx(10 * (2 * first + 1 * second) / 3600), "6 and 2 on 4 workers"
     assert plan.record()["steps"] == 10 * (6 * 28_672 + 2 * 73_728), "whole rollouts of 4,096"
-    assert "rungs  6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
+    assert "rungs          6 candidates for 25,000 steps, 2 candidates for 100,000 steps" in "\n".join(plan.lines())
 
 
 def test_passes_that_late_stages_spare_are_in_the_hours_and_in_the_speed(tmp_path, monkeypatch):

@@ -115,8 +115,8 @@ def test_lens_opens_the_pupil_first_and_then_what_bends_light(scale):
 
 @pytest.mark.parametrize(("index", "aperture"), [(1.5, 0.38), (2.0, 0.54)])
 def test_a_lens_in_focus_is_within_reach_of_the_lens_presets_genes(index, aperture):
-    """Lenses in focus are also possible behind pupils that are slightly wider than the best pinhole: control points
-    span 16 R² / (4 f (n - 1)).
+    """Lenses in focus are also possible behind pupils that are slightly wider than the best pinhole. For a pupil of
+    radius R, focal length f and index n, the control points of a paraboloid span 16 R² / (4 f (n - 1)).
     """
     config = assemble(preset="lens")
     eye = animal(config).eyes(config.eye).eye()

@@ -71,7 +71,7 @@ def test_eyes_too_close_are_spread_until_they_touch():
 
 
 def test_too_many_eyes_are_fewer_on_the_widest_arc():
-    """An arc of 150° at 0.4 mm is 1.047 mm: five arcs of 0.2 mm, and so six eyes."""
+    """An arc of 150° on a radius of 0.4 mm is 1.047 mm long. It contains five gaps of 0.2 mm, and thus six eyes."""
     vector = genome(n_eyes=16, placement_range_deg=60)
     animal = develop(vector, CROWDED)
     assert (animal.n_eyes, animal.placement_range_deg) == (6, 150)
@@ -89,7 +89,7 @@ def pitched(*settings):
 
 
 def alike(asked, fit):
-    """Return the squared distance of `fit` from `asked`, both pairs of eyes and receptors, in log ratios."""
+    """Return the squared distance between two pairs (eyes, receptors), in logarithms of their ratios."""
     return math.log((asked[0] - 0.5) / (fit[0] - 0.5)) ** 2 + math.log(asked[1] / fit[1]) ** 2
 
 
@@ -117,8 +117,8 @@ def test_wide_eyes_give_way_as_little_as_will_do(eyes, receptors, range_deg, wid
 
 def test_repair_prefers_neither_eyes_nor_receptors():
     """The mean of ln(width / eyes) stays at its requested value over all ranges. If only eyes were reduced, it would
-    rise by 1.4; if only receptors were, it would fall by 1.8. Counting eyes, or the gaps between them, changes it by
-    0.15 or -0.09.
+    rise by 1.4; if only receptors were, it would fall by 1.8. If the repair computed ratios from the number of eyes, or
+    from the number of gaps between them, the mean would change by 0.15 or -0.09.
     """
     config, random = pitched(), np.random.default_rng(0)
     moved = []

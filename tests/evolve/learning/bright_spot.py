@@ -11,10 +11,11 @@ from sim.tasks.find_goal import FindGoal
 
 
 class BrightSpot(VecEnv):
-    """A task in which each world has one Gaussian spot of light on a plane. The reward is the progress towards it, and
-    1 for reaching it.
+    """A task in which each world has one Gaussian spot of light on a plane.
 
-    blind eyes have no signal: the task can then be solved only by chance.
+    The reward is the progress towards the spot, and 1 for reaching it.
+
+    blind: True if eyes have no signals, so that the task can be solved only by chance
     """
 
     reach, limit, spread = 0.5, 40, 0.15

@@ -15,7 +15,8 @@ from evolve.learning.checkpoint_file import BLANK, ENTRY, metadata_of, sealed
 def changed(content, numbers=None, tensors=None, checksum=False):
     """Return a file after changes to its numbers and tensors.
 
-    numbers, tensors: functions that return the new dictionary · checksum: whether the checksum fits the changes
+    numbers, tensors: functions that return the changed dictionary
+    checksum: True to compute the checksum again, so that it fits the changes
     """
     old = json.loads(metadata_of(content)[ENTRY])
     new = numbers(dict(old)) if numbers else old

@@ -32,8 +32,9 @@ def unstacked(memory):
 
 
 def stacked(observation, memory):
-    """Return the result of a plain loop: each slot is a fixed number of steps back, but at most `age` steps, to the
-    episode's first frame.
+    """Return stacks of frames, built by a plain loop.
+
+    Each slot of a stack is a fixed number of steps back, but at most `age` steps, to the episode's first frame.
     """
     stacks = []
     for step in range(STEPS):

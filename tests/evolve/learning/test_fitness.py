@@ -81,9 +81,10 @@ def test_same_seed_same_life(outcome, tmp_path):
 @pytest.mark.parametrize(("most", "expected"), [(4096.0, None), (3.0, 3.0)])
 @pytest.mark.parametrize("resolution", [(3, 4), (1, 1)])
 def test_training_looks_less_closely_than_evaluation(resolution, most, expected, tmp_path, monkeypatch):
-    """Training uses at most this number of samples per receptor, whatever the eye. None: the number that the noise
-    requires, 4 or 6 in the maze. Fitness is always measured with the latter number, and checkpoints use the training's,
-    in the same light.
+    """The setting limits the number of samples per receptor in training, whatever the eye. `expected` is None if the
+    limit is above the number that the noise requires, 4 or 6 in the maze. Evaluations during training use as many
+    samples as training. Fitness is always measured with the number that the noise requires. Light is the same in all
+    three.
     """
     fidelities = []
 

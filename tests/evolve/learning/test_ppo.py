@@ -27,7 +27,7 @@ def learn(config=QUICK, seed=0, worlds=None, progress=None, **eyes):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("memory", [1, 4])
 def test_learns_to_reach_what_it_sees(memory):
-    """Measured over three seeds: 1.0 after 8000 steps with sight, 0.0 without."""
+    """Share of episodes in which the spot is reached after 8000 steps, for three seeds: 1.0 with sight, 0.0 without."""
     training = learn(memory=memory)
     assert training.steps == QUICK.total_steps
     assert play(training.policy, BrightSpot(64, memory=memory), 99).successes.mean() > 0.9

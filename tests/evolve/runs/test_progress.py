@@ -96,7 +96,7 @@ def test_summary_names_generation_best_median_pace_and_time_left(run, clock):
     tally.evaluated(add(run, 5, 0.0, failure="it broke"))
     tally.evaluated(add(run, 6, 3.0))
     clock.now = 3600.0
-    assert tally.summary() == "generation 1 of 0 to 1, best 9, median 4.5, 2 steps/s, 8:34 left"
+    assert tally.summary() == "generation 1 (last: 1), best 9, median 4.5, 2 steps/s, 8:34 left"
 
 
 def test_log_gets_one_line_per_candidate_and_no_control_characters(run):
@@ -107,7 +107,7 @@ def test_log_gets_one_line_per_candidate_and_no_control_characters(run):
         lines.evaluated(add(run, 0, 1.5))
         lines.evaluated(add(run, 1, 0.0, failure="no luck"))
     first, second = out.getvalue().splitlines()
-    assert first.startswith("candidate 0 (1/8): fitness 1.5; generation 0 of 0 to 1, best 1.5")
+    assert first.startswith("candidate 0 (1/8): fitness 1.5; generation 0 (last: 1), best 1.5")
     assert second.startswith("candidate 1 (2/8): failed (no luck)")
     assert "\x1b" not in out.getvalue()
 
@@ -121,7 +121,7 @@ def test_terminal_gets_a_bar(run):
         bar.evaluated(add(run, 1, 0.0, failure="[no] luck"))
     shown = _all_of(ours)
     assert "candidate 1 failed: [no] luck" in shown
-    assert "generation 0 of 0 to 1" in shown
+    assert "generation 0 (last: 1)" in shown
     assert "25%" in shown
 
 

@@ -170,7 +170,8 @@ def test_a_lost_checkpoint_is_trained_again(tmp_path, monkeypatch, whole):
 def test_a_damaged_checkpoint_is_set_aside_and_trained_again(tmp_path, monkeypatch):
     """The run says which files it does not use. Damages are drawn at random, and one file is that of another candidate.
 
-    The form of the test reads checkpoints as a worker does. A candidate would fail if a damaged file reached it.
+    The closed-form evaluation of this test reads checkpoints as a worker does. A candidate would fail if it received a
+    damaged file.
     """
     (tmp_path / "a").mkdir()
     whole, _ = carry(tmp_path / "a" / "run", tiny(*HALVING, "search.generations=1"), monkeypatch)

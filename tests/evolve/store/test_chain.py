@@ -65,7 +65,7 @@ def test_a_record_without_checksums_opens_and_its_chain_starts_with_the_next_lin
     old = random.randrange(1, LINES)
     lines = records_of(record)
     record.write_text("".join(json.dumps(line) + "\n" for line in lines[:old]))
-    assert f"checksums: none in the first {old} lines of the record" in call("status", record.parent)[1]
+    assert f"checksums: the first {old} lines of the record have none" in call("status", record.parent)[1]
     run = Run.open(record.parent)
     run.repair()
     for number in range(old, LINES):

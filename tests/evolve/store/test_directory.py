@@ -192,8 +192,8 @@ def test_steps_are_those_of_the_candidate_and_its_furthest_stage(run):
     run.append(replace(candidate(0), rung=1, steps=300))
 
     class Asked(dict):
-        """Lines of a record that must not be scanned: there are thousands, and progress reads steps after every
-        rollout.
+        """Lines of a record that must not be scanned, because there may be thousands, and the progress display requests
+        the steps of a candidate after every rollout.
         """
 
         def values(self):

@@ -42,7 +42,7 @@ def closed_spectrum(shape, fx, fy):
 
 
 def frequencies(lowest, highest, n=60):
-    """Vectors of these lengths in directions from a fixed seed."""
+    """Return random frequency vectors with lengths from `lowest` to `highest`; the seed is fixed."""
     angle = np.random.default_rng(0).uniform(0, 2 * np.pi, n)
     f = np.linspace(lowest, highest, n)
     return f * np.cos(angle), f * np.sin(angle)
@@ -65,7 +65,7 @@ def grid_spectrum(soft, fx, fy, rate):
 @shapes
 @pytest.mark.parametrize(("ripple", "passband"), [(1e-3, 6.0), (1e-6, 2.0), (1e-8, 15.0), (1e-10, 4.0)])
 def test_spectrum_is_the_closed_form_then_nothing(shape, ripple, passband):
-    """Samples are spaced as coarsely as the band allows: aliases fall beyond the passband if the edge is soft."""
+    """Samples are as far apart as the stopband allows. If the edge is soft, the aliases lie outside the passband."""
     soft = shape.soften(passband, ripple)
     fx, fy = frequencies(1e-3, passband)
     error = grid_spectrum(soft, fx, fy, soft.passband + soft.stopband) - closed_spectrum(shape, fx, fy)
@@ -166,8 +166,9 @@ def test_derivatives(name, mode):
 
 
 def test_power_of_the_soft_disk():
-    """Parseval: the sum of squares over the grid equals the integral of the squared spectrum, damped by the
-    kernel's."""
+    """The sum of squares over the grid equals the integral of the squared spectrum (Parseval's theorem). The spectrum
+    is the product of the disk's spectrum and the kernel's.
+    """
     soft = Circle().soften(5.0, 1e-6)
     rate = 2.01 * soft.stopband
     x = np.arange(-int(1.3 * rate), int(1.3 * rate) + 1) / rate

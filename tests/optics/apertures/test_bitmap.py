@@ -19,8 +19,10 @@ def lopsided(n, seed):
 
 
 def in_the_focal_plane(image, at):
-    """Fraunhofer's integral over square pixels (Goodman, §4.4.1 and §5.2): each gives a product of two sincs, turned by
-    its position. The PSF is |U|²/A with U(X) = ∫ exp(-2πi x X/λf) dx/λf."""
+    """Return the PSF in the focal plane by Fraunhofer's integral over square pixels (Goodman, §4.4.1 and §5.2). Each
+    pixel gives a product of two sincs, with a phase that depends on its position. The PSF is |U|²/A, where A is the
+    area of the opening and U(X) = ∫ exp(-2πi x X/λf) dx/λf.
+    """
     n, pitch = len(image), 2 * RADIUS / len(image)
     centres = (np.arange(n) + 0.5) * pitch - RADIUS
     f = at / (WAVELENGTH * FOCUS)
@@ -47,7 +49,9 @@ def test_the_psf_is_the_sum_over_pixels(n, seed):
 
 
 def test_pixels_clipped_by_the_circle_are_the_shapes_they_draw():
-    """One open pixel is the whole disk, and two by two pixels with one open are a quarter of it."""
+    """An image of one open pixel is the whole disk, and an image of 2 x 2 pixels, of which one is open, is a quarter of
+    it.
+    """
     assert optics.union(optics.Bitmap([[1]])).area == pytest.approx(np.pi, rel=1e-12)
     quarter = optics.union(optics.Bitmap([[0, 0], [0, 1]]))
     same = optics.union(optics.Oblong(1, 1, (0.5, 0.5)))
@@ -102,7 +106,9 @@ def test_an_image_without_open_pixels_is_refused():
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
 def test_planning_and_quadrature_of_many_edges_take_as_long_as_the_sum(seed):
-    """The first PSF of a 64 x 64 image took seven times as long as the second; the rules of nodes took the rest."""
+    """The first PSF of a 64 x 64 image took seven times as long as the second in an earlier version. The difference was
+    the time for the quadrature nodes.
+    """
     open_ = optics.Pupil(30e-6, aperture=optics.union(optics.Bitmap([[1]])))
     optics.psf(open_, dx=0.5e-6, shape=(65, 65), tolerance=1e-4)
     image = np.random.default_rng(seed).random((64, 64)) < 0.5

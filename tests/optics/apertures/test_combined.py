@@ -36,7 +36,9 @@ def disk_at(radius, centre, fx, fy):
 
 
 def vane(n):
-    """Outline of one vane's part in the ring: its ends are arcs, approximated by polygons of n sides."""
+    """Return the outline of the part of a vane that lies in the ring. Its ends are arcs, approximated by n points
+    each.
+    """
     ends = []
     for radius, way in ((1.0, 1), (0.3, -1)):
         half = math.asin(0.02 / radius)
@@ -122,7 +124,7 @@ def test_a_ring_is_a_difference():
 
 
 def test_small_disks_are_softened_from_both_ends():
-    """For a stop smaller than the kernel's reach, both ends of its arcs lie within the reach."""
+    """Both ends of the arcs of a stop lie within the reach of the kernel if the stop is smaller than this reach."""
     x, y = np.random.default_rng(1).uniform(-0.4, 0.4, (2, 1000))
     shape, edge = difference(Circle(), Disk(0.07, (0.05, 0.02))), Circle().soften(4.0, 1e-7).edge
     assert edge.reach > 0.14
@@ -220,7 +222,7 @@ def test_shapes_that_touch_are_cut_where_they_touch(name):
 
 
 def test_a_small_hole_within_the_soft_edge_is_a_ring():
-    """Empty arcs do not lose a full turn: the softened difference is the softened ring."""
+    """The angle of an empty arc is not taken for a full turn, so the softened difference equals the softened ring."""
     x, y = np.meshgrid(np.linspace(-1, 1, 101), np.linspace(-1, 1, 101))
     hole, ring = (at(shape.soften(3.0, 1e-5), x, y) for shape in (difference(Circle(), Disk(0.1)), Annulus(0.1)))
     assert np.abs(hole - ring).max() < 1e-5

@@ -20,7 +20,7 @@ def hexagon(centre, radius, rotation_deg):
 
 
 def two_hexagons(gap, radius, turn_deg):
-    """Two hexagons with parallel sides at this gap; overlapping if it is negative."""
+    """Return two hexagons with parallel sides that are separated by `gap`; they overlap if it is negative."""
     centre = np.exp(1j * np.deg2rad(turn_deg)) * (radius * math.sqrt(3) / 2 + gap / 2)
     return union(*(hexagon(side * centre, radius, 30 + turn_deg) for side in (-1, 1)))
 
@@ -58,7 +58,9 @@ def test_no_shape_is_lost(name, seed):
 
 @pytest.mark.parametrize("gap", [1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-5])
 def test_areas_are_those_of_closed_forms(gap):
-    """The tolerance is a gap's own area: 1e-12 radii are one edge, wider gaps are two."""
+    """The tolerance is the area of the gap. Sides 1e-12 radii apart are a common edge, and sides further apart are two
+    edges.
+    """
     two = union(Disk(0.4, (0.4 + gap / 2, 0)), Disk(0.4, (-0.4 - gap / 2, 0)))
     assert two.area == pytest.approx(2 * math.pi * 0.4**2, abs=1e-9)
     ring = difference(Annulus(0.3), Disk(0.3 - gap))
@@ -68,7 +70,7 @@ def test_areas_are_those_of_closed_forms(gap):
 
 
 def test_the_amplitude_of_two_disks_is_that_of_their_closed_form():
-    """A disk's Fourier transform is r J1(2πqr)/q; two disks at a gap of 1e-8 interfere."""
+    """A disk of radius r has the Fourier transform r J1(2πqr)/q at the frequency q. Two disks 1e-8 apart interfere."""
     r, gap = 0.4, 1e-8
     two = union(Disk(r, (r + gap / 2, 0)), Disk(r, (-r - gap / 2, 0)))
     q = np.array([[0.3, 0.0], [0.7, 0.4], [-1.3, 2.1], [0.0, 2.5]])
@@ -80,7 +82,9 @@ def test_the_amplitude_of_two_disks_is_that_of_their_closed_form():
 
 
 def test_sides_tested_too_far_away_are_noticed(monkeypatch):
-    """The former test at a fixed distance of 1e-7 looked across the gap and lost a disk."""
+    """An earlier version tested points at a fixed distance of 1e-7 from a side. They lay beyond the gap, and a disk was
+    lost.
+    """
     monkeypatch.setattr(Outline, "clearance", lambda self, points, least: np.full(len(points), np.inf))
     with pytest.raises(ValueError, match=r"outline cannot be computed near .*: move one of them"):
         union(Disk(0.4, (0.4 + 5e-9, 0)), Disk(0.4, (-0.4 - 5e-9, 0)))

@@ -37,8 +37,9 @@ def exact(opening):
 @pytest.mark.parametrize("count", [1, 2, 5, 16, 33])
 @pytest.mark.parametrize("digits", [3.0, 6.0, 10.0])
 def test_nodes_are_as_good_as_they_are_asked_to_be(opening, exact, count, digits):
-    """Borders of 33 pixels lie neither on the axes nor on the square's sides, and some borders of 16 do; 1 is a single
-    pixel."""
+    """No border between 33 pixels lies on an axis, but some borders between 16 pixels do. The last case is a single
+    pixel.
+    """
     nodes = PixelatedAperture(opening, count).nodes(CYCLES, digits)
     assert abs(np.sum(nodes.weight * wave(nodes.x, nodes.y)) - exact) < 10**-digits * opening.area
     assert np.all(opening.contains(nodes.x, nodes.y))
@@ -56,7 +57,9 @@ def test_rows_and_columns_of_nodes_are_as_good(opening, exact, count, digits):
 
 @pytest.mark.parametrize("fixed", [4, 7])
 def test_cells_of_different_widths_integrate_polynomials_exactly(opening, fixed):
-    """A different cubic in every cell, as of a spline with uneven knots, times another one: degree 3 in x and in y."""
+    """The function is a product of two splines with uneven knots. It is a cubic polynomial in x and in y in every
+    cell.
+    """
     borders = (-1.0, -0.7, -0.65, -0.1, 0.2, 0.5, 0.95, 1.0)
     cells = PixelatedAperture.between(opening, borders, fixed)
     slopes = np.random.default_rng(0).standard_normal((2, 7, 4))
@@ -77,8 +80,9 @@ def test_cells_of_different_widths_integrate_polynomials_exactly(opening, fixed)
 
 
 def test_pixels_cannot_be_left_out_or_taken_whole():
-    """The usual way takes a pixel as open if its centre is: the staircase edge has an error of 3e-3 with 33 pixels, a
-    thousand times the tolerance above."""
+    """The usual method counts a whole pixel if its centre lies in the opening. With 33 pixels, this edge of steps has
+    an error of 3e-3, a thousand times the tolerance above.
+    """
     count, circle = 33, Circle()
     centres = (np.arange(count) + 0.5) * 2 / count - 1
     x, y = np.meshgrid(centres, centres)
@@ -90,7 +94,9 @@ def test_pixels_cannot_be_left_out_or_taken_whole():
 @pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("count", [5, 16])
 def test_no_panel_crosses_a_border_between_pixels(opening, count):
-    """A function with a different value in every pixel jumps at the borders; it is integrated as if pixel by pixel."""
+    """A function that is constant in every pixel, and jumps at the borders, is integrated as accurately as the sum over
+    pixels.
+    """
     heights = np.random.default_rng(0).random((count, count))
 
     def jumping(nodes):
@@ -125,8 +131,9 @@ def test_a_soft_edge_is_refused():
 )
 @pytest.mark.parametrize(("count", "cycles"), [(1, 10.0), (2, 10.0), (4, 30.0)])
 def test_edges_that_slant_have_nodes_for_what_they_slide_by(opening, count, cycles):
-    """Nodes along a slanted side move far in x while they move little in y: chosen by y alone they leave an error of
-    1e-3."""
+    """Along a slanted side, x changes much while y changes little. If the number of nodes followed from y alone, the
+    error would be 1e-3.
+    """
     angle = np.deg2rad(25)
 
     def turning(nodes):

@@ -26,7 +26,9 @@ def test_areas():
 
 
 def test_regular_polygon_tends_to_the_circle():
-    """The difference falls like n^-2, the sagitta of an edge, once edges are shorter than the kernel resolves."""
+    """For a polygon of n sides that are shorter than the kernel resolves, the difference from the circle falls like
+    n^-2, as does the sagitta of a side.
+    """
     x, y = np.random.default_rng(0).uniform(-1.1, 1.1, (2, 2000))
     circle = at(Circle(), x, y)
     error = [np.abs(at(Polygon.regular(n), x, y) - circle).max() for n in (128, 256, 512)]
@@ -37,7 +39,9 @@ def test_regular_polygon_tends_to_the_circle():
 
 
 def test_corner_and_edge_values():
-    """The transmittance at a corner is the angle's share of a turn; on an edge far from corners it is a half."""
+    """The transmittance at a corner is the angle of the corner divided by 2π. On an edge far from corners, it is
+    1/2.
+    """
     hexagon = Polygon.regular(6)
     soft = hexagon.soften(30.0, 1e-8)
     middle = (hexagon.vertices + np.roll(hexagon.vertices, -1, axis=0)) / 2

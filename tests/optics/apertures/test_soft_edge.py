@@ -1,4 +1,6 @@
-"""The soft edge's kernel: its spectrum is 1, then 0, up to the ripple; its transition needs the fewest samples."""
+"""The kernel of soft edges: its spectrum is 1 in the passband and 0 in the stopband, up to the ripple, and the width of
+the transition needs the fewest samples.
+"""
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from optics.numerics.quadrature import gauss_legendre
 
 
 def spectrum(edge, f):
-    """Hankel transform of the kernel, by quadrature."""
+    """Return the Hankel transform of the kernel at the frequency f, by quadrature."""
     u, weight = gauss_legendre(300)
     r = edge.reach * u
     return j0(2 * np.pi * np.outer(f, r)) @ (edge.reach * weight * edge.ring(r))
@@ -25,7 +27,9 @@ def test_spectrum_keeps_its_ripple(ripple, passband):
 
 
 def test_kaisers_rule_alone_misses_the_ripple():
-    """The kernel needs a margin, because in the plane side lobes from all directions meet at frequency 0."""
+    """Kaiser's rule is for one dimension. The kernel needs a margin, because side lobes from all directions of the
+    plane add up at frequency 0.
+    """
     edge = SoftEdge.cheapest(0.5, 1e-8, 0.25)
     bare = SoftEdge(0.5, 0.5 + kaiser_beta(1e-8) / np.pi / 0.25, (1e-8 * 9) ** (1 / 1.08))
     assert bare.reach == pytest.approx(edge.reach)
@@ -52,7 +56,7 @@ def test_reach_has_a_limit():
 
 @pytest.mark.parametrize("attenuation", [30.0, 45.0, 49.9, 50.1, 80.0])
 def test_kaisers_rule_is_his(attenuation):
-    """Below an attenuation of about 25 dB, our value stays at 1."""
+    """For an attenuation below about 25 dB, our value is 1, in contrast to Kaiser's."""
     assert kaiser_beta(10 ** (-attenuation / 20)) == pytest.approx(signal.kaiser_beta(attenuation), rel=1e-9)
     assert kaiser_beta(0.1) == 1.0
 

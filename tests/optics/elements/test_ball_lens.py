@@ -39,7 +39,9 @@ def test_a_glass_ball_has_the_textbook_focal_length_and_refracts_by_snells_law()
 
 
 def traced(lens, height):
-    """Direction [rad] towards the axis and optical path of a ray inside a lens, by d/ds (n dx/ds) = grad n."""
+    """Return the direction [rad] towards the axis and the optical path of a ray behind the lens, by d/ds (n dx/ds) =
+    grad n.
+    """
     entry = np.array([-math.sqrt(R * R - height * height), height])
     normal = entry / R
     relative = float(lens.index(R)) / float(lens.medium_n)
@@ -86,7 +88,9 @@ def test_the_wavefront_of_a_perfect_lens_is_flat_and_its_psf_that_of_an_ideal_le
 
 
 def test_the_wavefronts_slope_is_the_longitudinal_aberration():
-    """A wavefront that is ahead by W at x focuses at n/z = n/f + W'/x, up to the fourth order of x/f."""
+    """A ray at the height x, at which the wavefront is ahead by W, crosses the axis at the distance z with n/z = n/f +
+    W'/x, up to the fourth order in x/f.
+    """
     lens = BallLens(R, 1.5, 1.5, 1.0)
     pupil, focal = lens.pupil(0.1 * R), lens.focal_length()
     x = np.linspace(0.098, 0.1, 3) * R

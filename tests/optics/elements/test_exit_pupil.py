@@ -67,9 +67,10 @@ def strehl(read):
 
 
 def test_navarro_s_eye_is_as_sharp_as_its_rays_say():
-    """Strehl ratio on the axis against the mean of e^{2πiW} over rays spaced evenly in the entrance pupil. optiland
-    0.6.3 gives a root mean square of 0.0784 waves and 0.780 at the peak of its PSF, from samples that end short of the
-    rim."""
+    """The Strehl ratio on the axis is compared with |mean of e^{2πiW}|² over rays that are evenly spaced in the
+    entrance pupil. optiland 0.6.3 gives a root mean square of 0.0784 waves and a peak of 0.780, from samples that do
+    not reach the rim.
+    """
     system = traced()
     read = read_exit_pupil(system, WAVE, medium_n=1.336)
     rays = np.abs(np.mean(np.exp(2j * np.pi * system.opd[:-64]))) ** 2
@@ -81,8 +82,9 @@ def test_navarro_s_eye_is_as_sharp_as_its_rays_say():
 
 
 def test_the_wave_is_ahead_where_the_other_program_says():
-    """The image 0.1 mm behind is the same, whether the exit pupil is read there or the sensor is moved there; a
-    wavefront of the opposite sign gives another image."""
+    """The image 0.1 mm further back is the same whether the exit pupil is read for this plane or the sensor is moved
+    there. A wavefront of the opposite sign gives another image.
+    """
     here, behind = (read_exit_pupil(traced(shift), WAVE, medium_n=1.336) for shift in (0.0, 0.1))
     there = axis(behind.pupil, behind.distance)
     assert axis(here.pupil, here.distance + 0.1e-3) == pytest.approx(there, rel=0.03)
@@ -134,7 +136,8 @@ def round_samples(n, width, centre, soft):
 def test_one_sample_on_the_rim_of_an_even_grid_decides_nothing():
     """256 samples over 4 mm reach from -2 mm to 1.98 mm. The radius is 2 mm, the root mean square 0.25 µm/√5, and the
     Strehl ratio |∫ exp(2πiW/λ) dρ²|². The tolerances admit the pitch of the samples, 0.8 % of the radius, to its
-    square. A radius half a sample too long gives a Strehl ratio of 0.165."""
+    square. If the radius were half a sample too long, the Strehl ratio would be 0.165.
+    """
     rho2 = (np.arange(4000) + 0.5) / 4000
     ratio = abs(np.mean(np.exp(2j * np.pi * 0.25 / 0.555 * (6 * rho2**2 - 6 * rho2)))) ** 2
     read = read_exit_pupil(round_samples(256, 4.0, (0, 0), soft=False), 0.555e-6, focal_length=0.1)
@@ -218,7 +221,9 @@ def test_what_cannot_be_read_is_said_in_a_line(system, more, says):
 
 
 def test_obscured_and_uneven_pupils_are_refused():
-    """The rims of these pupils are round: read as open circles, they would be other lenses without any warning."""
+    """The rims of these pupils are round. If they were read as open circles, they would silently become other
+    lenses.
+    """
     at = (np.arange(64) - 32) / (32 * 0.9)
     r = np.hypot(at[None, :], at[:, None])
     for amplitude in (r > 0.5, np.exp(-(r**2)), r > 0.1):
@@ -237,7 +242,9 @@ def test_obscured_and_uneven_pupils_are_refused():
 
 @pytest.mark.parametrize("rings", [2, 3, 4, 5, 9])
 def test_few_rings_of_rays_are_no_obscured_pupil(rings):
-    """The k-th ring of a hexapolar grid has 6k rays; without its inner half the pupil is obscured."""
+    """The k-th ring of a hexapolar grid has 6k rays. If the inner half of the rings is missing, the pupil is
+    obscured.
+    """
     rays = [(0.0, 0.0)] + [
         (k / rings * math.cos(turn), k / rings * math.sin(turn))
         for k in range(1, rings + 1) for turn in np.arange(6 * k) * math.pi / (3 * k)

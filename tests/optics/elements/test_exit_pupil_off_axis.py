@@ -21,13 +21,13 @@ TILTED = (0.0, np.sin(0.3), np.cos(0.3))
 
 
 def image(read, n=41):
-    """The PSF on the image plane, relative to its sum."""
+    """Return the PSF on the image plane, divided by its sum."""
     seen = optics.psf(read.pupil, [WAVE], read.distance, dx=PITCH, shape=(n, n)).psf[0]
     return seen / seen.sum()
 
 
 def huygens_image(rays, weights, n=41, normal=(0.0, 0.0, 1.0), even=True, **asked):
-    """The Huygens sum over rays; `even`: with the same amplitude in all directions, not at all rays."""
+    """Return the Huygens sum over rays. even: True for equal amplitudes per solid angle instead of per ray"""
     wave = triplet(20, WAVE, rays, normal=normal, **asked)
     share = weights * (wave.intensity > 0)
     if even:
@@ -41,7 +41,7 @@ def apart(image, other):
 
 
 def test_tangential_contrast_at_20_degrees():
-    """A Huygens sum gives 0.139 at 50 cycles per mm over a window of 82 µm, with the same amplitude at all rays.
+    """A Huygens sum with equal amplitudes of all rays gives 0.139 at 50 cycles per mm, over a window of 82 µm.
 
     A pupil that ignores the tilt of the image plane gives 0.076.
     """

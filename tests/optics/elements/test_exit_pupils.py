@@ -32,7 +32,7 @@ def test_positions_and_lateral_colour_are_those_of_optiland():
 
 
 def test_the_pupils_of_a_field_have_one_origin():
-    """Their wavefronts contain a tilt that moves the image by the lateral colour."""
+    """The wavefronts of other wavelengths therefore contain a tilt, which moves the image by the lateral colour."""
     lens = optics.read_exit_pupils(traced((20,)))
     blue = lens.at(0)[0]
     places = {pupil.position for pupil in lens.at(0)}

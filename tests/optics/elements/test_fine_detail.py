@@ -27,7 +27,7 @@ AT = (np.arange(96) + 0.5) * 2 / 96 - 1
 
 
 def ripple(cycles):
-    """cos(2πfx), with a mean square of 1/2."""
+    """Return samples of cos(2πfx), whose mean square is 1/2."""
     return np.broadcast_to(np.cos(2 * np.pi * cycles * AT), (96, 96))
 
 
@@ -49,7 +49,7 @@ def test_cubics_are_no_detail():
 @pytest.mark.parametrize("phase", [0.2, 1.0])
 @pytest.mark.parametrize("of", ["height", "wavefront", "wide wavefront"])
 def test_ripples_in_a_phase_count_by_their_phase(of, phase):
-    """Amplitude φ [rad]: φ²/2 of the light goes to orders at the ripple's frequency, for small φ."""
+    """A ripple of small amplitude φ [rad] sends φ²/2 of the light to orders at its frequency."""
     waves = phase * WAVE / (2 * math.pi)
     wide = 1.5 if of == "wide wavefront" else 1.0
     pupil = {
@@ -62,7 +62,9 @@ def test_ripples_in_a_phase_count_by_their_phase(of, phase):
 
 
 def test_a_mask_counts_by_its_share_of_what_it_lets_through():
-    """(1 + cos)/2: a third of the light is in the orders, 1/8 of 3/8; the same holds in the middle of a wider map."""
+    """The mask (1 + cos)/2 transmits 3/8 of the light, of which a third (1/8 of all light) is in the orders. The same
+    holds if the mask is the middle of a wider map.
+    """
     own, wide = MaskMap((1 + ripple(6.0)) / 2), MaskMap((1 + ripple(9.0)) / 2, reach=1.5 * R)
     for mask in (own, wide):
         assert Pupil(R, mask=mask).scatter(WAVE, 0.3) * R == pytest.approx(6, abs=0.3)
@@ -71,13 +73,13 @@ def test_a_mask_counts_by_its_share_of_what_it_lets_through():
 
 
 def test_a_gaussian_mask_spreads_as_a_beam_does():
-    """Beyond the frequency f lies exp(-2π²w²f²) of a laser's power."""
+    """The fraction exp(-2π²w²f²) of the power of a Gaussian beam of waist w lies beyond the frequency f."""
     reach = Pupil(R, mask=GaussianMask(R / 10)).scatter(WAVE, 0.01)
     assert math.exp(-2 * (math.pi * R / 10 * reach) ** 2) == pytest.approx(0.01)
 
 
 def test_several_share_what_may_be_lost():
-    """Each element also scatters the light already scattered by the others."""
+    """The elements share the allowed loss. Each of them also scatters light that the others have scattered."""
     mask, wavefront = GaussianMask(R / 10), WavefrontMap(0.2 * WAVE / 2 / math.pi * ripple(8.0))
     both = Pupil(R, mask=mask, wavefront=wavefront).scatter(WAVE, 0.02)
     assert both == pytest.approx(
@@ -106,8 +108,9 @@ def test_a_mask_of_ones_own_reaches_as_far_as_its_band():
 
 
 def test_what_a_mask_scatters_is_a_share_of_what_comes_through_the_opening():
-    """An evenly dimmed mask scatters as far, and so does a user-defined mask. A bright middle covered by a ring has no
-    effect: the ring's faint stripes carry most of its light."""
+    """A mask scatters equally far if it is evenly dimmed, or if the user has defined it as a function. A bright middle
+    covered by a ring has no effect: the ring's faint stripes carry most of its light.
+    """
     dim, full = (MaskMap(level * (1 + ripple(8.0)) / 2) for level in (0.1, 1.0))
     reaches = [Pupil(R, mask=mask).scatter(WAVE, 0.02) * R for mask in (dim, full)]
     assert reaches[0] == pytest.approx(reaches[1])

@@ -24,7 +24,9 @@ def standard_contrasts():
 
 
 def contrasts(eye, axis):
-    """Contrasts (cone, frequency) with wavelengths 20 nm apart: cones' spectra are five times as wide."""
+    """Return contrasts (cone, frequency). Wavelengths 20 nm apart are enough, because the spectra of cones are five
+    times as wide.
+    """
     nm, dx, side = np.arange(440, 681, 20), 1.2e-6, 193
     energy = np.array([cone.at(nm * 1e-9) * nm for cone in cone_fundamentals()[:2]])
     places = (np.arange(side) - side // 2) * dx
@@ -64,7 +66,9 @@ def test_and_no_other_reading_of_the_table_has(change):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("radius", [1e-3, 3e-3])
 def test_without_aberrations_it_is_perfect_in_570_nm(radius):
-    """The paraboloid alone has 4 µm of spherical aberration at 3 mm, which removes the peak."""
+    """A paraboloid alone would have 4 µm of spherical aberration over a pupil of 3 mm, and its PSF would have no
+    peak.
+    """
     eye = HumanEye(radius, None)
     seen = optics.psf(eye.pupil, [570e-9], eye.focal_length, dx=0.5e-6, shape=(33, 33), tolerance=1e-4)
     assert optics.strehl_ratio(seen)[0] == pytest.approx(1, abs=2e-4)
@@ -72,7 +76,9 @@ def test_without_aberrations_it_is_perfect_in_570_nm(radius):
 
 
 def test_chromatic_aberration_is_that_of_humans():
-    """The defocus of Thibos et al. (1992) in µm, D r²/4√3, compensates it at 460 nm: the Strehl ratio is 1 again."""
+    """A defocus of D r²/4√3 [µm], with D from Thibos et al. (1992), compensates the chromatic aberration at 460 nm, so
+    that the Strehl ratio is 1 again.
+    """
     radius = 1e-3
     dioptres = -0.63346 * (1 / (0.460 - 0.2141) - 1 / (0.570 - 0.2141))
     um = dioptres * radius**2 / (4 * math.sqrt(3)) * 1e6
@@ -92,7 +98,9 @@ def test_a_known_wavefront_serves_its_middle():
 
 
 def test_mean_mtf():
-    """The value at 10 cycles per degree and 4 mm agrees, and contrast is 0 beyond a perfect lens's cut-off."""
+    """The published value at 10 cycles per degree and 4 mm agrees, and the contrast is 0 beyond the cut-off of a
+    perfect lens.
+    """
     u1 = 21.95 - 5.512 * 4 + 0.3922 * 16
     perfect = 2 / math.pi * (math.acos(s := 10 * 180 * 555e-9 / (math.pi * 4e-3)) - s * math.sqrt(1 - s * s))
     expected = math.sqrt(perfect) / (1 + (10 / u1) ** 2) ** 0.62
@@ -102,8 +110,9 @@ def test_mean_mtf():
 
 @pytest.mark.slow
 def test_standard_observer_is_near_the_mean_of_two_hundred():
-    """White light and 6 mm, the case with the strongest aberrations: the error is below 0.05, and that of a perfect
-    lens above 0.7."""
+    """White light and a pupil of 6 mm are the case with the strongest aberrations. The error is below 0.05; that of a
+    perfect lens would be above 0.7.
+    """
     seen = standard_contrasts().mean(axis=0)
     mean = mean_human_mtf(CYCLES, 6e-3)
     assert np.abs(seen[1:] - mean[1:]).max() < 0.05
@@ -141,7 +150,7 @@ def test_derivatives_are_refused():
 
 
 def test_an_eye_of_its_retina_is_as_long_as_it_is():
-    """The eye's field of view is correct, too: the image of a point at 0.4° lies f tan(0.4°)/n from the axis."""
+    """The eye's field of view is correct, too: the image of a point at 0.4° is f tan(0.4°)/n away from the axis."""
     human = HumanEye(1e-3, wavefront=None)
     width = human.sensor_width(1.0)
     eye = optics.Eye(pupil=human.pupil, full_aperture=8e-3, fov_deg=1.0, sensor_width=width, resolution=(15, 15))

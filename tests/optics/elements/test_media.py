@@ -20,7 +20,7 @@ def centroid(result):
 
 @pytest.mark.parametrize(("before", "behind"), [(1.0, 1.33), (1.33, 1.0), (1.336, 1.336)])
 def test_snell_bends_what_comes_aslant(before, behind):
-    """A lens sends light from the angle θ to z tan θ', n₀ sin θ = n sin θ'."""
+    """Light that arrives at the angle θ reaches the sensor at z tan θ', where n₀ sin θ = n sin θ'."""
     angle, z = (0.3, -0.15), 400e-6
     tx, ty = np.tan(angle)
     sine = before / behind * np.array([tx, ty]) / math.sqrt(1 + tx * tx + ty * ty)
@@ -33,7 +33,7 @@ def test_snell_bends_what_comes_aslant(before, behind):
 
 
 def test_a_point_before_the_lens_has_its_image_at_n_over_z():
-    """n/z = n/f - n₀/s at every wavelength."""
+    """The distance z of the image of a point at the distance s satisfies n/z = n/f - n₀/s at every wavelength."""
     s, water = 8e-3, medium("water")
     pupil = Pupil(R, thin_lens_focal_length=1e-3, medium_n=water, object_n=1.0)
     z = pupil.image_distance(s)
@@ -124,8 +124,10 @@ def best_distance(eye, wavelength, near):
 
 @pytest.mark.slow
 def test_longitudinal_chromatic_aberration_of_the_human_eye():
-    """One refracting surface of 5.55 mm between air and Thibos' medium: its focus over the spectrum against the curve
-    that Thibos et al. (1992, eq. 5) fit to their observers, Rx = 1.68524 - 0.63346/(λ - 0.21410) [D], λ in µm."""
+    """The eye is one refracting surface with a radius of 5.55 mm between air and the medium of Thibos et al. (1992).
+    Its focus at each wavelength λ [µm] agrees with their fit to observers, Rx = 1.68524 - 0.63346/(λ - 0.21410) [D]
+    (eq. 5).
+    """
     humour, surface = medium("chromatic_eye"), 5.55e-3
     cornea = BSplineRelief.paraboloid(0.0, 1 / surface, 0.5e-3)
     eye = Pupil(0.5e-3, cornea, n=humour, medium_n=humour, object_n=1.0)

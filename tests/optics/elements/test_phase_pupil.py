@@ -53,7 +53,9 @@ def test_a_quadratic_phase_is_a_lens_of_a_focal_length_proportional_to_one_over_
 
 
 def test_stripes_of_half_a_wave_send_no_light_straight_on_at_any_wavelength():
-    """Half of the opening is reversed, so the amplitude in the middle is 0. A relief does so at one wavelength only."""
+    """The phase is reversed in half of the opening, so the amplitude in the middle of the image is 0. With a relief,
+    this is the case at one wavelength only.
+    """
     waves, middle = [450e-9, 550e-9, 650e-9], 16
     lens = {"thin_lens_focal_length": FOCUS, "aperture": optics.Slit(1.0, 1.0)}
     stripes = np.pad(np.tile([0.0, math.pi], (4, 2)), 2, mode="wrap")

@@ -19,7 +19,9 @@ def centres(count, radius):
 
 
 class TestGratings:
-    """Order m lies at m λf/period (f/50), and its peak over that of the open slit is the order's efficiency."""
+    """Gratings behind a lens of f/50. Order m lies at m λf/period, and its peak relative to that of the open slit is
+    the efficiency of the order.
+    """
 
     RADIUS, FOCAL_LENGTH, PERIODS = 0.5e-3, 50e-3, 20
     OPENING = Slit(1.4, 1.4)  # 14 whole periods
@@ -39,14 +41,15 @@ class TestGratings:
     @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize(("levels", "order"), [(2, 1), (4, 1), (2, -1), (2, 3), (4, -3), (8, 1), (8, -7)])
     def test_efficiency_of_a_staircase(self, levels, order):
-        """sinc²(m/N): 0.405, 0.811, 0.950 in the first order (Swanson 1989). Off the axis the lens focuses a little
-        nearer, and less light leaves at a slant: 1 % in the seventh order."""
+        """Order m of a staircase of N levels has the efficiency sinc²(m/N) (Swanson 1989), reduced by 1 % in the
+        seventh order, because the lens focuses slightly nearer off the axis and oblique light is weaker.
+        """
         expected = reference.staircase_grating_efficiency(order, levels)
         assert self.efficiency(levels, order) == pytest.approx(expected, rel=0.02)
 
     @pytest.mark.slow
     def test_splines_through_the_same_heights_are_another_grating(self):
-        """PixelRelief is needed here: a smooth spline through the same samples has half the efficiency."""
+        """A smooth spline through the same samples is far less efficient."""
         steps = self.efficiency(4, 1)
         splines = self.efficiency(4, 1, optics.HeightMap)
         assert splines < 0.85 * steps
@@ -70,8 +73,9 @@ class TestLenses:
     @pytest.mark.slow
     @pytest.mark.parametrize("levels", [2, 4, 8])
     def test_a_lens_of_levels_focuses_as_a_grating_of_as_many(self, levels):
-        """sinc²(1/N), relative to the lens with the same pixels at any height (the pixels alone cost 2 %). With two
-        levels the other orders are close enough to send 3 % to the focus."""
+        """The focus has sinc²(1/N) of the light of a lens with the same pixels of any height. With two levels, other
+        orders add 3 %.
+        """
         smooth = self.strehl(self.lens(128))
         expected = reference.staircase_grating_efficiency(1, levels)
         assert self.strehl(self.lens(128, levels)) / smooth == pytest.approx(
@@ -80,13 +84,15 @@ class TestLenses:
 
     @pytest.mark.slow
     def test_whole_waves_change_nothing(self):
-        """A wrapped lens equals the full lens: the pixels of a Fresnel lens, at its wavelength."""
+        """A lens whose heights are wrapped to one wave equals the full lens at this wavelength."""
         whole = self.lens(24)
         assert self.strehl(whole % WAVE) == pytest.approx(self.strehl(whole), rel=1e-5)
 
     @pytest.mark.slow
     def test_finer_pixels_become_the_smooth_relief(self):
-        """Each pixel's phase error is its slope times the position in it; the mean falls with the width squared."""
+        """The phase error in a pixel is the slope times the distance from the pixel's centre. Its mean effect falls
+        with the square of the pixel's width.
+        """
         counts, off = (64, 128, 256), []
         smooth = Pupil(self.RADIUS, thin_lens_focal_length=self.FOCAL_LENGTH)
         limit = optics.strehl_ratio(optics.psf(smooth, [WAVELENGTH], self.FOCAL_LENGTH, shape=(65, 65)))[0]
@@ -123,7 +129,7 @@ class TestMethods:
             assert found.plan.predicted_error <= tolerance
 
     def test_against_a_plain_sum(self):
-        """Rayleigh-Sommerfeld's first integral over 16 x 16 points of every pixel of a slit, by NumPy."""
+        """The reference is the first Rayleigh-Sommerfeld integral over 16 x 16 points in every pixel."""
         n, fine, radius, z, k = 12, 16, 12e-6, 150e-6, 2 * np.pi / WAVELENGTH
         at = centres(n * fine, radius)
         open_ = np.abs(at) < 0.5 * radius + 1e-12
@@ -147,7 +153,7 @@ class TestMethods:
         assert "cheapest" in plan.why
 
     def test_wide_windows_are_not_for_the_direct_sum(self):
-        """They also raise the rank of the matrix product; the spectrum is at least ten times faster."""
+        """The spectral method is at least ten times faster for wide windows."""
         options = {
             option.method: option.seconds
             for option in optics.plan(self.PUPIL, WAVELENGTH, 150e-6, shape=(801, 801)).options
@@ -210,7 +216,7 @@ class TestScatter:
     """Pixels scatter light to places that smooth glass does not reach."""
 
     def test_of_a_grating_it_is_the_order_that_the_share_reaches(self):
-        """Two levels: 0.811 of the light in the first orders, 0.09 in the third, 0.032 in the fifth, on both sides."""
+        """The two first orders of two levels have 0.811 of the light, the third orders 0.09, and the fifth 0.032."""
         count, periods = 128, 32
         heights = np.broadcast_to(np.arange(count) // 2 % 2 * WAVE / 2, (count, count))
         pupil = Pupil(1e-3, PixelRelief(heights), aperture=Slit(1.4, 1.4))
@@ -224,8 +230,9 @@ class TestScatter:
         assert Pupil(1e-3, PixelRelief(smooth.control_points), n=1.0).scatter(WAVELENGTH, 0.01) == 0
 
     def test_an_eye_sees_by_pixels(self):
-        """A lens of 0.8 µm pixels next to the ideal one, looking at an edge: the scattered light is missing on the
-        bright side, and little of it reaches the dark side."""
+        """A lens of pixels 0.8 µm wide is compared with the ideal lens at an edge. The scattered light is missing on
+        the bright side, and little of it reaches the dark side.
+        """
         eye = optics.Eye(pupil=None, resolution=(9, 9), fov_deg=45, bands=1)
         focal_length = eye.sensor_distance
         x = centres(64, 25e-6)
@@ -254,7 +261,7 @@ class TestScatter:
 
     @pytest.mark.slow
     def test_light_that_goes_everywhere_is_seen_too(self):
-        """Noise scatters light up to the eye's rim; the eye's cells together hold the light of a wide window."""
+        """Random heights scatter light up to the eye's rim. All cells together receive the light of a wide window."""
         noise = PixelRelief(np.random.default_rng(0).random((32, 32)) * 1e-6)
         eye = optics.Eye(pupil=Pupil(25e-6, noise), resolution=(9, 9), fov_deg=45, bands=1)
         kernel = eye.kernel(1)
@@ -281,7 +288,7 @@ def test_a_stack_says_that_it_cannot():
 
 
 def test_a_flat_relief_is_known_to_be_flat_unless_it_may_change():
-    """A flat relief is rotationally symmetric; one with derivatives is not, because its pixels may change."""
+    """A flat relief is rotationally symmetric, except if derivatives with respect to its heights are requested."""
     assert PixelRelief(np.full((3, 3), 1e-7)).rotationally_symmetric
     assert not PixelRelief(np.diag([1e-7, 0.0, 0.0])).rotationally_symmetric
     types = precision("float64")

@@ -68,8 +68,10 @@ def test_wavelengths_share_slopes_where_the_glass_does_not_disperse():
 
 
 def test_slopes_of_a_lens_hold_out_to_the_rim_of_its_soft_edge():
-    """A lens turns the phase by thousands of waves. First-order slopes at the grid's ends would add an error to the
-    small difference that remains in the focus, and would need more samples."""
+    """A lens changes the phase by thousands of waves. If slopes at the ends of the grid were accurate to first order
+    only, their error would dominate the small difference that remains in the focus, and more samples would be
+    needed.
+    """
     f = 100e-6
     slopes = Pupil(30e-6, thin_lens_focal_length=f).slopes(550e-9, PointSource())
     x, y = slopes.grid.x[None, :], slopes.grid.y[:, None]
@@ -107,8 +109,9 @@ def test_bad_pupils(arguments, message):
 
 
 def test_path_and_pupil_turn_together_most_at_the_rim():
-    """Without a relief, the path's slope towards a point on the axis is n sin of the angle to the rim, R / √(R² +
-    D²)."""
+    """Without a relief, the slope of the path to a point on the axis at the distance D is n times the sine of the angle
+    to the rim, R / √(R² + D²).
+    """
     radius, distance = 30e-6, 200e-6
     slopes = Pupil(radius, medium_n=1.33).slopes(550e-9, PointSource())
     soft, disk = slopes.turning(distance, Grid((1, 1), 1e-6), 1.33)

@@ -96,7 +96,9 @@ def test_bad_control_points(points):
 
 @pytest.mark.parametrize("shape", [(4, 9), (12, 5), (1, 6), (7, 2)])
 def test_rows_and_columns_may_differ_in_number(shape):
-    """The spline is a tensor product: it is exact for a product of polynomials that each side can represent."""
+    """The spline is a tensor product. It is therefore exact for a product of one polynomial in x and one in y that the
+    samples along each side determine.
+    """
     y, x = ((2 * np.arange(n) + 1) / n - 1 for n in shape)
     down, across = (min(n - 1, 3) for n in shape)
     relief = HeightMap((1 + y**down)[:, None] * (2 - x**across))

@@ -21,14 +21,16 @@ def lens(mask=None, **others):
 
 
 def smooth(side=40):
-    """Amplitudes without any symmetry."""
+    """Return smooth amplitudes without any symmetry."""
     at = (np.arange(side) + 0.5) * 2 / side - 1
     x, y = at[None, :], at[:, None]
     return 0.6 + 0.3 * np.sin(2.1 * x + 0.4) * np.cos(1.3 * y) - 0.1 * y
 
 
 def test_a_gaussian_beam_stays_one():
-    """The beam focuses to the waist λf/πw if the pupil cuts off nothing, with a laser's intensity exp(-2r²/w²)."""
+    """A Gaussian beam of waist w, with the intensity exp(-2r²/w²), has the waist λf/πw in the focus if the pupil does
+    not cut it off.
+    """
     waist = R / 4
     result = optics.psf(lens(GaussianMask(waist)), **ASKED, tolerance=1e-5)
     focus = WAVE * F / (math.pi * waist)
@@ -54,8 +56,9 @@ def test_what_a_mask_lets_through():
 @pytest.mark.parametrize("waveguide", [None, optics.Waveguide(2e-6)])
 def test_signals_hold_a_masks_share_once(waveguide):
     """An even mask that halves the amplitude passes a quarter of the light, both in the reported white signal and in
-    the rendered signals. The tolerance is a tenth of the kernels' tolerance; counted twice, the share would be a
-    sixteenth."""
+    the rendered signals. The tolerance is a tenth of the kernels' tolerance. If the mask were counted twice, the
+    signals would be a sixteenth.
+    """
     plain, masked = (
         optics.Eye(optics.Pupil(30e-6, thin_lens_focal_length=240e-6, mask=mask), (3, 3), bands=1, waveguide=waveguide)
         for mask in (None, MaskMap(np.full((4, 4), 0.5), reach=40e-6))
@@ -66,7 +69,9 @@ def test_signals_hold_a_masks_share_once(waveguide):
 
 
 def test_a_masks_share_has_its_derivative_each_time():
-    """A graph allows one backward pass, so a cached one would give the second pass no derivative."""
+    """A graph of derivatives can be used for one backward pass only. If it were cached, the second pass would give no
+    derivative.
+    """
     waist, found = Float64(R / 2), []
     dr.enable_grad(waist)
     pupil = lens(GaussianMask(waist))
@@ -80,8 +85,9 @@ def test_a_masks_share_has_its_derivative_each_time():
 
 @pytest.mark.parametrize("of", ["waist", "samples", "radius"])
 def test_a_share_that_was_told_before_has_its_derivative_once_it_is_asked_for(of):
-    """The first request returns a plain number, which must not be cached: ∂T/∂w against T = w²/2R² (1 -
-    e^{-2R²/w²})."""
+    """The first request returns a plain number, which must not be cached for the second one. The derivative ∂T/∂w is
+    compared with that of the closed form T = w²/2R² (1 - e^{-2R²/w²}).
+    """
     waist, radius = Float64(R / 2), Float64(R)
     samples = TensorXf64(np.full((4, 4), 0.5))
     mask = MaskMap(samples) if of == "samples" else GaussianMask(waist if of == "waist" else R / 2)
@@ -96,7 +102,9 @@ def test_a_share_that_was_told_before_has_its_derivative_once_it_is_asked_for(of
 
 
 def test_contrast_behind_a_gaussian_is_gaussian():
-    """The OTF is the amplitude's autocorrelation, exp(-(λfF)²/2w²), and 1 at 0 for any transmission."""
+    """The OTF is the autocorrelation of the amplitude, exp(-(λfF)²/2w²) at the frequency F. It is 1 at F = 0, however
+    much light the mask transmits.
+    """
     waist = R / 4
     found = optics.mtf(optics.psf(lens(GaussianMask(waist)), **{**ASKED, "shape": (61, 61)}))
     closed = np.exp(-((WAVE * F * found.fx) ** 2) / (2 * waist**2))
@@ -119,7 +127,9 @@ def test_samples_of_a_gaussian_are_one():
 @pytest.mark.parametrize("aperture", [TELESCOPE, optics.Circle(), Rings([0.2, 0.5, 0.7, 1.0])], ids=repr)
 @pytest.mark.parametrize("method", ["low_rank", "far_field", "angular_spectrum", "split_angular_spectrum"])
 def test_methods_agree(aperture, method):
-    """Samples under a soft edge agree with the sum over nodes, which has no sample in common with them."""
+    """Methods that sample a softened edge agree with the sum over quadrature nodes, which uses other points of the
+    pupil.
+    """
     pupil = lens(MaskMap(smooth()), aperture=aperture)
     exact = optics.psf(pupil, **ASKED, method="rayleigh_sommerfeld", tolerance=1e-6, dtype="float64").psf
     assert relative_l2(optics.psf(pupil, **ASKED, method=method, tolerance=1e-4).psf, exact) < 1e-5
@@ -135,8 +145,9 @@ def test_rings_by_transforms_of_radii(mask):
 
 
 def test_a_zone_plate_has_a_focus():
-    """Each edge adds z/L e^{ikL} with its sign on the axis (first Rayleigh-Sommerfeld integral); a tenth of the light,
-    1/π², is in the focus."""
+    """Each edge of a zone contributes ± z/L e^{ikL} to the field on the axis, where L is its distance from there (first
+    Rayleigh-Sommerfeld integral). A tenth of the light (1/π²) is in the focus.
+    """
     z, radius = 2e-3, 100e-6
     plate = Rings.zone_plate(radius, z, WAVE)
     path = np.hypot(plate.radii * radius, z)
@@ -230,8 +241,9 @@ def test_bad_input_names_itself(make, message):
 
 
 def test_rays_do_not_judge_a_mask():
-    """A mask that is narrow relative to its pupil spreads light in a way that rays cannot predict: approximations are
-    never chosen."""
+    """A mask that is narrow relative to its pupil spreads light in a way that rays cannot predict. Approximations by
+    rays are therefore not chosen.
+    """
     asked = {"tolerance": 0.3, "dx": 20e-6, "shape": (9, 9)}
     approximate = ("fresnel", "fraunhofer", "geometric", "pinhole")
     assert optics.plan(lens(GaussianMask(1e-6)), WAVE, F, **asked).method not in approximate

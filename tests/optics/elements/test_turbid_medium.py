@@ -29,7 +29,9 @@ def test_fog_leaves_two_percent_contrast_at_its_visibility():
 
 
 def of_green_receptor(c, d):
-    """Signal of a white surface by Gauss-Legendre quadrature in panels of 5 nm, instead of sums over bands."""
+    """Return the signal of a green receptor from a white surface, by Gauss-Legendre quadrature over intervals of 5
+    nm.
+    """
     receptors, (x, w) = optics.receptors_of("rgb"), np.polynomial.legendre.leggauss(4)
     starts = np.arange(*receptors.limits_nm, 5.0)
     nm, weights = (starts[:, None] + 2.5 * (x + 1)).ravel(), np.tile(w, len(starts))

@@ -19,7 +19,9 @@ ASKED = {"wavelengths": [WAVE], "sensor_distance": F, "dx": 1.5e-6, "shape": (15
 
 
 def disk(n, spokes):
-    """Nodes (x, y) and weights of a quadrature for the unit disk's mean: Gauss in ρ², even in the angle."""
+    """Return nodes x, y and weights for the mean over the unit disk: Gauss-Legendre nodes in ρ², and equidistant
+    angles.
+    """
     square, weight = np.polynomial.legendre.leggauss(n)
     rho, angle = np.meshgrid(np.sqrt((square + 1) / 2), np.arange(spokes) * 2 * np.pi / spokes)
     return rho * np.cos(angle), rho * np.sin(angle), np.broadcast_to(weight / 2 / spokes, rho.shape)
@@ -30,7 +32,7 @@ def eye(wavefront, **others):
 
 
 def written_out(rho, theta):
-    """Thibos et al. (2002), table 2, by their index."""
+    """Return the Zernike polynomials of Thibos et al. (2002), table 2, by index."""
     r, s, c = rho, np.sin, np.cos
     return [
         1 + 0 * r,
@@ -75,7 +77,7 @@ def test_root_mean_square():
 
 
 def test_positive_defocus_is_a_myopes():
-    """A myope of D dioptres has c = D R²/(4√3): a stronger lens, 1/f' = 1/f + D."""
+    """An eye that is myopic by D dioptres has a stronger lens, 1/f' = 1/f + D. Its defocus is c = D R²/(4√3)."""
     dioptres = 30.0
     strong = {"sensor_distance": 1 / (1 / F + dioptres), "tolerance": 1e-5, "dx": 1e-6, "shape": (31, 31)}
     myope = Zernike({(2, 0): 1e6 * dioptres * R**2 / (4 * math.sqrt(3))})
@@ -88,7 +90,7 @@ def test_positive_defocus_is_a_myopes():
 
 @pytest.mark.parametrize("key", [(1, 1), (1, -1)])
 def test_light_goes_away_from_where_the_wavefront_is_ahead(key):
-    """W = 2c x/R turns light by -2c/R."""
+    """The wavefront W = 2c x/R deflects light by the angle -2c/R."""
     c = 0.5
     picture = optics.psf(eye(Zernike({key: c})), [WAVE], F, dx=0.5e-6, shape=(129, 129), tolerance=1e-2)
     place = np.unravel_index(picture.psf[0].argmax(), picture.psf[0].shape)
@@ -128,7 +130,9 @@ def test_picture_is_the_direct_sum(medium_n):
 
 @pytest.mark.parametrize("key", [(2, 0), (4, 0), (2, 2), (3, 3), (4, -2)])
 def test_strehl_ratio_goes_to_mahajans(key):
-    """exp(-(2πσ/λ)²) is right to fourth order: half the aberration gives a sixteenth of the error."""
+    """Mahajan's formula exp(-(2πσ/λ)²) has an error of fourth order: half the aberration gives a sixteenth of the
+    error.
+    """
     far = 20e-3  # where all rays are too flat for obliquity to matter
     one = {"wavelengths": [WAVE], "sensor_distance": far, "shape": (1, 1), "tolerance": 1e-8, "dtype": "float64"}
     ideal = optics.psf(Pupil(R, thin_lens_focal_length=far), **one).psf[0, 0, 0]
@@ -152,7 +156,7 @@ def test_samples_are_the_polynomials():
 
 @pytest.mark.parametrize("kind", ["zernike", "map"])
 def test_wider_than_the_pupil(kind):
-    """Over twice the radius, the middle has a quarter of the coefficient's defocus."""
+    """The pupil has a quarter of the defocus if the wavefront is defined over twice the radius of the pupil."""
     x = (np.arange(32) + 0.5) / 16 - 1
     wide = Zernike({(2, 0): 0.8}, radius=2 * R)
     if kind == "map":
@@ -168,7 +172,7 @@ def asking(numbers):
 
 
 def brightness(wavefront):
-    """Brightness of one sample next to the axis."""
+    """Return the PSF at one sample next to the axis."""
     result = optics.psf(eye(wavefront), [WAVE], F, dx=2e-6, shape=(3, 3), tolerance=1e-5, dtype="float64")
     return dr.gather(Float64, dr.ravel(result.tensor), UInt32(5))
 
@@ -217,7 +221,7 @@ def test_a_population_has_them_too():
 
 
 def test_beside_a_relief_of_pixels():
-    """A stepped relief combined with a wavefront: a lens compensates half a wave of defocus."""
+    """A stepped relief is combined with a wavefront: a lens made of pixels compensates half a wave of defocus."""
     steps = optics.PixelRelief(np.where(np.add.outer(np.arange(8), np.arange(8)) % 2, 2e-7, 0))
     bent = 1e6 * 40.0 * R**2 / (4 * math.sqrt(3))
     plain = Pupil(R, steps, thin_lens_focal_length=1 / (1 / F + 40.0), aperture=Slit(1, 1))
@@ -227,8 +231,9 @@ def test_beside_a_relief_of_pixels():
 
 
 def test_vector_focus_takes_wavefronts():
-    """Maréchal's Strehl ratio holds for spherical aberration, and for astigmatism, which is not rotationally
-    symmetric."""
+    """The Strehl ratios of spherical aberration, and of astigmatism, which is not rotationally symmetric, agree with
+    Maréchal's formula.
+    """
     assert eye(Zernike({(4, 0): 0.1, (2, 2): 0.0})).rotationally_symmetric(WAVE)
     round_, ideal = (
         optics.vector_focus(Pupil(2 * R, thin_lens_focal_length=F, wavefront=each), WAVE)

@@ -81,7 +81,9 @@ X, Y = R * np.cos(ANGLE), R * np.sin(ANGLE)
     ids=["noll", "fringe"],
 )
 def test_polynomials_are_the_published_ones(table, make):
-    """Rounding alone: polynomials of order 10 with coefficients up to 630 lose three of sixteen digits."""
+    """Only rounding is allowed for. Polynomials of order 10 have coefficients of up to 630, so they lose three of
+    sixteen digits.
+    """
     for j, polynomial in table.items():
         np.testing.assert_allclose(make({j: 1.0}).at(X, Y), 1e-6 * polynomial(R, ANGLE), atol=1e-18)
     numbers = RNG.choice(list(table), 5, replace=False).tolist()
@@ -104,7 +106,7 @@ def test_numbers_and_modes_are_one_to_one():
 
 
 def test_the_orders_differ():
-    """The same numbers in another numbering are other wavefronts, so an order must be named."""
+    """The same coefficients in another numbering describe another wavefront. The order must therefore be named."""
     row = [0, 0, 0, 0, 0.1, 0.2]
     kinds = [make(row).modes for make in (optics.Zernike, optics.Zernike.from_noll, optics.Zernike.from_fringe)]
     kept = [{mode: value for mode, value in modes.items() if value} for modes in kinds]

@@ -26,7 +26,7 @@ LAST = sum(thickness for _, thickness, _ in TRIPLET)
 
 
 def surface(points, away, radius, conic):
-    """Hit points of rays on a conic through the origin, and its normals there."""
+    """Return the points at which rays hit a conic surface through the origin, and the normals there."""
     c = 1 / radius
     (x, y, z), (l, m, n) = points, away
     a = c * (l * l + m * m + (1 + conic) * n * n)
@@ -112,7 +112,9 @@ def sensor_grid(wave, n, pitch, normal=(0.0, 0.0, 1.0)):
 
 
 def contrast(image, pitch, frequency, tangential=True):
-    """|OTF| of a picture at one frequency [1/m] along y (tangential) or x, relative to the light in the picture."""
+    """Return |OTF| of an image at one frequency [1/m], along y (tangential) or along x, relative to the light in the
+    image.
+    """
     at = (np.arange(image.shape[0]) - image.shape[0] // 2) * pitch
     wave = np.exp(-2j * np.pi * frequency * at)
     return abs(np.sum(image * (wave[:, None] if tangential else wave))) / image.sum()
@@ -134,9 +136,8 @@ def grid_rays(n):
 
 
 def solid_angles(at, wave, normal=(0.0, 0.0, 1.0)):
-    """Area in the sines along the image plane that belongs to each point of the entrance pupil.
-
-    It is the Jacobian of polynomials that are fitted to the sines of all rays.
+    """Return, for each point of the entrance pupil, the area of direction sines along the image plane per area of the
+    pupil. It is the Jacobian of polynomials that are fitted to the sines of all rays.
     """
     normal = np.array(normal) / np.linalg.norm(normal)
     right = np.array([1.0, 0, 0]) - normal[0] * normal

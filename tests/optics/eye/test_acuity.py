@@ -17,7 +17,7 @@ from optics import (
 
 
 def test_the_least_eye_parameter_is_snyders():
-    """Snyder, J. Comp. Physiol. 116, 161, 1977: D Δφ = 0.58 λ."""
+    """The least eye parameter is D Δφ = 0.58 λ (Snyder, J. Comp. Physiol. 116, 161, 1977)."""
     assert least_eye_parameter(500e-9) == pytest.approx(0.58 * 500e-9, rel=5e-3)
     assert least_eye_parameter(500e-9, "square") == 250e-9
 
@@ -38,7 +38,9 @@ def test_a_hexagonal_lattice_resolves_finer_gratings_than_a_square_one_of_equal_
 
 
 def test_a_lattice_of_points_aliases_beyond_its_acuity():
-    """The lattice sum of exp(2πi k·x) peaks first at a frequency of twice the acuity along its rows' normal."""
+    """Along the normal of the lattice's rows, the sum of exp(2πi k·x) over the lattice has its first peak at twice the
+    acuity.
+    """
     points = optics.hexagonal_directions(12, 1.0)
     finest = sampling_acuity(1.0)
     frequencies = np.linspace(0.5, 2.2, 341) * finest
@@ -47,7 +49,9 @@ def test_a_lattice_of_points_aliases_beyond_its_acuity():
 
 
 def test_an_ideal_observer_detects_at_the_predicted_threshold():
-    """The likelihood ratio of random draws of photons picks the right one of two intervals in 75 % of trials."""
+    """An observer who compares the likelihoods of random photon counts picks the right one of two intervals in 75 % of
+    the trials at the threshold.
+    """
     rng = np.random.default_rng(3)
     x = np.arange(64) / 64 * 4 * 2 * np.pi
     grating, mean = np.tile(np.sin(x), (16, 1)), 40.0

@@ -56,7 +56,9 @@ def test_colours_reach_their_pixels():
 
 
 def test_an_srgb_scene_is_a_spectral_scene():
-    """Reflectances times daylight, in the bands of the sensor. Display values of 0.5 are 0.214 in linear light."""
+    """The radiance is reflectance times daylight, in the bands of the sensor. Display values of 0.5 are 0.214 in linear
+    light.
+    """
     eye = camera_eye(PUPIL, SENSOR)
     daylight = optics.illuminant("D65")
     colours = [eye.in_bands(lambda at, ink=ink: ink.at(at) * daylight.at(at)) for ink in optics.srgb_basis()]
@@ -68,7 +70,7 @@ def test_an_srgb_scene_is_a_spectral_scene():
 
 
 def test_a_near_surface_hides_the_one_behind():
-    """A dark plate, out of focus, before a bright wall: beside the edge the plate only takes light away."""
+    """A dark plate is in front of a bright wall and out of focus. Next to its edge, it only removes light."""
     scene, depth = np.ones(WIDE), np.full(WIDE[:2], 2.0)
     scene[:, :16], depth[:, :16] = 0.0, 0.04
     seen = np.asarray(camera_image(scene, PUPIL, replace(SENSOR, filters=(530,)), depth=depth))[0]

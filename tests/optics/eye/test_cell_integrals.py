@@ -9,8 +9,9 @@ from optics.numerics.grid import Grid
 
 
 def circle():
-    """Spatial frequencies up to 1, the cut-off of a circular pupil's focus, and the MTF there times the weights of a
-    sum."""
+    """Return spatial frequencies up to 1, the cut-off of a circular pupil in focus, and its MTF there times quadrature
+    weights.
+    """
     u, weight = np.polynomial.legendre.leggauss(400)
     angle = np.pi * (u + 1) / 4
     f = np.sin(angle)  # smooth at the end of the MTF
@@ -19,19 +20,23 @@ def circle():
 
 
 def line_spread(x):
-    """A circular pupil's focus summed along y, with a highest frequency of 1."""
+    """Return the PSF of a circular pupil in focus, integrated along y. Its highest frequency is 1."""
     f, share = circle()
     return 2 * np.cos(2 * np.pi * np.outer(x, f)) @ share
 
 
 def over_cells(middles, size, from_cell):
-    """Integrals of the line spread over cells, for light from points or from the whole area of a scene cell."""
+    """Return integrals of the line spread function over cells, for light from points or from the whole area of a scene
+    cell.
+    """
     f, share = circle()
     return 2 * size * np.cos(2 * np.pi * np.outer(middles, f)) @ (share * np.sinc(f * size) ** (1 + from_cell))
 
 
 def integral_error(samples, size, from_cell):
-    """Relative error of integrals over cells of a size, with `samples` per cycle."""
+    """Return the relative error of integrals over cells of this size, with `samples` per cycle of the highest
+    frequency.
+    """
     pitch = 1 / samples
     count = 2 * int(14 / pitch) + 1
     tiles = Tiles(2 * int(5 / size) + 1, size, from_cell)
@@ -45,22 +50,25 @@ def integral_error(samples, size, from_cell):
 @pytest.mark.parametrize("cycles", [0.1, 0.5, 0.95, 1.0, 1.5, 1.95, 2.0, 3.0])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-5])
 def test_error_is_within_a_third_of_the_tolerance(tolerance, cycles, from_cell):
-    """cycles: cycles of the highest frequency in a cell. The number of samples is the smallest that the rule allows."""
+    """The number of samples is the smallest that the rule allows. cycles: number of cycles of the highest frequency in
+    a cell
+    """
     assert integral_error(samples_per_cycle(tolerance, cycles), cycles, from_cell) < tolerance / 3
 
 
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("cycles", "fewer"), [(0.5, 0.5), (0.1, 0.25)])
 def test_samples_that_larger_cells_need_are_too_few_for_smaller_ones(cycles, fewer):
-    """The rule is necessary: with the number of samples for larger cells, the error exceeds a third of a hundredth."""
+    """The error exceeds a third of the tolerance of 0.01 with a number of samples that is enough for larger cells."""
     assert integral_error(samples_per_cycle(1e-2, cycles) - fewer, cycles, False) > 1e-2 / 3
 
 
 @pytest.mark.parametrize("from_cell", [False, True])
 @pytest.mark.parametrize(("samples", "cells"), [(3, 1), (5, 3), (9, 3), (64, 15), (201, 15)])
 def test_it_is_the_spline_s_own_integral(samples, cells, from_cell):
-    """The reference is the spline itself, integrated by SciPy, for every sample set to 1 alone; from a cell it is
-    integrated twice."""
+    """The reference is SciPy's integral of splines of which a single sample is 1 and the others are 0. For light from a
+    whole cell, the spline is integrated twice.
+    """
     pitch = 0.3
     size = samples * pitch / cells * 0.8
     x, degree = Grid((1, samples), pitch).x, min(7, (samples - 2) // 2 * 2 + 1)

@@ -22,7 +22,7 @@ def white(eye, cells):
 
 
 def centroid(kernel):
-    """Centre of gravity of a kernel, (row, column), in cells from its centre."""
+    """Return the centroid of a kernel, (row, column), in cells from the middle of the array."""
     rows, columns = (np.arange(n) - n // 2 for n in kernel.shape)
     total = kernel.sum()
     return (kernel.sum(axis=1) @ rows) / total, (kernel.sum(axis=0) @ columns) / total
@@ -68,7 +68,7 @@ class TestOrientation:
 
     @pytest.mark.parametrize("axis", [0, 1])
     def test_prism_shifts_the_scene_away_from_its_thick_side(self, axis):
-        """Light bent towards +x lands at +x, the owner's left, and appears on the right."""
+        """Light that is deflected towards +x lands at +x, on the owner's left, and therefore appears on the right."""
         eye = Eye(Pupil(15e-6, prism(15e-6, 0.15, axis)), bands=1)
         shift = eye.sensor_distance * math.tan(math.asin(0.15)) / (eye.receptor_pitch / S)
         expected = (shift, 0) if axis == 0 else (0, shift)
@@ -123,8 +123,7 @@ class TestKernel:
         assert 0.99 < kernel.sum() < 1.001
 
     def test_strong_relief_follows_its_rays(self):
-        """Waves and rays through 60 µm of random glass put the light in the same place, up to the width of
-        diffraction."""
+        """Waves and rays through 60 µm of random glass reach the same place, to within the width of diffraction."""
         pupil = Pupil(60e-6, BSplineRelief(np.random.default_rng(5).random((4, 4)) * 60e-6), n=1.6)
         eye = Eye(pupil, bands=1)
         kernel = eye.kernel(2)[0].astype(np.float64)
@@ -253,7 +252,9 @@ class TestBands:
     @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize(("tolerance", "seed"), [(0.1, 0), (0.05, 1)])
     def test_signals_are_those_of_64_bands(self, tolerance, seed):
-        """Random patches of smooth colours behind random glass, whose speckle differs from band to band."""
+        """The scene consists of random patches with smooth spectra. The lens is random glass, whose speckle differs
+        between bands.
+        """
         rng = np.random.default_rng(seed)
         pupil = Pupil(15e-6, BSplineRelief(rng.random((4, 4)) * 10e-6))
         few, many = (Eye(pupil, (6, 6), bands=bands, tolerance=tolerance, noise_sigma=0) for bands in ("auto", 64))

@@ -20,7 +20,7 @@ def types():
 
 
 def eye_of(radius, relief, n, fov):
-    """The relief's control points are scaled by different factors: c (1 + (scale - 1) (1 + (i mod 3)))."""
+    """Return an eye. Control point i of its relief is multiplied by 1 + (relief - 1) (1 + (i mod 3))."""
     pattern = 1 + np.arange(16) % 3
     if isinstance(relief, float):
         points = RELIEF * (1 + (relief - 1) * pattern.reshape(4, 4))
@@ -33,7 +33,7 @@ def eye_of(radius, relief, n, fov):
 
 
 def seen(radius, relief, n, z, fov):
-    """One number: signals of a random scene, with random weights."""
+    """Return the sum of the signals of a random scene, with random weights."""
     rng = np.random.default_rng(5)
     eye = eye_of(radius, relief, n, fov)
     signal = eye.see(rng.random((1, 12, 14)), S, z=z * 2e-3)
@@ -46,7 +46,7 @@ def seen(radius, relief, n, z, fov):
 
 
 def difference(name):
-    """Central difference with Richardson's step: error O(STEP⁴)."""
+    """Return the central difference with Richardson's extrapolation, with an error of O(STEP⁴)."""
     at = [seen(**START | {name: 1 + k * STEP}) for k in (-2, -1, 1, 2)]
     return (8 * (at[2] - at[1]) - (at[3] - at[0])) / (12 * STEP)
 

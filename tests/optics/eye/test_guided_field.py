@@ -23,8 +23,10 @@ def eye_of(guide, pupil=LENS, receptors=9, bands=1, **others):
 
 
 def seen_by(ommatidium, eye, cells, side):
-    """Means over cells of an ommatidium's sensitivity (tangents). A kernel belongs to points on the opposite side in
-    the order of the visual field, which is right and down. These have the same signs along x (left) and y (up)."""
+    """Return the means of an ommatidium's sensitivity over the cells of an eye's kernel, in tangents of the directions.
+    An element of a kernel belongs to a point on the opposite side of the receptor. Columns of a kernel therefore ascend
+    to the left (x) in the visual field, and rows upwards (y).
+    """
     node, weight = np.polynomial.legendre.leggauss(4)
     at = (np.arange(side)[:, None] + 0.5 + node / 2 - side / 2).ravel() * PITCH / cells / FOCAL
     x, y = np.meshgrid(at, at)
@@ -79,8 +81,9 @@ def test_errors_fall_with_the_tolerance():
 
 @pytest.mark.slow
 def test_a_wide_guide_integrates_intensity_over_its_section():
-    """The kernel of dozens of modes is the PSF integrated over the disk, which white light fills. Evanescent fields, V
-    times shorter than the radius, also collect light around it."""
+    """The kernel of a waveguide with dozens of modes is the PSF integrated over the disk of the waveguide. The
+    evanescent fields, whose length is the radius divided by V, also collect light around the disk.
+    """
     guide = Waveguide(5e-6, 1.42, 1.34)
     eye = Eye(LENS, (3, 3), 2 * math.degrees(math.atan(9e-6 / FOCAL)), 18e-6, 1, waveguide=guide, full_aperture=1e-4)
     kernel = 144 * eye.kernel(12)[0].astype(float)  # for a square of 6 µm
@@ -98,7 +101,7 @@ def test_a_wide_guide_integrates_intensity_over_its_section():
 
 
 def test_acceptance_of_one_mode_is_narrower_than_snyders():
-    """Snyder's √((λ/D)² + (d/f)²) ignores the waveguide: it is 1.4 times too wide for one mode (1.97° for 1.398°)."""
+    """Snyder's formula √((λ/D)² + (d/f)²) ignores the waveguide. For one mode, it gives 1.97° instead of 1.398°."""
     eye = eye_of(Waveguide(1.4e-6), tolerance=5e-3)
     wavelength = float(eye.spectral_bands.wavelengths[0])
     found = eye.describe().acceptance_angle_deg
@@ -109,7 +112,9 @@ def test_acceptance_of_one_mode_is_narrower_than_snyders():
 
 @pytest.mark.parametrize("cells", [3, 4])
 def test_seeing_is_the_sum_over_the_scene(cells):
-    """The signal is not the mean over a receptor's cells; white light gives `white_signal`."""
+    """A signal is the sum over the cells of the scene, and not a mean over the cells of a receptor. White light gives
+    `white_signal`.
+    """
     eye = eye_of(Waveguide(1.8e-6), receptors=5, bands=2)
     side = 5 * cells + 40
     white = np.broadcast_to(daylight(eye.spectral_bands.wavelengths)[:, None, None], (2, side, side))
@@ -125,8 +130,9 @@ def test_seeing_is_the_sum_over_the_scene(cells):
 
 
 def test_guides_off_the_axis_point_at_the_pupil():
-    """A facet's field at 20° equals that on the axis, except for the lens' coma; an upright guide would collect almost
-    no light from a pupil that it sees at 20°."""
+    """The field of a facet at 20° equals that on the axis, except for the coma of the lens. A waveguide that is not
+    tilted would collect almost no light from a pupil that it sees at 20°.
+    """
     guide = Waveguide(1.4e-6)
     slow = Pupil(12.5e-6, thin_lens_focal_length=4 * FOCAL)
     eye = Eye(slow, (9, 9), 2 * math.degrees(math.atan(13.5e-6 / (4 * FOCAL))), 27e-6, 1, waveguide=guide)
@@ -188,7 +194,7 @@ def test_derivatives_are_refused():
 
 
 def test_a_guide_may_fill_its_receptor_and_no_more():
-    """Rounding of the receptor's side is no reason for a refusal."""
+    """A waveguide exactly as wide as the receptor is accepted, even if the receptor's side is rounded."""
     for side in np.random.default_rng(5).uniform(1e-6, 5e-6, 20):
         check_guide(Waveguide(float(side)), LENS, (float(side), 2 * float(side)))
         check_guide(Waveguide(float(side * (1 + 5e-10))), LENS, (2 * float(side), float(side)))
@@ -199,7 +205,9 @@ def test_a_guide_may_fill_its_receptor_and_no_more():
 
 
 def test_the_window_of_a_focused_guide_is_narrower_than_all_diffracted_light():
-    """Rays meet in the focus, so that the search for a window starts within the light that edges diffract."""
+    """Rays meet in the focus. The search for a window therefore starts with a window that excludes part of the
+    diffracted light.
+    """
     retina = eye_of(Waveguide(1.4e-6))._retina(4)
     spot = spot_of(beams_to(LENS, retina, math.inf, (0.0, 0.0)), retina)
     assert spot.half_of_rays < 0.1 * spot.half

@@ -22,7 +22,7 @@ def an_eye(pupil=PUPIL, **changes):
 
 @pytest.fixture
 def computed(monkeypatch):
-    """The distances for which kernels are computed."""
+    """Return a list to which the distances are added for which kernels are computed."""
     calls, compute = [], module.receptor_kernel
 
     def counted(eye, retina, z, *rest):
@@ -58,7 +58,9 @@ def test_other_kernels_are_computed(computed, other):
 
 
 def test_a_call_of_another_thread_does_not_change_the_kernels():
-    """Before every line of the function that keeps kernels, the eye sees another distance, as another thread could."""
+    """Before each line of the function that stores kernels, the eye sees a scene at another distance, as it could in
+    another thread.
+    """
     eye, before = an_eye(), sys.gettrace()
     expected = an_eye().see(SCENE, 2, z=0.02)
 
@@ -80,7 +82,7 @@ def test_a_call_of_another_thread_does_not_change_the_kernels():
 
 
 def test_derivatives_are_computed_again(computed):
-    """A graph allows one backward pass, so kernels with derivatives are not kept."""
+    """A graph of derivatives can be used for one backward pass only, so kernels with derivatives are not stored."""
     from drjit.auto.ad import Float
 
     radius = Float(20e-6)

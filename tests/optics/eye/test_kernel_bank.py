@@ -24,7 +24,7 @@ def flat_scene(rng, eye, margin=4):
 
 
 def reference(eye, radiance, kernel_of):
-    """Signals with every cell of the scene spread by its own kernel."""
+    """Return signals for which every cell of the scene is spread by its own kernel."""
     total = np.zeros((eye.bands, *radiance.shape[1:]))
     height, width = radiance.shape[1:]
     for i, j in np.ndindex(height, width):
@@ -42,7 +42,7 @@ class TestDepth:
     @pytest.fixture(scope="class")
     @staticmethod
     def scene():
-        """A slanted wall: the left side near, the right side far."""
+        """Return a slanted wall, whose left side is near and whose right side is far."""
         radiance = flat_scene(np.random.default_rng(0), LENS)
         z = np.broadcast_to(1 / np.linspace(1 / NEAR, 1 / FAR, radiance.shape[2]), radiance.shape[1:])
         kernels = {d: LENS.kernel(S, d) for d in np.unique(z)}
@@ -80,7 +80,7 @@ class TestDepth:
         np.testing.assert_array_equal(LENS.see(scene, S, z=everywhere), LENS.see(scene, S, z=2e-3))
 
     def test_far_scenes_need_one_layer(self):
-        """Light from 10 m on is practically parallel: R² / (2 z λ) = 6e-5 waves."""
+        """Light from 10 m and more is practically parallel, R² / (2 z λ) = 6e-5."""
         bank = LENS.sight(S, (10.0, math.inf))
         assert bank.choices[0].counts == (1,)
         assert bank.choices[0].predicted_error < 1e-3
@@ -108,8 +108,9 @@ class TestField:
             assert kernel.sum() == pytest.approx(1, abs=0.02)
 
     def test_a_prism_turns_light_from_its_side_onto_the_axis(self):
-        """The sides are right: a relief that is thick on the right in row and column order deflects towards +x. Its
-        off-axis kernel has the same shift; that of a tilted source alone would not."""
+        """A relief that is thicker in its last columns deflects light towards +x. The kernel of a tilted source alone
+        would not have the expected shift.
+        """
         ramp = 0.1 / 0.5 * (2 * np.arange(4) - 3) * 15e-6
         eye = Eye(Pupil(15e-6, BSplineRelief(np.broadcast_to(ramp, (4, 4)))), bands=1)
 
@@ -136,7 +137,7 @@ class TestField:
             return eye.kernel(S, direction_deg=tuple(math.degrees(math.atan(t)) for t in (right, -down)))
 
         def kernel_of(i, j):
-            """Kernel of a symmetric eye: one quadrant's kernels, mirrored, give the kernels of all directions."""
+            """Return the kernel of a symmetric eye, a mirrored kernel of one quadrant."""
             right, down = (j - (width - 1) / 2) * cell, (i - (height - 1) / 2) * cell
             return corner(abs(right), abs(down))[:, :: (1 if down > 0 else -1), :: (1 if right > 0 else -1)]
 
@@ -183,7 +184,7 @@ class TestNodeChoice:
             np.testing.assert_allclose(linear_weights(at, nodes(count)).sum(axis=0), 1)
 
     def test_the_worst_scene_reaches_the_worst_difference(self):
-        """The worst scene has light only where the receptive field grew."""
+        """The difference is largest for a scene with light only where the second kernel exceeds the first."""
         rng = np.random.default_rng(0)
         a, b = rng.random((1, 5, 5)), rng.random((1, 7, 7))
         padded = b - np.pad(a, ((0, 0), (1, 1), (1, 1)))
@@ -194,7 +195,7 @@ class TestNodeChoice:
         assert worst_difference([(1, b), (-1, a)], 2) == pytest.approx(expected)
 
     def test_a_quadratic_family_errs_as_predicted(self):
-        """Kernels linear in t² between nodes at distance h have an error of h²/4 halfway."""
+        """Linear interpolation of t² between nodes at the distance h has an error of h²/4."""
         choice = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
         assert [choice.error((n,)) for n in (3, 5, 9)] == pytest.approx([1 / 4, 1 / 16, 1 / 64])
         assert choice.choose(0.1).counts == (5,)
@@ -257,7 +258,7 @@ class TestLightFrom:
             np.testing.assert_allclose(one, seen[0], atol=1e-4 * LENS.throughput)
 
     def test_stripes_are_what_the_diffraction_limit_leaves_of_them(self):
-        """Box scene x Airy's OTF (Goodman, eq. 6-32) x box receptor, at the stripes' odd harmonics."""
+        """The reference is a sum over harmonics, with Airy's OTF (Goodman, eq. 6-32) and the receptor's transform."""
         eye = replace(LENS, resolution=(41, 41), sensor_width=41 / 9 * LENS.sensor_width, tolerance=1e-3)
         eye = replace(eye, fov_deg=math.degrees(2 * math.atan(eye.sensor_width / 2 / LENS.sensor_distance)))
         assert eye.sensor_distance == pytest.approx(LENS.sensor_distance)
@@ -274,8 +275,9 @@ class TestLightFrom:
         assert np.diff(centres)[0] / eye.spectral_bands.weights[0, 0] < -contrast - 0.03, "points differ"
 
     def test_detail_within_cells_is_better_put_at_their_centres(self):
-        """Smooth waves are given as their means over cells. Errors fall with the square of the cell size once cells
-        resolve the PSF (0.2 of a receptor); at all sizes light from the centres has less than half the error."""
+        """Smooth waves are given as means over cells. Errors fall with the square of the cell size if cells resolve the
+        PSF. Light from the centres of cells always has less than half the error.
+        """
         eye = replace(LENS, tolerance=1e-4)
         height, width = eye.resolution
         fine = self.waves(32)

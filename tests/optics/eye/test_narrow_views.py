@@ -11,7 +11,9 @@ import optics
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
-    """The glass is 140 waves high over 38 µm, so that the kernel needs the far field by a few nodes."""
+    """The height of the glass changes by 140 waves over 38 µm, so that the kernel is computed as a far field from few
+    nodes.
+    """
     pupil = optics.Pupil(19e-6, optics.BSplineRelief(150e-6 * np.random.default_rng(seed).random((4, 4))))
     eye = optics.Eye(pupil, (15, 15), 20.0, bands=1)
     kernel = eye.kernel(4)[0]
@@ -40,7 +42,9 @@ def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
     "aperture", [optics.Circle(), optics.Slit(0.05, 1.0), optics.Annulus(0.95)], ids=["circle", "slit", "ring"]
 )
 def test_kernels_lose_no_more_than_the_tolerance_whatever_the_edge(aperture):
-    """Diffracted light is proportional to perimeter over area: for a slit it is twenty times a circle's."""
+    """Diffracted light is proportional to the ratio of perimeter to area. For this slit, the ratio is twenty times that
+    of a circle.
+    """
     focal = 2e-3
     width = 2 * focal * math.tan(math.radians(22.5))
     pupil = optics.Pupil(100e-6, thin_lens_focal_length=focal, aperture=aperture)

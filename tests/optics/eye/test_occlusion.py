@@ -76,8 +76,9 @@ def test_edges_agree_with_rays_and_plain_sums_do_not(focus):
 
 
 def test_the_light_of_each_point_is_blocked_by_nearer_layers():
-    """The reference adds the kernel of every scene point, times what the near plate leaves of it. The scene has three
-    distances, each with its own kernel."""
+    """The reference is a sum over scene points. The kernel of each point is multiplied by the fraction of its light
+    that passes the near plate. The scene has three distances, each with its own kernel.
+    """
     scene, _, _, plate = edge()
     middle, one = 0.12, eye(0.1)
     floor = np.arange(SIDE)[:, None] >= SIDE // 2 + 4

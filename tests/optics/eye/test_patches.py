@@ -52,7 +52,9 @@ def test_the_kernel_aside_is_the_picture_aside():
 
 
 def test_a_patch_of_a_human_fovea():
-    """A pupil of 1.5 mm in front of half a millimetre of retina: the contrast of stripes agrees with diffraction."""
+    """The pupil is 1.5 mm wide, and the patch of the retina half a millimetre. The contrast of stripes is limited by
+    diffraction.
+    """
     focal, n = 16.7e-3, medium("vitreous").at(550e-9)
     pupil = Pupil(0.75e-3, thin_lens_focal_length=focal * n, medium_n=medium("vitreous"), object_n=1.0)
     asked = {"resolution": (32, 32), "fov_deg": fov(96e-6, focal), "sensor_width": 96e-6}
@@ -72,8 +74,9 @@ def test_a_patch_of_a_human_fovea():
 
 
 def test_a_retina_behind_water_sees_the_angles_before_it():
-    """For a fish's eye taken out of the water, f stays the same, and so do the positions of directions on the
-    retina."""
+    """The focal length f of a fish's eye stays the same if it is taken out of the water, and so do the places on the
+    retina to which directions are imaged.
+    """
     f = WHOLE.sensor_distance
     pupil = Pupil(30e-6, thin_lens_focal_length=1.33 * f, medium_n=1.33, object_n=1.0)
     eye = Eye(pupil, (15, 15), WHOLE.fov_deg, 200e-6, 1)

@@ -53,8 +53,9 @@ def test_rows_of_microvilli_are_repeated_from_the_top_left():
 
 
 def test_bands_and_places_may_be_polarised_differently():
-    """Each receptor and type has its own mixture of bands; the left half is polarised at another angle than the
-    right."""
+    """Each receptor type has its own mixture of bands, and the left half of the scene is polarised at another angle
+    than the right half.
+    """
     eye = replace(PERFECT, microvilli=Microvilli(0.0, 6.0))
     angle = np.where(np.arange(8) < 4, 0.0, 70.0) * np.ones((6, 1))
     found = eye.see(WHITE, 2, polarization=(np.array([0.2, 0.9]), angle))
@@ -87,7 +88,9 @@ def by_vector_focus(pupil, receptor, places, cells, left, right):
     ],
 )
 def test_a_scene_polarised_in_two_ways_is_the_vector_focus_of_both(left, right, wavefront):
-    """A middle receptor on the border, and its neighbours, which see the border only through blur."""
+    """The receptor in the middle sees the border between the two polarisations; its neighbours see it only because of
+    blur.
+    """
     pupil = optics.Pupil(0.4e-3, thin_lens_focal_length=F, wavefront=wavefront)
     receptor, azimuth = 5e-6, 15.0
     eye = Eye(
@@ -130,7 +133,9 @@ def worst(pupil, z, sine):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", range(12))
 def test_steep_rays_err_by_less_than_eyes_allow(seed):
-    """NA up to 0.5, for circles, hexagons, slits and rings, in focus and out of it, with and without aberrations."""
+    """The numerical aperture is at most 0.5. Pupils are circles, hexagons, slits and rings, in focus and out of focus,
+    with and without aberrations.
+    """
     rng = np.random.default_rng(seed)
     sine = float(rng.choice([0.1, 0.2, 0.35, 0.5]))
     aperture = (optics.Circle(), optics.Polygon.regular(6), optics.Slit(0.9, 1.7), optics.Annulus(0.6))[seed % 4]
@@ -175,7 +180,9 @@ def test_modes_of_rhabdoms_take_polarised_light_as_squares_do():
 
 
 def test_derivatives_are_those_of_unpolarised_light_times_the_same():
-    """Derivatives with respect to the pupil's radius and a mask's waist; the polarisation is the same everywhere."""
+    """The derivatives are with respect to the radius of the pupil and the waist of a mask. The polarisation is the same
+    everywhere.
+    """
     slopes = {}
     for polarization in (None, (0.7, 30.0)):
         radius, waist = Float64(12e-6), Float64(10e-6)

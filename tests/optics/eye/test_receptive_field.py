@@ -23,8 +23,9 @@ def test_a_square_holds_the_share_of_rays_and_no_more(share):
 
 
 def test_splines_err_at_their_ends():
-    """Light is as bright at the last cell as in the middle, with 3.5 samples per wave. With four more samples at either
-    end the error there is a twenty-fourth; the test requires a tenth."""
+    """Light is as bright at the last cell as in the middle, and has 3.5 samples per wave. Four additional samples at
+    either end reduce the error there by a factor of 24; the test requires a factor of 10.
+    """
     size, count, waves = 4.0, 15, 1 / 3.5
     edges = (np.arange(count + 1) - count / 2) * size
     exact = size + np.diff(np.sin(2 * np.pi * waves * edges)) / (2 * np.pi * waves)

@@ -38,7 +38,9 @@ def test_a_point_shows_the_kernel():
 @pytest.mark.parametrize("shape", [(2, 1), (4, 5), (12, 11)])
 @pytest.mark.parametrize("size", [(3, 5), (25, 41)])
 def test_only_what_is_seen_is_computed(shape, size):
-    """Scene and kernel are cut to the part that reaches the middle, and nothing wraps around into it."""
+    """Scene and kernel are cut to the parts that contribute to the middle of the image. No light wraps around into
+    it.
+    """
     rng = np.random.default_rng(1)
     scene, kernel = rng.random((1, shape[0] + 8, shape[1] + 6)), rng.random((1, *size))
     whole = blurred(scene, kernel)
@@ -68,7 +70,7 @@ def test_receptors_must_be_centred(size):
 
 @pytest.mark.parametrize("size", [(5, 4), (4, 5), (4, 6), (5, 3)])
 def test_each_even_side_of_a_kernel_is_extended(size):
-    """Receptors that are not square can have kernels with only one even side."""
+    """Receptors that are not square can have kernels with an even number of cells along only one side."""
     kernel = np.random.default_rng(3).random((2, *size))
     odd = with_centre(precision("float64").Tensor(kernel)).numpy()
     assert odd.shape == (2, *(side + 1 - side % 2 for side in size))

@@ -25,9 +25,10 @@ def lens(amplitude, **others):
 
 @pytest.mark.parametrize("tolerance", [0.1, 0.03])
 def test_an_even_mask_changes_no_choice(tolerance):
-    """The mask dims the scene and white alike. An amplitude of 0.2 leaves a 25th of the light. An error measured
-    against the undimmed white would be smaller by the same factor, and one layer would be chosen for three, three for
-    five."""
+    """The mask dims the scene and white alike. An amplitude of 0.2 transmits 1/25 of the light. If errors were relative
+    to white without the mask, they would be smaller by this factor, and one layer would be chosen instead of three, or
+    three instead of five.
+    """
     open_, dim = (lens(amplitude).sight(S, DEPTHS, tolerance=tolerance).choices[0] for amplitude in (1, 0.2))
     assert dim.counts == open_.counts
     assert dim.counts[0] > 1
@@ -49,8 +50,9 @@ def distance(near, far, place):
 
 @pytest.mark.slow
 def test_waveguides_err_by_no_more_of_what_they_leave_of_white():
-    """A rhabdom of 1.4 µm collects 0.16 of a square's light. Against the raw tolerance one layer would be enough, with
-    an error of 0.2 of white."""
+    """A rhabdom of 1.4 µm collects 0.16 of the light of a square receptor. If the tolerance were not scaled by this
+    factor, one layer would be chosen, with an error of 0.2 of white.
+    """
     focal, width = 50e-6, 27e-6
     pupil = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0)
     fov = 2 * math.degrees(math.atan(width / 2 / focal))

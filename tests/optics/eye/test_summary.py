@@ -18,7 +18,7 @@ def lens(radius=25e-6, **options):
 
 
 def circular_mtf(s):
-    """2/π (arccos s - s √(1 - s²)), s = f / cutoff (Goodman, eq. 6-32)."""
+    """Return 2/π (arccos s - s √(1 - s²)), where s is the frequency divided by the cut-off (Goodman, eq. 6-32)."""
     return 2 / math.pi * (math.acos(s) - s * math.sqrt(1 - s * s))
 
 
@@ -35,7 +35,9 @@ def test_angles_and_light():
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("before", "behind"), [(1.0, 1.336), (1.336, 1.336), (1.33, 1.5)])
 def test_f_number_between_media_says_how_bright_the_image_is(before, behind):
-    """1/(2 (n/n₀) sin θ), paraxially: the image has π (n/n₀)² sin² θ of a scene's radiance (Born & Wolf, §4.8)."""
+    """The f-number is 1/(2 (n/n₀) sin θ) in the paraxial limit, because the irradiance of the image is π (n/n₀)² sin² θ
+    times the radiance of the scene (Born & Wolf, §4.8).
+    """
     pupil = Pupil(10e-6, thin_lens_focal_length=F * behind / before, medium_n=behind, object_n=before)
     eye = Eye(pupil, bands=1)
     sine = math.sin(math.atan(10e-6 / eye.retina_distance))
@@ -44,7 +46,9 @@ def test_f_number_between_media_says_how_bright_the_image_is(before, behind):
 
 @pytest.mark.parametrize(("order", "windows"), [(1, 2), (2, 4)])
 def test_receptors_with_dynamics_count_photons_over_the_window_of_their_filter(order, windows):
-    """White noise behind exp(-t/τ)/τ or t exp(-t/τ)/τ² is that of a window of 2 τ or 4 τ."""
+    """White noise filtered by exp(-t/τ)/τ or t exp(-t/τ)/τ² has the variance of white noise averaged over a window of 2
+    τ or 4 τ.
+    """
     dynamics = ReceptorDynamics(30.0, order)
     slow = Eye(photon_budget=PhotonBudget(1.0, 0.02), dynamics=dynamics).describe()
     window = Eye(photon_budget=PhotonBudget(1.0, windows * 0.03)).describe()
@@ -53,7 +57,7 @@ def test_receptors_with_dynamics_count_photons_over_the_window_of_their_filter(o
 
 
 def test_diffraction_limit_is_the_apertures_width_in_wavelengths():
-    """D/λ cycles per radian in small angles; exactly 2 sin θ f/λ on a flat retina."""
+    """The limit is D/λ cycles per radian for small angles, and exactly 2 sin θ f/λ on a flat retina."""
     found = lens(5e-6).describe()
     assert found.diffraction_cpd == pytest.approx(10e-6 / 550e-9 * math.pi / 180, rel=1e-3)
 
@@ -68,7 +72,9 @@ def test_sampling_limit_is_half_a_cycle_per_receptor():
 @pytest.mark.slow
 @pytest.mark.parametrize("sigma", [0.1, 0.4])
 def test_noise_limit_inverts_the_circular_mtf(sigma):
-    """σ / a² = MTF(f). The lens is slow, so that its PSF's window is many fringes wide and the MTF finely sampled."""
+    """The MTF at the limit is σ / a². The lens is slow, so that the window of its PSF contains many fringes, and the
+    MTF is finely sampled.
+    """
     eye = lens(50e-6, noise_sigma=sigma * 0.25, tolerance=1e-3)
     found = eye.describe()
     expected = brentq(lambda s: circular_mtf(s) - sigma, 1e-6, 1)
@@ -86,7 +92,7 @@ def test_each_limit_can_bind():
 
 
 def test_photons_set_the_noise():
-    """√(σ² + T/N): N photons at a signal of 1, and T N photons per receptor for white."""
+    """The noise is √(σ² + T/N) for N photons at a signal of 1. White gives T N photons per receptor."""
     eye = lens(noise_sigma=0.0, photon_budget=PhotonBudget(illuminance=0.1))
     found = eye.describe()
     assert found.photons == pytest.approx(found.throughput * eye.photons.mean())
@@ -95,7 +101,7 @@ def test_photons_set_the_noise():
 
 
 def test_quality_is_the_area_between_mtf_and_noise():
-    """T/f_N ∫ max(MTF - σ/T, 0) df by quadrature of the closed form."""
+    """The reference is the integral T/f_N ∫ max(MTF - σ/T, 0) df of the closed form, by quadrature."""
     eye = lens(12e-6, resolution=(90, 90), noise_sigma=1.8e-3, tolerance=2e-3)
     found = eye.describe()
     light, s = 0.0144, np.linspace(0, 1, 20001)
@@ -112,7 +118,9 @@ def test_acceptance_angle_of_a_sharp_eye_is_its_receptors():
 
 
 def test_acceptance_angle_is_that_of_the_kernel_cut_finely():
-    """PSF ⊗ receptor along the middle row, 15 places per receptor; with 4 it would be 2 % wider."""
+    """The reference is the PSF, convolved with the receptor, along the middle row at 15 places per receptor. With 4
+    places, the angle would be 2 % wider.
+    """
     eye, cells = lens(resolution=(63, 63)), 15
     field = eye.kernel(cells)[0].astype(np.float64)
     for _ in range(2):
@@ -128,7 +136,7 @@ def test_acceptance_angle_is_that_of_the_kernel_cut_finely():
 
 
 def test_acceptance_angle_of_a_small_pupil_is_the_airy_disks():
-    """1.029 λ/D, widened by a narrow receptor of 0.3 λ/D: variances add (Snyder 1977)."""
+    """The Airy disk is 1.029 λ/D wide. A receptor of 0.3 λ/D widens it, and the variances add up (Snyder 1977)."""
     eye = lens(4e-6, resolution=(100, 100))
     airy, receptor = 1.029 * 550e-9 / 8e-6, 2e-6 / F
     found = math.radians(eye.describe().acceptance_angle_deg)
@@ -180,7 +188,7 @@ def test_what_the_light_cannot_tell_is_one_named_line(monkeypatch):
 
 
 def test_advice_is_for_who_can_follow_it(monkeypatch):
-    """An eye has no argument dx; its pupil's PSF has."""
+    """The table does not recommend changing dx, because an eye has no such argument."""
 
     def refused(*_, **__):
         raise AccuracyError("it needs 9 x 9 samples", "set dx=1e-07, shape=(9, 9)")

@@ -32,8 +32,10 @@ def random_case(rng, fresnel_numbers=(0.01, 30.0)):
 
 
 def predicted_and_actual(case, method):
-    """The planner's predicted error of a method requested by name, its actual error against the exact integral, and the
-    plan's prediction."""
+    """Return the planner's predicted error of a method, its actual error, and the error that the PSF's plan predicts.
+
+    The actual error is relative to the exact integral. The method is requested by its name.
+    """
     pupil, wavelength, z, window = case
     task = Problem.from_beam(Beam(pupil, PointSource(), wavelength, z), window, 1e-3)
     settings = {"dx": window.dx, "shape": window.shape}

@@ -74,7 +74,9 @@ def test_what_is_not_even_is_not_taken_for_it(name):
 
 
 def test_derivatives_by_control_points_are_those_of_the_whole_pupil():
-    """A change of one control point breaks the symmetry; a change of the index does not."""
+    """Changing one control point breaks the symmetry, so its derivative needs the whole pupil; the derivative with
+    respect to the index does not.
+    """
     heights = on_both_sides()
     points = precision("float64").Tensor64(heights)
     assert not optics.BSplineRelief(points).mirror_symmetric

@@ -21,8 +21,9 @@ LAMBDA = 430e-9
 
 
 def problem_of(radius, z, degrees, tolerance, seed=0, dtype="float32", side=61):
-    """A problem with glass that bends light by several waves; the window reaches from the axis as far as rays of
-    `degrees`."""
+    """Return a problem whose glass changes the phase by several waves. Its window extends from the axis to rays at the
+    angle `degrees`.
+    """
     heights = 0.6 * radius * np.random.default_rng(seed).random((4, 4))
     beam = Beam(optics.Pupil(radius, optics.BSplineRelief(heights)), PointSource(), LAMBDA, z)
     window = Grid.square(side, 2 * z * math.tan(math.radians(degrees)) / side)
@@ -52,8 +53,9 @@ def test_a_few_nodes_stand_for_all(radius, z, degrees, tolerance):
 
 
 def test_nodes_that_forget_the_rest_s_size_are_wrong():
-    """The phase of the slow part alone would choose the same number of nodes and miss the tolerance: its size matters,
-    too."""
+    """A number of nodes that follows from the phase alone misses the tolerance. The size of the slow factor matters,
+    too.
+    """
     _, problem = problem_of(5e-6, 100e-6, 40, 1e-3)
     [how] = far_field(problem)
     x, y = 5e-6 * np.random.default_rng(1).uniform(-0.7, 0.7, (2, 60))
@@ -92,7 +94,7 @@ def test_fewer_nodes_for_looser_tolerances_and_smaller_pupils():
 
 
 def test_few_nodes_carry_the_derivative_by_the_distance():
-    """The slow part itself selects the nodes; they also serve its derivative."""
+    """The nodes are chosen for the slow factor, and are also enough for its derivative."""
     beam, problem = problem_of(14e-6, 567e-6, 40, 1e-3, dtype="float64", side=15)
     [how] = far_field(problem)
     z = precision("float64").Float64(beam.distance)
@@ -114,7 +116,7 @@ def test_few_nodes_carry_the_derivative_by_the_distance():
 
 @pytest.mark.filterwarnings("error")
 def test_a_window_of_one_sample_is_answered():
-    """The window has no width, although directions are counted in half angles of the window."""
+    """A window of one sample has no width, although directions are measured in half widths of the window."""
     pupil = optics.Pupil(25e-6)
     seen, exact = (
         optics.psf(pupil, shape=(1, 1), method=method).psf[0, 0, 0] for method in ("far_field", "rayleigh_sommerfeld")

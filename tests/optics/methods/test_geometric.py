@@ -39,7 +39,7 @@ def test_power_is_conserved_to_rounding():
 
 
 def test_rays_follow_the_exact_angle_not_the_paraxial_one():
-    """A prism of sine 0.6 shifts by z tan θ = 0.75 z."""
+    """A prism that deflects light to the sine 0.6 shifts the image by z tan θ = 0.75 z."""
     sine, radius = 0.6, 10e-6
     ramp = np.broadcast_to(sine / 0.5 * (2 * np.arange(4) - 3) * radius, (4, 4))
     found = optics.psf(
@@ -56,7 +56,7 @@ def test_evanescent_rays_do_not_arrive():
 
 
 def test_error_falls_with_the_fourth_root_of_the_fresnel_number():
-    """Fringes one Fresnel zone √(λz) wide lie along the shadow's rim; cells are fixed at a tenth of a zone."""
+    """Fringes along the rim of the shadow are as wide as a Fresnel zone, √(λz). Cells are a tenth as wide."""
     distances = np.array([20e-6, 80e-6, 320e-6])
     errors = []
     for z in distances:
@@ -73,7 +73,9 @@ def test_error_falls_with_the_fourth_root_of_the_fresnel_number():
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("method", ["geometric", "pinhole"])
 def test_predicted_error_bounds_the_actual_one(method):
-    """For 120 random pupils the prediction was always a bound within a factor of 1.2, and always within 30x."""
+    """For 120 random pupils, the actual error was at most 1.2 times the predicted one, and the predicted error at most
+    30 times the actual one.
+    """
     rng = np.random.default_rng(4)
     planned, actual, seen = np.array([predicted_and_actual(random_case(rng), method) for _ in range(20)]).T
     assert np.mean(planned >= actual) >= 0.9
@@ -138,7 +140,7 @@ class TestPinhole:
             optics.psf(Pupil(20e-6), [WAVELENGTH], distance, source_angle=(0.1, 0.0), method="pinhole")
 
     def test_a_masks_derivative_is_refused_as_well(self):
-        """The mask changes the amount of light in the cell, though not the choice of cell."""
+        """A mask changes the amount of light in each cell, although it does not change the cells that rays hit."""
         import drjit as dr
 
         waist = Float64(10e-6)

@@ -36,7 +36,9 @@ def errors(tolerance, count=8):
 @pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-2, 1e-3, 1e-5])
 def test_sampling_takes_no_more_than_half_the_tolerance(tolerance):
-    """A plan guarantees this; rays' amplitudes have a smaller error than the rim's, which determines the rank."""
+    """Every plan relies on this. The rank is determined by the amplitudes at the rim, and the amplitudes inside have
+    smaller errors.
+    """
     assert errors(tolerance).max() < tolerance / 2
 
 
@@ -50,7 +52,9 @@ def test_a_rank_chosen_for_far_more_error_breaks_the_promise(monkeypatch):
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (9e-6, -4e-6)])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 8), (9, 1), (33, 65), (16, 17), (17, 16)])
 def test_windows_of_any_shape_are_the_direct_sum_s(shape, centre, relief):
-    """The sum uses halves about the middle; with an even number of samples, one sample has no mirror image."""
+    """The sum treats the two halves of the window together. With an even number of samples, one sample has no mirror
+    image.
+    """
     beam = next(eyes(1)) if relief is None else Beam(Pupil(15e-6, relief), PointSource(), 550e-9, Z)
     problem = Problem.from_beam(beam, Grid(shape, 0.25e-6, centre), 1e-6, "float64")
     (how,), (reference,) = low_rank(problem), nodes(problem)
@@ -60,7 +64,9 @@ def test_windows_of_any_shape_are_the_direct_sum_s(shape, centre, relief):
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_the_matrix_is_limited_in_bytes_and_not_in_samples_across(dtype):
-    """A strongly aberrated focus of a thousand zones has rank 7 of 700 samples; the direct sum would take 24 s."""
+    """A strongly aberrated focus of a thousand Fresnel zones has rank 7, with 700 samples across. The direct sum would
+    take 24 s.
+    """
     tangent = 0.3 / np.sqrt(1 - 0.3**2)
     radius = 1000 * 550e-9 / tangent
     lens = Pupil(radius, thin_lens_focal_length=radius / tangent, wavefront=Zernike({(6, 2): 0.08, (5, 5): 0.08}))
@@ -75,7 +81,9 @@ def test_the_matrix_is_limited_in_bytes_and_not_in_samples_across(dtype):
 
 
 def test_it_is_not_offered_close_to_the_pupil():
-    """One wavelength behind a pupil sixty times as wide, its error would be 0.2 where 5e-3 is predicted."""
+    """One wavelength behind a pupil that is sixty wavelengths wide, the error would be 0.2, while the predicted error
+    is 5e-3.
+    """
     window = {"sensor_distance": 0.5e-6, "dx": 0.1e-6, "shape": (9, 9)}
     even = optics.MaskMap(np.ones((4, 4)))  # the cheapest only without symmetry
     found = optics.psf(optics.Pupil(30e-6, mask=even), [500e-9], tolerance=1e-2, **window)

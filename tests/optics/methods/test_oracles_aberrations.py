@@ -20,14 +20,13 @@ def disk():
 
 
 def aberrated(wavefront, **changes):
-    """Pupil whose glass adds `wavefront` [waves] of phase."""
+    """Return a pupil whose glass adds the phase `wavefront` [waves]."""
     settings = {"n": INDEX, "thin_lens_focal_length": FOCAL_LENGTH} | changes
     return optics.Pupil(RADIUS, wavefront * WAVELENGTH / (INDEX - 1), **settings)
 
 
 def on_axis(pupil, distance=FOCAL_LENGTH):
-    """The PSF at the reference point relative to an unaberrated one; aberrated light may be brighter at another
-    point."""
+    """Return the PSF on the axis, relative to that without aberration. It may be higher at another point."""
     result = optics.psf(pupil, [WAVELENGTH], distance, dx=1e-6, shape=(1, 1), tolerance=1e-5, dtype="float64")
     return float(result.psf[0, 0, 0]) * pupil.area / abs(converging(pupil.aperture_radius, distance)) ** 2
 
@@ -86,7 +85,9 @@ class TestStrehlRatio:
 
     @pytest.mark.parametrize("j", range(4, 16))
     def test_zernikes_cost_by_their_rms_alone(self, j):
-        """0.04 waves of any Zernike mode give exp(-(2πσ)²), up to third moments of order σ³."""
+        """For σ = 0.04 waves of any Zernike mode, the Strehl ratio is exp(-(2πσ)²), except for a third moment of order
+        σ³.
+        """
         got = on_axis(aberrated(0.04 * reference.zernike(j, RHO, THETA)))
         assert got == pytest.approx(reference.marechal_strehl(0.04), abs=3e-3)
 
@@ -98,9 +99,8 @@ class TestStrehlRatio:
         assert right > 20 * wrong
 
     def test_sensor_balances_what_glass_adds(self):
-        """Glass that is thicker at the rim delays the rim: W > 0 diverges, so the sensor has to move back, not forward.
-
-        Sensor shift: W020 = R² (1/z - 1/f) / (2λ), paraxially.
+        """Glass that is thicker at the rim delays light there. A positive W diverges, so the sensor has to move back,
+        not forward. Paraxially, the sensor at z adds W020 = R² (1/z - 1/f) / (2λ).
         """
         w = 1.0
         shifted = {}
@@ -112,7 +112,7 @@ class TestStrehlRatio:
 
     @pytest.mark.parametrize("waves", [-0.8, -0.3, 0.3, 0.8])
     def test_defocus_by_lens_relief_or_sensor_is_the_same(self, waves):
-        """sinc² in three ways; the glass bends light by (n - 1) h, so the test covers n, λ and h."""
+        """Three kinds of defocus give the same sinc². The path in glass is (n - 1) h, so the test covers n, λ and h."""
         expected = reference.strehl_defocus(waves)
         curvature = waves * 2 * WAVELENGTH / RADIUS**2
         by_relief = on_axis(aberrated(waves * RHO**2))
@@ -125,7 +125,7 @@ class TestStrehlRatio:
         assert by_sensor == pytest.approx(expected, abs=1e-3)
 
     def test_departure_from_the_closed_form_falls_like_the_aperture_squared(self):
-        """Half a wave of defocus at constant Fresnel number."""
+        """The defocus is half a wave, and the Fresnel number is constant."""
         apertures, errors = (0.05, 0.1, 0.2), []
         for aperture in apertures:
             f = 20 * WAVELENGTH / aperture**2
@@ -138,7 +138,7 @@ class TestStrehlRatio:
         assert reference.order_of_convergence(apertures, errors) > 1.8
 
     def test_samples_of_the_relief_converge_with_the_fourth_power(self):
-        """Cubic splines through cell centres: an asymmetric wavefront of half a wave on 8, 16, 32 samples."""
+        """An asymmetric wavefront of half a wave is interpolated by cubic splines from 8, 16 and 32 samples across."""
 
         def strehl(count):
             x = (np.arange(count) + 0.5) * 2 / count - 1

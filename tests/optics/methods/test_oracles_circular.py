@@ -33,8 +33,9 @@ def exact_psf(result):
 class TestExactIntegral:
     @pytest.mark.parametrize("f_number", [1.4, 2, 2.8, 4, 8, 16])
     def test_lens_in_focus(self, f_number):
-        """±10 λ f#. Seven digits are requested and obtained; Airy's pattern would have an error of 2e-3 at f/16, 0.1 at
-        f/1.4."""
+        """The window is ±10 λ f/D. Seven digits are requested and obtained. Airy's pattern has errors of 2e-3 at f/16
+        and 0.1 at f/1.4.
+        """
         result = optics.psf(
             lens(f_number), [WAVELENGTH], 300e-6, dx=WAVELENGTH * f_number / 4, shape=(81, 81), tolerance=1e-7,
             dtype="float64",
@@ -46,7 +47,9 @@ class TestExactIntegral:
 
     @pytest.mark.parametrize("f_number", [1, 2, 8, 30])
     def test_middle_of_a_focus_alone(self, f_number):
-        """No phase turns there, and the kernel still falls towards the rim: |U| = |1 - z/L - ikz ln(L/z)|."""
+        """All paths to the focus are equal, but the kernel falls towards the rim at the distance L: |U| = |1 - z/L -
+        ikz ln(L/z)|.
+        """
         focus = {"sensor_distance": 300e-6, "shape": (1, 1), "tolerance": 1e-8, "dtype": "float64"}
         result = optics.psf(lens(f_number), [WAVELENGTH], **focus)
         z, radius = 300e-6, result.pupil.radius
@@ -57,7 +60,7 @@ class TestExactIntegral:
     @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize(("dtype", "tolerance"), [("float32", 1e-4), ("float64", 1e-7)])
     def test_aperture_in_the_near_field(self, dtype, tolerance):
-        """Radius 50 µm at 200 µm, ±60 µm: Fresnel number 23, light and shadow in one window."""
+        """A radius of 50 µm at 200 µm gives the Fresnel number 23. The window of ±60 µm contains light and shadow."""
         result = optics.psf(
             optics.Pupil(50e-6), [WAVELENGTH], 200e-6, dx=1.5e-6, shape=(81, 81), tolerance=tolerance, dtype=dtype
         )
@@ -69,7 +72,7 @@ class TestExactIntegral:
 
     @pytest.mark.parametrize("z", [5e-6, 17e-6, 40e-6, 300e-6, 2e-3])
     def test_axis_behind_an_aperture(self, z):
-        """Distances from a quarter of the radius to Fresnel number 0.36."""
+        """The distances extend from a quarter of the radius to the Fresnel number 0.36."""
         result = optics.psf(
             optics.Pupil(20e-6),
             [WAVELENGTH],
@@ -87,8 +90,9 @@ class TestExactIntegral:
     @pytest.mark.parametrize("pitch", [1e-3, 0.03])
     @pytest.mark.parametrize("f_number", [1.4, 2, 2.8, 8])
     def test_nodes_suffice_where_hardly_a_wave_turns(self, f_number, pitch):
-        """All paths are equal at a focus, so nodes are needed for the obliquity alone. The two nodes that suffice for
-        the phase have an error of 6e-4 at f/2, and a check with equally few nodes could not detect it."""
+        """All paths to a focus are equal, so nodes are needed for the obliquity alone. Two nodes are enough for the
+        phase, but have an error of 6e-4 at f/2, which a check with equally few nodes could not detect.
+        """
         result = optics.psf(
             lens(f_number), [WAVELENGTH], 300e-6, dx=pitch * WAVELENGTH * f_number, shape=(9, 9), tolerance=1e-7,
             dtype="float64", method="rayleigh_sommerfeld",
@@ -97,7 +101,9 @@ class TestExactIntegral:
 
     @pytest.mark.parametrize("f_number", [0.7, 1, 2, 8])
     def test_peak_of_a_converging_wave(self, f_number):
-        """The Strehl ratio is 1 at any aperture, against the oracle's own peak: Airy's is 25 % too high at f/0.7."""
+        """The Strehl ratio is 1 at any aperture, and the peak is that of the oracle. Airy's peak is 25 % too high at
+        f/0.7.
+        """
         result = optics.psf(
             lens(f_number),
             [WAVELENGTH],
@@ -112,7 +118,9 @@ class TestExactIntegral:
         assert optics.strehl_ratio(result)[0] == pytest.approx(1, abs=2e-6)
 
     def test_finite_source(self):
-        """A point at 500 µm, sensor in front of, in and behind its image: the exact integral with both phases."""
+        """The sensor is in front of, in and behind the image of a point at 500 µm. The reference is the exact
+        integral.
+        """
         pupil = lens(4, 200e-6)
         image = reference.thin_lens_image_distance(200e-6, 500e-6)
         for z in (0.9 * image, image, 1.1 * image):
@@ -133,12 +141,16 @@ class TestExactIntegral:
 
 
 class TestParaxialLimits:
-    """Closed forms of the paraxial theory are limits: the package must deviate from them like the aperture squared."""
+    """Closed forms of paraxial theory are limits, from which exact results deviate in proportion to the aperture
+    squared.
+    """
 
     APERTURES = (0.05, 0.1, 0.2)
 
     def departure(self, defocus_waves, closed_form, fresnel_number=20.0):
-        """Misfit at constant Fresnel number and defocus, which give the same paraxial pattern."""
+        """Return deviations from the closed form. Fresnel number and defocus are constant, so the paraxial pattern is
+        the same.
+        """
         errors = []
         for aperture in self.APERTURES:
             f = fresnel_number * WAVELENGTH / aperture**2
@@ -180,16 +192,17 @@ class TestQuality:
     SLOW = optics.Pupil(0.5e-3, thin_lens_focal_length=50e-3)  # f/50, Fresnel number 9, NA 0.01: Airy to 1e-4
 
     def window(self, rings, samples_per_ring=8):
-        """PSF on a window in units of λ f#."""
+        """Return the PSF on a window of ± `rings` λ f/D."""
         n = 2 * rings * samples_per_ring + 1
         return optics.psf(
             self.SLOW, [WAVELENGTH], 50e-3, dx=50 * WAVELENGTH / samples_per_ring, shape=(n, n), tolerance=1e-4
         )
 
     def test_mtf_is_that_of_a_disk_as_the_window_grows(self):
-        """A window of W rings misses 2/(π² W) of the light, which would raise all frequencies: order -1. Relative to
-        all the light that arrives, only the sharp edge of the window remains as an error; the missing light is the
-        predicted error."""
+        """A window of W rings misses 2/(π² W) of the light. Relative to the light in the window, all contrasts would be
+        too high by this factor. Relative to all light that arrives, only the effect of the window's sharp edge remains.
+        The missing light is the predicted error.
+        """
         f = np.linspace(0.1, 0.9, 9) / (50 * WAVELENGTH)
         expected = reference.circular_mtf(f, WAVELENGTH, 0.5e-3, 50e-3)
         rings, lifted, errors, predicted = (4, 8, 16), [], [], []
@@ -218,8 +231,9 @@ class TestQuality:
         assert np.abs(transfer.profile(f)[0] - expected).max() < transfer.predicted_error[0] < 0.02
 
     def test_encircled_energy_is_airys(self):
-        """The energy agrees at any pitch, up to the 2e-5 of Airy's own error. Four clipped cells per ring would have a
-        larger error."""
+        """The energy agrees at any pitch, except for Airy's own error of 2e-5. A sum over four cells per ring would
+        have a larger error.
+        """
         zeros = reference.AIRY_ZEROS[:4] / np.pi * 50 * WAVELENGTH
         expected = reference.airy_encircled_energy(zeros, WAVELENGTH, 0.5e-3, 50e-3)
         for count in (4, 8, 16):
@@ -233,7 +247,9 @@ class TestQuality:
 
 
 class TestOrdersOfConvergence:
-    """A hard edge on a grid converges like N^-1 to N^-1.5; the soft edge of `psf` reaches the tolerance."""
+    """Errors of a hard edge on a grid of N samples fall like N^-1 to N^-1.5. Errors of the soft edge of `psf` stay
+    below the tolerance.
+    """
 
     RADIUS, Z = 20e-6, 60e-6
 
@@ -257,7 +273,7 @@ class TestOrdersOfConvergence:
 
     @pytest.mark.parametrize("method", ["angular_spectrum", "rayleigh_sommerfeld", "auto"])
     def test_soft_edge(self, method):
-        """Five more digits for less than four times the number of samples across."""
+        """Five additional digits need less than four times the number of samples across."""
         samples, errors = [], []
         for tolerance in (1e-3, 1e-5, 1e-8):
             result = optics.psf(

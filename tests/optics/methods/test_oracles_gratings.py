@@ -10,12 +10,12 @@ WAVELENGTH = 500e-9
 
 
 class TestFieldOrders:
-    """A grating of period 5 µm under a Gaussian beam: at 1 mm the orders are 100 µm apart and 22 µm wide."""
+    """A Gaussian beam on a grating with a period of 5 µm. At 1 mm, the orders are 100 µm apart and 22 µm wide."""
 
     PERIOD, WAIST, Z = 5e-6, 20e-6, 1e-3
 
     def efficiencies(self, phase, samples_per_period, orders):
-        """Power within 50 µm of each order; phase [waves] as a function of x/d in [0, 1)."""
+        """Return the share of the power within 50 µm of each order; phase: function of x / period in [0, 1) [waves]."""
         dx = self.PERIOD / samples_per_period
         n = 25 * samples_per_period
         x = (np.arange(n) - n // 2 + 0.5) * dx  # cells, not edges, on the period
@@ -49,7 +49,7 @@ class TestFieldOrders:
     @pytest.mark.fast_cases(4)
     @pytest.mark.parametrize("name", CASES)
     def test_every_order_has_its_share(self, name):
-        """16 samples per period: order m of a step has an error of 1 - sinc²(m/16), 4 % at m = 2."""
+        """Order m of a step with 16 samples per period has an error of 1 - sinc²(m/16), which is 5 % for m = 2."""
         phase, law = self.CASES[name]
         orders = (-2, -1, 0, 1, 2)
         got = self.efficiencies(phase, 16, orders)
@@ -60,12 +60,14 @@ class TestFieldOrders:
 
 
 class TestReliefs:
-    """The same laws for a glass grating on a pupil: peaks of its orders over the peak without it."""
+    """The same laws hold for a grating of glass in a pupil, for peaks of its orders relative to the peak without a
+    grating.
+    """
 
     RADIUS, PERIODS, N, Z = 100e-6, 16.2473, 1.5, 4e-3  # π x periods is a zero of J1: order 0 is dark at order 1
 
     def peak(self, height, order, n=1.5, wavelength=WAVELENGTH):
-        """PSF at an order's place, for a pupil with an ideal lens; orders are 16 Airy radii apart."""
+        """Return the PSF at the place of an order. Behind the ideal lens, orders are 16 Airy radii apart."""
         pupil = optics.Pupil(self.RADIUS, height, n=n, thin_lens_focal_length=self.Z)
         place = self.Z * np.tan(np.arcsin(order * wavelength * self.PERIODS / (2 * self.RADIUS)))
         dx = abs(place) if order else 1e-6
@@ -76,7 +78,9 @@ class TestReliefs:
     @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize("depth", [0.3, 0.766])
     def test_sinusoidal_relief(self, depth):
-        """A smooth relief is its samples' spline. Order 0 vanishes at J0's zero, 0.766 waves."""
+        """The spline represents a smooth relief accurately. Order 0 vanishes at a depth of 0.766 waves, where J0 is
+        zero.
+        """
         x = (np.arange(256) - 127.5) / 128
         height = depth / 2 * WAVELENGTH / 0.5 * np.sin(np.pi * self.PERIODS * x)
         height = np.broadcast_to(height, (256, 256))
@@ -89,8 +93,9 @@ class TestReliefs:
 
     @pytest.mark.slow
     def test_binary_relief_starves_order_zero(self):
-        """Half a wave of glass at half the duty: 0 and 40.5 %; the spline rounds the steps, with an error that
-        converges."""
+        """Steps of half a wave, over half of each period, send no light to order 0 and 40.5 % to order 1. The spline
+        rounds the steps, with an error that decreases with the number of samples.
+        """
         errors, samples = [], (128, 256)
         flat = self.peak(None, 0)
         for count in samples:

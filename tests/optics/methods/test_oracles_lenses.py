@@ -12,7 +12,7 @@ DESIGN = 550e-9
 
 
 def peak(pupil, wavelength, z, **options):
-    """PSF on the axis [1/m²]."""
+    """Return the PSF on the axis [1/m²]."""
     settings = {"dx": 1e-6, "shape": (1, 1), "tolerance": 1e-4, "dtype": "float64"} | options
     return float(optics.psf(pupil, [wavelength], z, **settings).psf[0, 0, 0])
 
@@ -22,7 +22,9 @@ class TestChromaticFocus:
 
     @pytest.mark.parametrize("wavelength", [420e-9, 550e-9, 680e-9])
     def test_refractive_relief(self, wavelength):
-        """Dispersive glass, n(λ) - 1 over f: through focus, the axis follows Fresnel's closed form with that f(λ)."""
+        """For dispersive glass, 1/f is proportional to n(λ) - 1. With this f(λ), the PSF on the axis through focus is
+        Fresnel's closed form.
+        """
         glass = optics.RefractiveIndex.from_abbe(1.62, 20.0)
         curvature_radius = self.FOCAL_LENGTH * 0.62
         relief = optics.BSplineRelief.paraboloid(2e-6, 1 / curvature_radius, self.RADIUS)
@@ -46,9 +48,8 @@ class TestChromaticFocus:
 
     @pytest.mark.parametrize("wavelength", [440e-9, 550e-9, 660e-9])
     def test_diffractive_lens(self, wavelength):
-        """Five whole zones of a wrapped lens: focus at f0 λ0/λ with efficiency sinc²(λ0/λ - 1).
-
-        The zones' edges are sampled: order 1 to 2 in the pitch, 2 % here.
+        """A lens of five zones, each one wave high, has its focus at f0 λ0/λ with the efficiency sinc²(λ0/λ - 1).
+        Sampling of the edges of zones causes an error of 2 % here, of order 1 to 2 in the pitch.
         """
         f0, zones = 1e-3, 5
         radius = math.sqrt(2 * zones * DESIGN * f0)
@@ -75,7 +76,7 @@ class TestChromaticFocus:
         return float(np.abs(out.u[4, 4]) ** 2 / (np.pi * radius**2))
 
     def test_the_two_shift_in_opposite_directions(self):
-        """Blue focuses nearer behind glass and farther behind zones, by the PSF's own best distance."""
+        """Blue light focuses nearer behind glass, and farther behind zones. The focus is where the PSF is highest."""
         glass = optics.RefractiveIndex.from_abbe(1.62, 20.0)
         assert glass.at(440e-9) > glass.at(660e-9)
         refractive = [reference.refractive_focal_length(1.24e-3, glass.at(w)) for w in (440e-9, 660e-9)]
@@ -92,7 +93,9 @@ class TestChromaticFocus:
 class TestThinLens:
     @pytest.mark.parametrize("conjugate", [1.5, 2.0, 4.0])
     def test_image_of_a_finite_source_is_airys(self, conjugate):
-        """f/17, up to NA²: Airy's pattern on the image plane, with the image distance as its focal length."""
+        """The PSF on the image plane of a lens of f/17 is Airy's pattern for the image distance, except for errors of
+        order NA².
+        """
         f, radius = 2e-3, 60e-6
         pupil = optics.Pupil(radius, thin_lens_focal_length=f)
         source = conjugate * f
@@ -117,7 +120,7 @@ class TestThinLens:
         assert result.x[np.argmax(result.psf[0, 0])] == pytest.approx(place, rel=1e-6)
 
     def test_through_focus_is_lommels(self):
-        """The axis over distance for a finite source: 1/f - 1/s in place of 1/f."""
+        """For a source at the distance s, the PSF on the axis over the distance has 1/f - 1/s in place of 1/f."""
         f, s, radius = 2e-3, 5e-3, 80e-6
         image = reference.thin_lens_image_distance(f, s)
         pupil = optics.Pupil(radius, thin_lens_focal_length=f)
@@ -132,10 +135,8 @@ class TestThinLens:
 
 class TestPinhole:
     def test_sharpest_radius(self):
-        """The PSF's peak over the pinhole's radius: highest at √(0.742 λz), by a parabola through the package's own
-        peaks.
-
-        NA = 0.02: paraxial up to 4e-4.
+        """The peak of the PSF is highest for the radius √(0.742 λz). The maximum is found by a parabola through
+        computed peaks. At the NA of 0.02, paraxial theory has an error of 4e-4.
         """
         z = 1e-3
         best = reference.pinhole_radius(DESIGN, z)

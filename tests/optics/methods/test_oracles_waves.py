@@ -19,7 +19,7 @@ def radii(n, dx):
 
 
 def plateau(n, dx, half_width, edge):
-    """A profile of 1 in the middle that falls smoothly: its edges send light only within their narrow spectrum."""
+    """Return a profile that is 1 in the middle and has a narrow spectrum."""
     x = positions(n, dx)
     profile = (erf((x + half_width) / edge) - erf((x - half_width) / edge)) / 2
     return profile[:, None] * profile[None, :]
@@ -42,7 +42,7 @@ class TestGaussian:
         ],
     )
     def test_exact(self, waist, z, dtype, bound):
-        """Amplitude and phase; at λ/(πw0) = 0.27 a grazing field of 2e-7 leaves and is cut off, at 0.05 none."""
+        """Grazing light with a relative amplitude of 2e-7 is lost for λ/(πw0) = 0.27, and none for 0.05."""
         dx, n = waist / 6, 64
         out_dx = waist * np.hypot(1, z * WAVELENGTH / (np.pi * waist**2)) / 8
         out = optics.propagate(
@@ -63,7 +63,7 @@ class TestGaussian:
 
     @pytest.mark.parametrize("z", [-60e-6, 5e-6, 60e-6])
     def test_paraxial(self, z):
-        """Width, curvature and Gouy's phase, in front of and behind the waist."""
+        """Width, curvature and Gouy phase agree in front of and behind the waist."""
         waist, n, dx = 3e-6, 64, 0.5e-6
         out = optics.propagate(
             np.exp(-((radii(n, dx) / waist) ** 2)),
@@ -99,7 +99,7 @@ class TestPlaneWaves:
     @pytest.mark.parametrize("axis", [0, 1])
     @pytest.mark.parametrize("sine", [-0.6, 0.0, 0.3, 0.6])
     def test_tilted(self, sine, axis):
-        """Phase through the distance kz cos θ: on the middle of a plateau, 20 µm from its edges."""
+        """The phase in the middle of the plateau, far from its edges, changes by kz cos θ."""
         n, dx, z = 256, 0.25e-6, 10e-6
         along = np.broadcast_to(positions(n, dx), (n, n)) if axis == 1 else positions(n, dx)[:, None]
         u = plateau(n, dx, 20e-6, 2.5e-6) * np.exp(2j * np.pi * sine / WAVELENGTH * along)
@@ -116,7 +116,7 @@ class TestPlaneWaves:
 
     @pytest.mark.parametrize("sine", [1.6, 2.0])
     def test_evanescent_decay(self, sine):
-        """exp(-2πz √(f² - 1/λ²)) in amplitude and no phase, over a decade and a half."""
+        """The amplitude is exp(-2πz √(f² - 1/λ²)), and the phase does not change."""
         n, dx = 256, 62.5e-9
         u = plateau(n, dx, 4e-6, 1.4e-6) * np.exp(2j * np.pi * sine / WAVELENGTH * positions(n, dx))
         heights, logs = np.array([0.02e-6, 0.08e-6, 0.16e-6]), []
@@ -134,7 +134,7 @@ class TestPlaneWaves:
 
 
 class TestTalbot:
-    """Period 0.8 µm at 500 nm, the first order at 39°: exact distance 2.28 µm, paraxial 2.56 µm."""
+    """For a period of 0.8 µm and 500 nm, the Talbot distance is 2.28 µm, and 2.56 µm in paraxial theory."""
 
     PERIOD, ORDERS = 0.8e-6, {-1: 0.3, 0: 1.0, 1: 0.3}
 
@@ -167,7 +167,7 @@ class TestTalbot:
 
 
 class TestEdges:
-    """Square aperture of 20 µm at Fresnel number 2: the product of two slits, in Fresnel's theory."""
+    """A square aperture at the Fresnel number 2, which is a product of two slits in Fresnel's theory."""
 
     HALF, Z, OUT = 10e-6, 100e-6, 1e-6
 
@@ -192,7 +192,7 @@ class TestEdges:
         assert reference.relative_l2(self.slits(1.02 * self.HALF), self.slits()) > 5 * errors[-1]
 
     def test_exact_propagation_differs_by_little_here(self):
-        """Edge light at θ = 0.3 has phase errors kzθ⁴/8, but little power; Fraunhofer's sinc² is the wrong regime."""
+        """Fresnel's phase error kzθ⁴/8 matters only at θ = 0.3, where there is little power."""
         exact = self.square(161, "angular_spectrum")
         assert reference.relative_l2(np.abs(exact), np.abs(self.slits())) < 5e-2
         x = positions(41, self.OUT)
@@ -200,7 +200,7 @@ class TestEdges:
         assert reference.relative_l2(np.abs(sinc[:, None] * sinc), np.abs(self.slits())) > 0.2
 
     def test_a_wide_screen_shows_the_knife_edge(self):
-        """80 µm wide, observed within 6 µm of one edge: the other is too far away, so the error goes with pitch²."""
+        """Within 6 µm of one edge, the other edge 80 µm away has no effect. The error falls like pitch²."""
         width, z, pitches, errors = 80e-6, 20e-6, (0.5e-6, 0.25e-6, 0.125e-6), []
         for dx in pitches:
             n, m = int(width / dx), int(40e-6 / dx) | 1
@@ -236,7 +236,7 @@ class TestNothingComesBack:
         assert reference.relative_l2(np.abs(out.u[n // 2]) ** 2, np.abs(exact) ** 2) < tolerance
 
     def direct(self, u, x, dx, z):
-        """First Rayleigh-Sommerfeld integral as a sum: dx < λ/2, so that its replicas are evanescent."""
+        """Return the first Rayleigh-Sommerfeld integral as a sum, whose aliases are evanescent."""
         n, k = len(u), 2 * np.pi / WAVELENGTH
         d = np.sqrt((positions(n, dx)[None, :] - x) ** 2 + positions(n, dx)[:, None] ** 2 + z**2)
         return np.sum(u * z / (2 * np.pi * d**2) * (1 / d - 1j * k) * np.exp(1j * k * d)) * dx**2
@@ -249,7 +249,7 @@ class TestLaws:
         return coarse[0] + 1j * coarse[1]
 
     def test_parseval(self):
-        """Power in a window that holds all light, minus the evanescent part, by an independent transform."""
+        """A window that contains all light has all power except for the evanescent part."""
         n, dx = 64, 0.2e-6  # frequencies up to 1.25/λ along an axis
         u = self.random(n, 1)
         spectrum = np.abs(np.fft.fft2(u, (1024, 1024))) ** 2
@@ -266,7 +266,7 @@ class TestLaws:
         assert abs(1 - arrived) > 0.03  # |H| = 1 everywhere would preserve it all
 
     def test_reciprocity(self):
-        """∫ v (P t Q u) = ∫ u (Q t P v): source and sensor swapped behind a random screen have the same amplitude.
+        """For propagators P, Q and a screen t, ∫ v (P t Q u) = ∫ u (Q t P v).
 
         A kernel shifted by half a sample, or one that is not even, breaks it.
         """
@@ -285,7 +285,7 @@ class TestLaws:
         assert abs(shifted - there) > 1e-2 * abs(there)
 
     def test_reciprocity_of_source_and_sensor(self):
-        """Law on a lens' axis: z² PSF(s -> z) = s² PSF(z -> s), to the aperture squared (unit waves on the pupil)."""
+        """z² PSF(s -> z) = s² PSF(z -> s) on a lens's axis, with deviations proportional to the aperture squared."""
         errors, apertures = [], (0.05, 0.1, 0.2)
         for aperture in apertures:
             f = 20 * WAVELENGTH / aperture**2

@@ -63,7 +63,7 @@ def test_memory_does_not_grow_with_the_rows_of_a_pupil(monkeypatch):
 
 
 def test_pupils_far_beyond_the_limits_are_planned_at_once():
-    """X-rays of 1 pm need 10^14 samples: their blocks are counted, and not listed."""
+    """X-rays of 1 pm need 10^14 samples. Their blocks are counted without a list of all blocks."""
     assert row_blocks.block_size(Grid((10**9, 10**9), 1e-12))[0] > 10**7
     with pytest.raises(optics.AccuracyError, match=r"needs integrals over .* GB and about .* s by hankel"):
         optics.plan(Pupil(30e-6, thin_lens_focal_length=240e-6), 1e-12)
@@ -72,7 +72,9 @@ def test_pupils_far_beyond_the_limits_are_planned_at_once():
 @pytest.mark.slow
 @pytest.mark.parametrize("distance", [10e-3, 12e-3])
 def test_a_pupil_of_more_than_4096_samples_across(distance):
-    """It was refused for its number of samples, although it takes a few seconds and needs a few hundred megabytes."""
+    """An earlier version refused it because of its number of samples, although it takes a few seconds and a few hundred
+    megabytes.
+    """
     pupil = Pupil(1.5e-3, BSplineRelief(np.arange(16.0).reshape(4, 4) * 1e-8), thin_lens_focal_length=distance)
     ask = {"sensor_distance": 1.01 * distance, "dx": 1e-6, "shape": (65, 65)}
     plan = optics.plan(pupil, **ask, method="split_angular_spectrum")

@@ -20,8 +20,9 @@ def lens(sine, **others):
 
 
 def in_focus(sine):
-    """Relative L2 errors over the plane in light polarised along x and unpolarised. A field around the axis of (I₀ + I₂
-    cos 2φ, I₂ sin 2φ, -2i I₁ cos φ) has the intensity a + b cos 2φ."""
+    """Return the relative L2 errors over the plane, in light polarised along x and in unpolarised light. The field (I₀
+    + I₂ cos 2φ, I₂ sin 2φ, -2i I₁ cos φ) around the axis has an intensity a + b cos 2φ.
+    """
     rho = np.linspace(0, 25 / sine, 1500) * WAVE
     light = Light(lambda theta: 1 / np.cos(theta))
     along, axial, twice, scalar = focal_integrals(rho, 2 * math.pi / WAVE, F, (0.0, math.asin(sine)), light)
@@ -42,7 +43,7 @@ def test_a_round_pupil_in_focus_errs_as_tabulated(sine):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.1, 0.3])
 def test_unpolarised_light_errs_by_what_curvature_it_has(sine):
-    """The error is -∇²I/4k² to second order, here for Airy's disk and without any vector theory."""
+    """The error is -∇²I/4k² to second order, which follows from Airy's pattern without vector theory."""
     u = np.linspace(1e-6, 80, 20001)
     from scipy.special import j1, jv
 
@@ -95,7 +96,7 @@ def test_a_population_says_it_too():
 
 
 def pupils(rng):
-    """Random pupils of all kinds, aberrated by up to 0.6 waves, and their defocus [λ/sine²]."""
+    """Return a random pupil of any kind, aberrated by up to 0.6 waves, with its NA and its defocus [λ/NA²]."""
     sine = float(rng.choice([0.1, 0.3, 0.5, 0.7, 0.85, 0.9]))
     weights = rng.normal(size=len(MODES))
     rms = float(rng.choice([0.0, 0.03, 0.07, 0.15, 0.3, 0.6])) * WAVE * 1e6
@@ -116,8 +117,9 @@ def pupils(rng):
 
 
 def errors(light, rng):
-    """Errors of scalar theory, over windows of several widths about the brightest sample, unpolarised and along 8
-    planes."""
+    """Return errors of scalar theory over windows of several widths around the brightest sample, for unpolarised light
+    and for 8 planes of polarisation.
+    """
     y, x = np.unravel_index(light.scalar.argmax(), light.scalar.shape)
     turns = np.arange(8) * np.pi / 8
     fields = np.tensordot(np.stack([np.cos(turns), np.sin(turns)], 1), light.parts, axes=1) * math.sqrt(2)
@@ -132,7 +134,7 @@ def errors(light, rng):
 
 @pytest.fixture(scope="module")
 def ratios():
-    """Actual errors over predicted ones, (case, window and polarisation)."""
+    """Return the ratios of actual and predicted errors, (case, window and polarisation)."""
     rng, found = np.random.default_rng(5), []
     for _ in range(36):
         pupil, sine, defocus = pupils(rng)

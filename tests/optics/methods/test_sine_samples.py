@@ -21,7 +21,7 @@ APERTURES = {"circle": Circle(), "ring": Annulus(0.6), "hexagon": Polygon.regula
 
 
 def error(beam, window, tolerance):
-    """Actual error of low_rank's PSF against the sum over nodes; float64."""
+    """Return the actual error of the PSF by "low_rank", relative to the sum over nodes in float64."""
     problem, exactly = (Problem.from_beam(beam, window, each, "float64") for each in (tolerance, 1e-3 * tolerance))
     (how,), (reference,) = low_rank(problem), nodes(exactly)
     assert isinstance(how.pupil, SineSamples)
@@ -41,8 +41,7 @@ def bent(radius, distance, aperture, seed):
 @pytest.mark.parametrize("tolerance", [2e-4, 1e-5, 1e-7])
 @pytest.mark.parametrize("place", [0.0, 0.7])
 def test_half_the_tolerance_holds_for_every_aperture_on_and_off_the_axis(name, tolerance, place):
-    """It also holds at half a right angle, where a step in sines is several times as long on the pupil as on its
-    axis."""
+    """It also holds at 45°, where equal steps in the sine are several times as long on the pupil as on the axis."""
     distance = 100e-6
     source = PointSource(300e-6, (math.atan(place), -math.atan(place / 2)))
     centre = (place * distance, -place / 2 * distance)
@@ -54,8 +53,9 @@ def test_half_the_tolerance_holds_for_every_aperture_on_and_off_the_axis(name, t
 
 @pytest.mark.slow
 def test_many_zones_take_no_more_samples_than_their_aberrations():
-    """About the focus of a lens of Fresnel number N, the samples depend on the Zernike waves and the window but not on
-    N, and the PSF agrees with the direct sum."""
+    """Near the focus of a lens, the number of samples depends on the aberrations and on the window, but not on the
+    Fresnel number. The PSF agrees with the direct sum.
+    """
     counts = []
     for zones in (1e2, 1e3, 1e4):
         for aperture in (0.1, 0.3):
@@ -72,8 +72,9 @@ def test_many_zones_take_no_more_samples_than_their_aberrations():
 
 
 def test_samples_spaced_for_the_middle_alias_at_the_rim(monkeypatch):
-    """The spacing in sines accounts for the map's stretch at the rim; without this factor the error exceeds the
-    tolerance."""
+    """The spacing in sines accounts for the longer steps at the rim. Without this factor, the error exceeds the
+    tolerance.
+    """
     beam = Beam(bent(40e-6, 60e-6, Circle(), 1), PointSource(), WAVE, 60e-6)
     window = Grid.square(33, 0.3e-6)
     assert error(beam, window, 1e-6) < 0.5e-6
@@ -97,7 +98,9 @@ def test_sines_that_crowd_leave_the_pupil_to_an_even_grid():
 
 
 def test_a_grid_that_no_memory_holds_is_not_made():
-    """A high mode continues, and grows, in the soft edge beyond its circle; radial rings still give the PSF."""
+    """A high Zernike mode increases in the soft edge beyond its circle, so that a grid would need too many samples.
+    Rings of nodes still give the PSF.
+    """
     bent_far = Pupil(25e-6, thin_lens_focal_length=240e-6, wavefront=Zernike({(28, 0): 0.06}))
     assert (
         sine_samples(Problem.from_beam(Beam(bent_far, PointSource(), WAVE, 240e-6), Grid.square(65, 1e-6), 1e-2))
@@ -107,7 +110,9 @@ def test_a_grid_that_no_memory_holds_is_not_made():
 
 
 def test_every_sample_stands_for_its_area():
-    """Behind an open pinhole samples add up to its area times the pupil's field; in sines, areas differ by 1/cos⁴."""
+    """For an open pinhole, the weights of the samples add up to its area. Equal steps in sines have areas that differ
+    by the factor 1/cos⁴.
+    """
     distance, radius = 50e-6, 30e-6
     beam = Beam(Pupil(radius), PointSource(), WAVE, distance)
     for centre in ((0.0, 0.0), (20e-6, -10e-6)):

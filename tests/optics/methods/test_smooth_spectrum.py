@@ -40,7 +40,9 @@ def test_apertures_of_genomes_are_intersections_of_sides(aperture: Aperture, kno
 @pytest.mark.parametrize("slope", [0.2, 3.0])
 @pytest.mark.parametrize(("aperture", "error"), [(optics.Slit(1.0, 1.6), 1e-8), (optics.Circle(), 4e-3)])
 def test_light_is_the_convolution_with_a_gaussian(aperture, error, slope):
-    """A quadratic phase within straight sides is exact, at corners as well; circles are nearly straight."""
+    """The convolution is exact for a quadratic phase within straight sides, also at corners. Circles are nearly
+    straight over the Gaussian's width.
+    """
     radius, width = 10e-6, 0.2e-6
     wavefront = optics.Zernike({(1, 1): 2.5 * slope, (1, -1): 1.5 * slope, (2, 0): 0.8}, radius)
     beam = Beam(optics.Pupil(radius, aperture=aperture, wavefront=wavefront), LIGHT, 0.5e-6, 1e-3)
@@ -63,7 +65,7 @@ def test_light_is_the_convolution_with_a_gaussian(aperture, error, slope):
 
 @pytest.mark.parametrize("aperture", [optics.Circle(), optics.Polygon.regular(3, 90.0)])
 def test_psf_of_a_steep_relief_equals_the_direct_sum(aperture):
-    """Sines of slopes exceed 2.5, and much of the light misses the window."""
+    """Slopes of the relief correspond to sines above 2.5, and much of the light misses the window."""
     pupil = optics.Pupil(2.5e-6, height=rough(6, 5.6e-6), aperture=aperture)
     beam, window = Beam(pupil, LIGHT, 0.5e-6, 15e-6), Grid.square(11, 1.6e-6)
     problem = replace(Problem.from_beam(beam, window, 1e-2), steep=True, reach=window.half_width)

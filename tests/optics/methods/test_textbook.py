@@ -15,7 +15,7 @@ CLOSE = 0.01
 
 
 class Case:
-    """A pupil, and the same pupil as optical paths on the textbook's grid."""
+    """A pupil, and its optical paths on the grid of the textbook method."""
 
     def __init__(self, radius, distance, dx, samples, focal_length=None, relief=None):
         self.radius, self.distance, self.dx = radius, distance, dx
@@ -69,7 +69,7 @@ def test_fresnels_approximation_does_not_at_high_aperture():
 
 
 def test_power_arrives_whole():
-    """The pupil's power arrives, except for the evanescent part: nothing is renormalised."""
+    """All power that passes the pupil arrives, except for the evanescent part. No result is normalised."""
     case = CASES["defocused lens"]
     whole = angular_spectrum_psf(case.path, case.dx, case.radius, WAVELENGTH, case.distance)
     assert np.sum(whole) * case.dx**2 == pytest.approx(1, abs=0.01)

@@ -60,7 +60,7 @@ def test_a_rough_relief_needs_samples_for_its_light_alone():
 
 
 def test_the_check_finds_light_that_samples_miss(monkeypatch):
-    """Half of the rays are neglected, and light from outside the window appears in it."""
+    """Light that belongs outside the window appears in it, because half of the rays are neglected."""
     monkeypatch.setattr(module, "NEGLECTED", 0.5)
     monkeypatch.setattr(module, "RIM_CYCLES", 0.0)
     pupil = lens(wavefront=modes(6, 0.6))

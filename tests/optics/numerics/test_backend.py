@@ -117,7 +117,7 @@ def test_require_points_drjit_at_the_library():
 
 @pytest.mark.parametrize("verdict", ["broken", "too old", "missing"])
 def test_what_may_be_mended_under_the_same_path_is_proved_again(verdict, tmp_path, monkeypatch):
-    """A fix such as installing libatomic makes the same library file work, so it must be tested again."""
+    """A repair, such as installing libatomic, may make the same library file usable, so it must be tested again."""
     library = tmp_path / "libLLVM.so"
     library.write_bytes(b"one")
     verdicts = iter([verdict, "good"])

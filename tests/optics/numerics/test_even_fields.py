@@ -15,8 +15,7 @@ TYPES = precision("float64")
 
 
 def even_field(shape, seed=0):
-    """A field as its quarter and as the whole plane, equal at mirrored places; samples without a mirrored place are
-    dark."""
+    """Return a symmetric field as one quarter and as the whole plane. Samples without a mirror image are 0."""
     rng, small = np.random.default_rng(seed), [n // 2 + 1 for n in shape]
     u = rng.normal(size=small) + 1j * rng.normal(size=small)
     u[(shape[0] + 1) // 2 :] = u[:, (shape[1] + 1) // 2 :] = 0

@@ -71,7 +71,9 @@ def test_complex_products_by_four_and_by_three(across, transposed, monkeypatch):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_parts_of_a_field_are_computed_together(way):
-    """Real and imaginary part share sines: evaluated one after the other, each would compute them."""
+    """The real and the imaginary part use the same sines. If they were evaluated separately, the sines would be
+    computed twice.
+    """
     types, grid = precision("float32"), Grid.square(256, 1.0)
     x, y = grid.coordinates(types)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
@@ -85,7 +87,9 @@ def test_parts_of_a_field_are_computed_together(way):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_derivative_is_the_adjoint(way):
-    """d/du of Σ w·re + v·im of a linear sum is its adjoint applied to (w, v)."""
+    """For a linear sum, the derivative of Σ (w·re + v·im) with respect to u is the adjoint of the sum, applied to (w,
+    v).
+    """
     _, field = random_field((5, 6))
     (w, v), out = np.random.default_rng(1).normal(size=(2, 42)), (6, 7)
     dr.enable_grad(field.re, field.im)

@@ -19,8 +19,9 @@ from validation.reference import circular_aperture_on_axis, ideal_lens_field, re
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
 def test_obliquity_alone_is_resolved(tolerance):
-    """An aperture far below the wavelength has no fringes: the line must only represent z²/(z² + r²)², here up to
-    66°."""
+    """An aperture far smaller than the wavelength gives no fringes. The profile must only represent z²/(z² + r²)², here
+    up to 66°.
+    """
     asked = {"dx": 2e-4, "shape": (17, 17), "tolerance": tolerance, "dtype": "float64"}
     result = optics.psf(Pupil(1e-12), [550e-9], 1e-3, **asked, method="rayleigh_sommerfeld")
     rho2 = result.x**2 + result.y[:, None] ** 2 + 1e-6
@@ -29,7 +30,7 @@ def test_obliquity_alone_is_resolved(tolerance):
 
 
 def test_a_window_far_off_the_axis_needs_no_line():
-    """There are 18 000 fringes from the axis to 5 mm, and the window covers two."""
+    """There are 18 000 fringes between the axis and 5 mm, of which the window contains two."""
     line = RadialProfile.resolving(5e-3, 5e5, 2e-4, 1e-4)
     assert not line.pays(81)
     asked = {"centre": (5e-3, 0.0), "dx": 2e-6, "shape": (3, 3), "tolerance": 1e-3, "dtype": "float64"}
@@ -42,7 +43,9 @@ def test_a_window_far_off_the_axis_needs_no_line():
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("radius", "distance"), [(1e-7, 1e-9), (1e-7, 1e-7), (1e-9, 1e-9), (3e-5, 1e-6)])
 def test_planes_nearer_than_the_pupil_is_wide(radius, distance):
-    """The kernel's poles need more nodes there than its phase: the axis against Osterberg and Smith's closed form."""
+    """The number of nodes follows from the poles of the kernel there, and not from its phase. The reference on the axis
+    is Osterberg and Smith's closed form.
+    """
     asked = {"dx": radius / 4, "shape": (9, 9), "tolerance": 1e-8, "dtype": "float64"}
     result = optics.psf(Pupil(radius), [550e-9], distance, **asked, method="rayleigh_sommerfeld")
     exact = circular_aperture_on_axis(radius, distance, 550e-9) / (math.pi * radius**2)
@@ -51,8 +54,9 @@ def test_planes_nearer_than_the_pupil_is_wide(radius, distance):
 
 
 def test_a_profile_costs_no_more_than_its_wave_turns():
-    """For a wave that turns 2πbR = 63 radians over its radius, and an obliquity that adds a tenth, some fifty points
-    and a table twice as fine are enough. A rim a hundred times as far away adds nothing."""
+    """About fifty points and a table twice as fine are enough if the phase changes by 63 radians over the radius, and
+    the obliquity adds a tenth. A pupil a hundred times as far away needs no additional points.
+    """
     near, far = (RadialProfile.resolving(1e-4, 1e5, distance, 1e-4) for distance in (2e-3, 2e-1))
     assert 30 < far.points <= near.points < 150
     assert 60 < far.table <= near.table < 1.05 * far.table
@@ -63,8 +67,9 @@ HOLE = {"radius": 1e-3, "distance": 1e-6 / (1000 * 550e-9)}  # Fresnel number 1,
 
 @pytest.mark.slow
 def test_a_hole_of_a_thousand_zones():
-    """The whole shadow on few samples agrees with the direct sum at some of them, and on the axis with Osterberg and
-    Smith's closed form."""
+    """The window contains the whole shadow in few samples. They agree with the direct sum, and on the axis with
+    Osterberg and Smith's closed form.
+    """
     samples = 65
     radius, distance = HOLE["radius"], HOLE["distance"]
     asked = {"dx": 2.2 * radius / samples, "tolerance": 1e-3}
@@ -82,7 +87,7 @@ def test_a_hole_of_a_thousand_zones():
 
 
 def test_long_lines_are_their_own_table(monkeypatch):
-    """The PSF is the same without the matrix from Chebyshev points."""
+    """A profile with many points is interpolated without a matrix from Chebyshev points. The PSF is the same."""
     asked = {"dx": 1e-6, "shape": (101, 101), "tolerance": 1e-5, "dtype": "float64", "method": "hankel"}
     by_points = optics.psf(Pupil(30e-6), [550e-9], 1e-3, **asked).psf[0]
     monkeypatch.setattr(radial_profile, "LARGEST_MATRIX", 1)

@@ -12,8 +12,9 @@ from tests.optics.device_types import Float64
 @pytest.mark.parametrize("shape", [(31, 34), (64, 20), (1, 5)])
 @pytest.mark.parametrize("span", [0.2, 0.9, 3.0])
 def test_sums_are_those_of_the_points(shape, span):
-    """Points span a part of the period, nearly all of it, or wrap around it; the number of digits is as requested, and
-    not higher by chance."""
+    """The points lie in a part of the period, in nearly all of it, or wrap around it. The error is below the requested
+    one, but not much below.
+    """
     rng = np.random.default_rng(0)
     p, q = (rng.random((2, 200)) - 0.4) * span
     u = rng.normal(size=(2, 200)) + 1j * rng.normal(size=(2, 200))

@@ -17,7 +17,7 @@ def table():
 
 
 def angles(sine_x, sine_y):
-    """Angles along x and y whose tangents are those of a direction with these sines."""
+    """Return the angles along x and y of a direction with these sines."""
     cosine = np.sqrt(1 - sine_x**2 - sine_y**2)
     return np.arctan(sine_x / cosine), np.arctan(sine_y / cosine)
 

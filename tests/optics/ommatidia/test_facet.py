@@ -11,15 +11,16 @@ DROSOPHILA = FacetLens(16e-6, 11e-6, -11e-6, 8e-6, 1.45, 1.0, 1.34)
 
 
 def test_the_lens_of_a_fruit_fly():
-    """Stavenga (2003), appendix 1: a power of 0.049 µm⁻¹, focal lengths of 20.6 and 27.5 µm."""
+    """The lens has a power of 0.049 µm⁻¹ and focal lengths of 20.6 and 27.5 µm (Stavenga 2003, appendix 1)."""
     assert DROSOPHILA.power(550e-9) == pytest.approx(0.049e6, rel=0.01)
     assert DROSOPHILA.object_focal_length() == pytest.approx(20.6e-6, rel=3e-3)
     assert DROSOPHILA.focal_length() == pytest.approx(27.5e-6, rel=3e-3)
 
 
 def test_one_surface_and_a_ball():
-    """A single surface has f = n'r/(n' - n₀); a ball of index 2 in air focuses on its back, with both planes in its
-    middle."""
+    """A single surface has f = n'r/(n' - n₀). A ball of index 2 in air focuses light on its back, and both principal
+    planes are in its middle.
+    """
     single = FacetLens(20e-6, 10e-6, n=1.4, medium_n=1.4)
     assert single.focal_length() == pytest.approx(1.4 * 10e-6 / 0.4)
     assert single.principal_planes() == pytest.approx((0.0, 0.0))
@@ -29,7 +30,7 @@ def test_one_surface_and_a_ball():
 
 
 def test_a_ray_through_both_surfaces_meets_the_axis_where_the_formulas_say():
-    """Paraxial refraction, step by step."""
+    """The reference is paraxial refraction at one surface after the other."""
     height, slope = 1.0, 0.0
     slope = (slope * 1.0 - height * (1.45 - 1.0) / 11e-6) / 1.45
     height += slope * 8e-6

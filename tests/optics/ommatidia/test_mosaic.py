@@ -31,7 +31,7 @@ def test_a_grating_comes_with_its_contrast():
 
 
 def test_contrast_falls_as_a_gaussian_of_the_acceptance_angle():
-    """Approximately exp(-(π Δρ ν)²/(4 ln 2)) (Götz 1964), and no contrast beyond D/λ."""
+    """The contrast is approximately exp(-(π Δρ ν)²/(4 ln 2)) (Götz 1964), and 0 for frequencies ν above D/λ."""
     rho = math.degrees(FLY.ommatidium.acceptance_angle())
     for frequency in (0.1, 0.3):
         gauss = math.exp(-((math.pi * rho * frequency) ** 2) / (4 * math.log(2)))
@@ -102,9 +102,10 @@ def test_nothing_is_left_of_gratings_finer_than_a_facet_passes():
 
 @pytest.mark.slow
 def test_in_water_a_facet_passes_finer_gratings():
-    """Wavelengths are shorter in front of the facet. Contrast ends at 2R n/λ, and equals the sensitivity's transform up
-    to there, except for the part that this window cuts off. Without the index there would be no contrast at the second
-    frequency."""
+    """Wavelengths are shorter in front of the facet. The contrast ends at 2R n/λ. Up to there, it equals the transform
+    of the sensitivity, except for the part outside the window. Without the index n, there would be no contrast at the
+    second frequency.
+    """
     lens = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.34)
     eye = AppositionEye(Ommatidium(lens, Waveguide(1e-6)), 1, 1.5)
     in_air = 2 * lens.radius / 500e-9

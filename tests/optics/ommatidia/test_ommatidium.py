@@ -20,8 +20,9 @@ LENS = Pupil(D / 2, thin_lens_focal_length=1.34 * FOCAL, medium_n=1.34, object_n
 
 
 def formulas(mode, angles):
-    """Power in a mode, up to a factor, from the published formulas: Fraunhofer's field in the focal plane overlaps the
-    mode, ∫ F(ρ) J_l(kρθ) ρ dρ over the facet, F(ρ) = ∫ ψ(r) J_l(krρ/f) r dr."""
+    """Return the power in a mode, up to a constant factor, by the published formulas. The overlap of Fraunhofer's field
+    in the focal plane with the mode ψ is ∫ F(ρ) J_l(kρθ) ρ dρ over the facet, with F(ρ) = ∫ ψ(r) J_l(krρ/f) r dr.
+    """
     k = 2 * math.pi / WAVE
     r, rho = np.linspace(0, 12e-6, 3001), np.linspace(0, D / 2, 801)
     psi = mode.field(r, 0.0) * r
@@ -30,15 +31,16 @@ def formulas(mode, angles):
 
 
 def width(angles, seen):
-    """Full width at half the peak, from one side of the axis."""
+    """Return the full width at half maximum of a symmetric curve, given on one side of the axis."""
     last = np.flatnonzero(seen >= seen.max() / 2)[-1]
     share = (seen[last] - seen.max() / 2) / (seen[last] - seen[last + 1])
     return 2 * math.degrees(angles[last] + share * (angles[last + 1] - angles[last]))
 
 
 def test_acceptance_angle_of_a_fly_is_that_of_the_formulas():
-    """A facet of 25 µm at f/2 in front of a rhabdomere of 1.4 µm, at 500 nm: one mode, Δρ = 1.398°. The formulas are
-    paraxial, with an error of 2e-3 at f/2."""
+    """A facet of 25 µm at f/2 is in front of a rhabdomere of 1.4 µm, which has one mode at 500 nm: Δρ = 1.398°. The
+    formulas are paraxial and have an error of 2e-3 at f/2.
+    """
     eye = Ommatidium(LENS, Waveguide(1.4e-6))
     [mode] = eye.modes(WAVE)
     angles = np.radians(np.linspace(0, 1.5, 3001))
@@ -52,9 +54,9 @@ def test_acceptance_angle_of_a_fly_is_that_of_the_formulas():
 
 @pytest.mark.slow
 def test_wide_slow_lenses_are_the_formulas_limit():
-    """The formulas ignore that the focal plane is not a wavefront, e^{iknx²/2f}, and ignore oblique rays. A pupil 16
-    times as wide at f/8, with a rhabdom of the same V that is 4 times as wide, has the same pattern and a sixteenth of
-    the angles."""
+    """The formulas ignore oblique rays, and the phase e^{iknx²/2f} in the focal plane. A pupil 16 times as wide at f/8,
+    with a rhabdom 4 times as wide and of the same V, has the same pattern at a sixteenth of the angles.
+    """
     lens = Pupil(16 * D / 2, thin_lens_focal_length=64 * 1.34 * FOCAL, medium_n=1.34, object_n=1.0)
     core = math.sqrt(1.34**2 + (1.363**2 - 1.34**2) / 16)
     eye = Ommatidium(lens, Waveguide(4 * 1.4e-6, core, 1.34))
@@ -67,7 +69,9 @@ def test_wide_slow_lenses_are_the_formulas_limit():
 @pytest.mark.slow
 @pytest.mark.parametrize("diameter", [1.4e-6, 2.2e-6])
 def test_every_mode_takes_what_the_formulas_say(diameter):
-    """Along x, where sine modes are dark, and relative to the first mode's peak."""
+    """The directions are along x, where the sine modes receive no light. Powers are relative to the peak of the first
+    mode.
+    """
     eye, angles = Ommatidium(LENS, Waveguide(diameter)), np.radians(np.linspace(0, 2.5, 12))
     found = eye.mode_power(angles, 0 * angles, WAVE)
     expected = np.array([0 * angles if mode.sine else formulas(mode, angles) for mode in eye.modes(WAVE)])
@@ -78,8 +82,9 @@ def test_every_mode_takes_what_the_formulas_say(diameter):
 @pytest.mark.parametrize("wavefront", [None, optics.Zernike({(1, 1): 0.06, (3, -1): 0.08})], ids=["even", "lopsided"])
 @pytest.mark.parametrize("angle", [(0.0, 0.0), (0.02, -0.01)])
 def test_modes_take_the_overlap_with_the_field_in_the_focus(angle, wavefront):
-    """The opposite calculation: the facet's field, summed with the mode over the sensor's plane. Light from a point on
-    one side travels to the other."""
+    """The reference is the overlap of the facet's field and the mode in the plane of the rhabdom's end. Light from a
+    point on one side travels to the other side.
+    """
     lens, guide = FacetLens(20e-6, 13e-6, -60e-6, 6e-6), Waveguide(1.8e-6, 1.37, 1.34)
     eye = Ommatidium(lens.pupil(wavefront=wavefront), guide, lens.focal_length() + 3e-6)
     pupil, z, types = eye.pupil, lens.focal_length() + 3e-6, precision("float64")
@@ -127,8 +132,10 @@ def test_hexagons_see_nearly_alike_all_around():
 
 @pytest.mark.parametrize("wavelength", [400e-9, 450e-9, 550e-9])
 def test_colours_have_foci_of_their_own_behind_glass_that_disperses(wavelength):
-    """The reference is a lens with the index at that wavelength, with the rhabdom at the same place behind its front,
-    because a thick lens' principal plane moves as well. Without dispersion violet would be sharp."""
+    """The reference is a lens with the index at this wavelength, and a rhabdom at the same distance from its front,
+    because the principal plane of a thick lens also depends on the index. Without dispersion, violet light would be in
+    focus.
+    """
     glass, shape = optics.RefractiveIndex.from_abbe(1.5, abbe_number=15.0), (25e-6, 24e-6, -40e-6, 20e-6)
     guide, lens = Waveguide(1.6e-6), FacetLens(*shape, n=glass)
     behind_front = lens.principal_planes()[1] + lens.focal_length()
@@ -143,8 +150,9 @@ def test_colours_have_foci_of_their_own_behind_glass_that_disperses(wavelength):
 
 
 def test_superposition_narrows_what_one_facet_blurs():
-    """Light of many facets that arrives in phase has the diffraction of the aperture instead of a facet's (Stavenga
-    2006)."""
+    """Light of many facets that arrives in phase is diffracted by the whole aperture instead of a single facet
+    (Stavenga 2006).
+    """
     narrow = Waveguide(0.8e-6, 1.38, 1.34)
     whole = Pupil(30e-6, aperture=optics.hexagonal_segments(1), thin_lens_focal_length=0.2e-3, medium_n=1.34)
     facet = Pupil(30e-6 / 2.65, aperture=optics.Polygon.regular(6), thin_lens_focal_length=0.2e-3, medium_n=1.34)
@@ -168,7 +176,9 @@ def test_bad_input_names_itself(make, message):
 
 
 def test_fields_of_thin_rhabdoms_reach_far(monkeypatch):
-    """A mode at V = 1 falls by e over five core radii: twelve radii miss 0.3 %, forty are enough: e^-8."""
+    """A mode at V = 1 falls by a factor e over five core radii. A field of twelve radii misses 0.3 % of the power;
+    forty radii are enough.
+    """
     thin = Ommatidium(FacetLens(25e-6, 30e-6), Waveguide(0.64e-6))
     power = {}
     for radii in (12.0, radiation.FARTHEST, 400.0):

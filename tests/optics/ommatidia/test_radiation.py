@@ -13,7 +13,7 @@ K = 2 * math.pi * N / WAVE
 
 
 def integral(modes, x, y, end):
-    """Rayleigh-Sommerfeld from a plane that is turned towards the pupil's centre, on a fine polar grid."""
+    """Return the Rayleigh-Sommerfeld integral over a plane that faces the pupil's centre, on a fine polar grid."""
     b, far = modes[0].radius, reach(modes)
     r, weight = [], []
     for low, high, n in ((0, b, 40), (b, far, 120)):

@@ -12,13 +12,15 @@ WAVE = 500e-9
 
 
 def guide(v, diameter=2e-6):
-    """A waveguide with this V at 500 nm."""
+    """Return a waveguide that has this V at 500 nm."""
     clad = 1.34
     return Waveguide(diameter, math.hypot(clad, v * WAVE / (math.pi * diameter)), clad)
 
 
 def on_a_grid(l, v, n=6000, end=9.0):
-    """U of the bound states of -ψ'' - ψ'/r + l²ψ/r² + V² ψ (beyond the core) = U² ψ, by finite differences of √r ψ."""
+    """Return U of all bound modes by finite differences of √r ψ. They satisfy -ψ'' - ψ'/r + l²ψ/r² + V² ψ = U² ψ, where
+    the term V² ψ exists only outside the core.
+    """
     h = end / n
     r = (np.arange(n) + 0.5) * h
     outside = np.clip((r + h / 2 - 1) / h, 0, 1)  # share of a cell beyond the edge
@@ -40,8 +42,9 @@ def test_modes_are_those_of_the_wave_equation(v):
 
 
 def test_cut_offs_are_zeros_of_bessel_functions():
-    """Gloge (1971): LP11 from 2.405, LP21 and LP02 from 3.832, LP31 from 5.136, LP12 from 5.520. (Just above its
-    cut-off LP02 is too wide to be detected.)"""
+    """The cut-offs are 2.405 for LP11, 3.832 for LP21 and LP02, 5.136 for LP31, and 5.520 for LP12 (Gloge 1971). (Just
+    above its cut-off, LP02 is too wide to be detected.)
+    """
     names = {"11": 2.4048, "21": 3.8317, "02": 3.8317, "31": 5.1356, "12": 5.5201}
     for name, v in names.items():
         below, above = ({f"{m.l}{m.m}" for m in guide(at).modes(WAVE)} for at in (v - 0.003, v + 0.1))
@@ -72,7 +75,7 @@ def test_fields_go_smoothly_through_the_edge():
 
 
 def test_the_fundamental_mode_is_nearly_gaussian():
-    """Marcuse (1977): with w/b = 0.65 + 1.619 V^-1.5 + 2.879 V^-6 the overlap is above 0.99."""
+    """The overlap with a Gaussian of width w/b = 0.65 + 1.619 V^-1.5 + 2.879 V^-6 (Marcuse 1977) is above 0.99."""
     v = 2.4
     [mode] = guide(v).modes(WAVE)
     waist = 1e-6 * (0.65 + 1.619 * v**-1.5 + 2.879 * v**-6)

@@ -13,7 +13,7 @@ from scipy.interpolate import make_interp_spline
 
 @dataclass(frozen=True)
 class Scene:
-    """A round pupil in front of a small window off the axis. Lengths in m."""
+    """A round pupil in front of a small window off the axis. Lengths are in m."""
 
     radius: float = 25e-6
     focal_length: float = 240e-6
@@ -38,7 +38,9 @@ def lines_of_pixels(n: int) -> np.ndarray:
 
 
 def spline(n: int, at: np.ndarray) -> np.ndarray:
-    """The cubic splines through each single one of n samples at cell centres, (place, sample)."""
+    """Return the values at some places of n cubic splines, each of which is 1 at one of n cell centres and 0 at the
+    others, (place, sample).
+    """
     return make_interp_spline(np.arange(n), np.eye(n), k=3)((at + 1) * n / 2 - 0.5)
 
 

@@ -14,7 +14,7 @@ VALUES = {"radius": 3e-6, "n": 1.5, "height": 1.0, "waist": 2e-6, "focal_length"
 
 
 def arriving(values, **others):
-    """The fraction of light that is not evanescent, behind a rough relief and a mask, in front of a fast lens."""
+    """Return the fraction of light that is not evanescent, for a rough relief, a mask and a fast lens."""
     pupil = optics.Pupil(
         values["radius"],
         height=optics.HeightMap(values["height"] * optics_array(HEIGHTS)),

@@ -16,14 +16,14 @@ RIPPLE = 1e-5
 
 
 def near_and_far(rng, count):
-    """Distances from a random centre, and radii that include 0 and very small ones, in units of 1/cutoff."""
+    """Return distances from a random centre, and radii from 0 on, in units of 1/cutoff."""
     x, y = rng.uniform(-12, 12, (2, count)) - rng.uniform(-1, 1, (2, 1))
     return np.hypot(x, y), np.concatenate([[0.0, 1e-9, 0.03], rng.uniform(0, 9, 20)])
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_all_circles_weigh_samples_as_each_does(seed):
-    """The weights are those of a soft disk, computed by quadrature for one disk at a time."""
+    """The reference for the weights is a quadrature for one soft disk at a time."""
     rng = np.random.default_rng(seed)
     distance, radii = near_and_far(rng, 60)
     kernel = SoftEdge(1.0, rng.uniform(1.5, 6), RIPPLE)
@@ -55,7 +55,7 @@ def test_cells_count_with_the_share_that_lies_within():
 
 
 def test_many_radii_take_no_more_work_than_some():
-    """A blurred spot: the former sum evaluated the edge of each circle, and 1000 circles took 1000 times the work."""
+    """Earlier versions evaluated the edge of each circle separately, so that 1000 circles took 1000 times as long."""
     pupil = optics.Pupil(1e-3, thin_lens_focal_length=12.5e-3)
     blurred = optics.psf(pupil, sensor_distance=12.8e-3, dx=1.1e-6, shape=(129, 129))
     optics.encircled_energy(blurred, 30e-6)

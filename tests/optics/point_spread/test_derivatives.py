@@ -23,7 +23,7 @@ def float64(value):
 
 
 def asking(value):
-    """The same number with its gradient enabled."""
+    """Return the same number with its gradient enabled."""
     import drjit as dr
 
     x = float64(value)
@@ -32,7 +32,7 @@ def asking(value):
 
 
 def total(values, heights=None, method="auto"):
-    """A random functional of the PSF, as a Dr.Jit scalar."""
+    """Return a sum of the PSF with random weights, as a Dr.Jit scalar."""
     import drjit as dr
 
     relief = None if heights is None else BSplineRelief(heights)
@@ -129,7 +129,9 @@ def test_psf_by_control_points(method):
 
 
 def test_a_derivative_asks_about_every_control_point():
-    """A paraboloid is symmetric, but its neighbours are not: the derivative must not assume a symmetric pupil."""
+    """A paraboloid is symmetric, but no longer so if one control point changes. The derivative must not assume a
+    symmetric pupil.
+    """
     import drjit as dr
 
     points = BSplineRelief.paraboloid(1e-6, 1 / (0.5 * 120e-6), 12e-6).control_points

@@ -22,7 +22,9 @@ ASKED = {"wavelengths": [WAVE], "sensor_distance": Z, "dx": 0.9e-6, "shape": (15
 
 
 def written_out(pupil, x, y):
-    """Gauss and trapezoid over the ring; first Rayleigh-Sommerfeld integral, with its carrier."""
+    """Return the first Rayleigh-Sommerfeld integral over a ring, including the carrier, by Gauss nodes in the radius
+    and equidistant angles.
+    """
     inner = pupil.aperture.rings[0][0]
     square, weight = np.polynomial.legendre.leggauss(160)
     rho2 = inner**2 + (1 - inner**2) * (square + 1) / 2
@@ -60,7 +62,7 @@ def test_field_is_the_integral(name, method):
 
 
 def test_symmetric_fields_along_a_line_are_those_of_the_plane():
-    """Nodes are summed along one radius in a wide window."""
+    """The sum over nodes is computed along one radius only if the window is wide."""
     wide = {**ASKED, "dx": 0.5e-6, "shape": (121, 121)}
     line = optics.psf(PUPILS["lens"], **wide, method="rayleigh_sommerfeld", tolerance=1e-6, field=True)
     plane = optics.psf(PUPILS["lens"], **wide, method="split_angular_spectrum", tolerance=1e-6, field=True)
@@ -92,7 +94,7 @@ def test_methods_that_are_none_are_named(method):
 
 
 def test_the_phase_carries_derivatives():
-    """The derivative with respect to the distance includes the carrier: d arg U / dz is about k."""
+    """The derivative of the phase of U with respect to the distance is about k, because it includes the carrier."""
 
     def real_part(z):
         asked = {**ASKED, "sensor_distance": z, "method": "rayleigh_sommerfeld", "tolerance": 1e-8}

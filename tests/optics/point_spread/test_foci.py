@@ -22,14 +22,16 @@ def focus(sine, aplanatic=False, **options):
 
 
 def width(profile, dx):
-    """Full width at half height by linear interpolation, from the middle outwards."""
+    """Return the full width at half maximum, by linear interpolation from the middle outwards."""
     half = profile[len(profile) // 2 :]
     at = int(np.argmax(half < half[0] / 2))
     return 2 * dx * (at - 1 + (half[at - 1] - half[0] / 2) / (half[at - 1] - half[at]))
 
 
 def test_spot_of_an_objective_of_na_09():
-    """365 by 270 nm along and across the polarisation; scalar theory gives 253 (flat) or 277."""
+    """The published spot is 365 nm wide along the polarisation and 270 nm across. Scalar theory gives 253 nm with a
+    flat wave, or 277 nm.
+    """
     found = focus(0.9, aplanatic=True, polarization=(1, 0))
     assert width(found.psf[40], 10e-9) == pytest.approx(365e-9, abs=1.5e-9)
     assert width(found.psf[:, 40], 10e-9) == pytest.approx(270e-9, abs=1.5e-9)
@@ -38,7 +40,9 @@ def test_spot_of_an_objective_of_na_09():
 
 @pytest.mark.parametrize("polarization", [(1, 0), (0, 1), (1, 1j), (1, -2)])
 def test_it_is_the_sum_of_plane_waves_turned_with_their_rays(polarization):
-    """A double integral over directions: field ∝ (ŝ-part) + (p-part, turned from the pupil's radius to the ray)."""
+    """The reference is a double integral over directions. The lens preserves the s-component of the field, and turns
+    the p-component with the ray.
+    """
     found = focus(0.8, aplanatic=True, polarization=polarization, dx=90e-9, shape=(5, 7))
     nodes, weights = np.polynomial.legendre.leggauss(60)
     alpha, k = math.asin(0.8), 2 * math.pi / WAVELENGTH
@@ -74,7 +78,7 @@ def test_at_low_na_it_is_rayleigh_sommerfelds():
 
 
 def test_defocus_and_spherical_relief_are_in_it():
-    """The wavefront is included: 20 µm behind the focus, against the scalar integral of the same light."""
+    """20 µm behind the focus, the scalar integral with the same wavefront is the reference."""
     pupil = optics.Pupil(0.15e-3, optics.BSplineRelief.paraboloid(0, 40.0, 0.15e-3), thin_lens_focal_length=1e-3)
     window = {"dx": 0.5e-6, "shape": (33, 33)}
     exact = optics.psf(pupil, [WAVELENGTH], 1.02e-3, dtype="float64", tolerance=1e-6, **window).psf[0]
@@ -83,7 +87,7 @@ def test_defocus_and_spherical_relief_are_in_it():
 
 
 def test_all_components_together_hold_the_light_of_scalar_theory():
-    """Each plane wave has |e| = 1, so integrals over the plane agree."""
+    """The polarisation vectors of all plane waves have the length 1, so the integrals over the plane agree."""
     found = focus(0.7, dx=0.15e-6, shape=(135, 135))
     assert found.psf.sum() == pytest.approx(found.scalar.sum(), rel=2e-3)
     assert found.intensity[2].sum() > 0.1 * found.psf.sum()

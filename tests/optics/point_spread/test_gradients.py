@@ -48,7 +48,7 @@ def view(tolerance, scene=SCENE, **more):
 
 
 def gradient(values, pupil, tolerance, **more):
-    """The gradient of the random functional, and the plan of the PSF."""
+    """Return the gradient of a random functional of the PSF, and the plan of the PSF."""
     import drjit as dr
 
     inputs = asking(values)
@@ -116,7 +116,9 @@ def test_gradients_by_the_samples_of_maps(name, values, n, tolerance):
 
 
 def test_a_flat_map_of_every_user_s_first_step():
-    """119 nodes for 1,024 unknowns would give a gradient of the wrong sign; the plan states the reason for more."""
+    """The PSF alone needs 119 nodes. For 1,024 unknowns, they would give a gradient of the wrong sign, so the plan has
+    more, and states the reason.
+    """
     found, plan = gradient(np.zeros((32, 32)), pupil_with("height"), 1e-2)
     assert np.corrcoef(found.ravel(), exact_gradient("height", "zeros", 32).ravel())[0, 1] > 0.9995
     assert "derivatives with respect to samples of maps need more samples (height: 32 x 32)" in plan.why
@@ -152,7 +154,7 @@ def test_gradients_by_smooth_coefficients(name, flat, tolerance):
 
 
 def cubic(t):
-    """The four cubic B-splines of one uniform patch."""
+    """Return the four cubic B-splines of a uniform patch at t in [0, 1]."""
     return np.stack([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]) / 6
 
 
@@ -165,7 +167,9 @@ NUMBERS = {"radius": 25e-6, "distance": 240e-6, "n": 1.5, "focal_length": 240e-6
 )
 @pytest.mark.parametrize("name", sorted(NUMBERS))
 def test_derivatives_by_single_numbers(name, height, tolerance):
-    """The derivative of every sample of the PSF is compared. A PSF itself would neglect the height of 1 nm."""
+    """The derivative of every sample of the PSF is compared. Without derivatives, a height of 1 nm would be
+    neglected.
+    """
     import drjit as dr
 
     relief = np.random.default_rng(4).random((12, 12)) * height
@@ -193,7 +197,7 @@ def test_derivatives_by_single_numbers(name, height, tolerance):
 
 @pytest.mark.parametrize("reach", [None, 31e-6])
 def test_maps_with_different_knots(reach):
-    """Relief, wavefront and mask at once: their knots lie between each other, and the product has two splines."""
+    """Relief, wavefront and mask have different knots, and the amplitude is a product of two splines."""
     height, wavefront, mask = (samples(name, "smooth", n) for name, n in (("height", 9), ("wavefront", 6), ("mask", 7)))
     half = 1.0 if reach is None else reach / SCENE.radius
     nodes = disk_nodes(np.unique(np.concatenate([lines_of_knots(9), lines_of_knots(6) * half, lines_of_knots(7)])), 7)
@@ -236,7 +240,7 @@ def test_only_enabled_gradients_need_nodes():
 
 
 def test_approximations_are_not_chosen_for_derivatives():
-    """A wide shadow is the density of rays to within 0.4, but its edges move otherwise."""
+    """The density of rays approximates a wide shadow to 0.4, but the derivative at its edges is wrong."""
     seen = {"sensor_distance": 0.5e-3, "dx": 30e-6, "shape": (33, 33), "tolerance": 0.4}
     assert optics.psf(Pupil(1e-3), **seen).plan.method == "geometric"
     plan = optics.psf(Pupil(asking(1e-3)), **seen).plan

@@ -15,9 +15,9 @@ def lens():
 
 
 def huygens_contrasts(shift, weights, n=49):
-    """Tangential and sagittal contrasts (2, frequency) of the weighted sum of PSFs around one point of the image.
-
-    By Parseval's theorem, all light of a wave with amplitude 1 in all its directions is λ² times their solid angle.
+    """Return tangential and sagittal contrasts (2, frequency) of the weighted sum of PSFs around one point of the
+    image. By Parseval's theorem, the light of a wave whose amplitude is 1 in all directions is λ² times their solid
+    angle.
     """
     rays, each = gauss_rays(20, 70)
     plane = sensor_grid(triplet(20, 0.55e-6, rays, shift=shift), n, PITCH)
@@ -44,7 +44,7 @@ def test_contrasts_through_focus_are_those_of_a_huygens_sum(lens, shift):
 
 
 def displaced(x, y, angle=0):
-    """The rays of the triplet at 0.55 µm, whose image is moved by (x, y) [mm]."""
+    """Return the rays of the triplet at 0.55 µm, with the image displaced by (x, y) [mm]."""
     wave = triplet(angle, 0.55e-6)
     wave.pupil_x, wave.pupil_y = wave.pupil_x + x, wave.pupil_y + y
     wave.reference_center = np.add(wave.reference_center, (x, y, 0))
@@ -61,7 +61,8 @@ def test_frequencies_beyond_the_cutoff_are_refused_in_all_directions():
 
 
 def test_lateral_colour_cancels_a_pattern_of_twice_its_width():
-    """Two equal images 10 µm apart along x multiply contrasts by |cos(πfx 10 µm)|, which is 0 at 50 cycles per mm.
+    """Contrasts are multiplied by |cos(πfx 10 µm)| if two equal images are 10 µm apart along x. This factor is 0 at 50
+    cycles per mm.
 
     On the axis of the lens, x is the sagittal direction.
     """
@@ -76,7 +77,7 @@ def test_lateral_colour_cancels_a_pattern_of_twice_its_width():
 
 
 def test_tangential_is_the_direction_from_the_axis():
-    """A quarter turn of a lens about its axis changes neither contrast."""
+    """Neither contrast changes if the lens and the image point are rotated by 90° about the axis."""
     turned = triplet(20, 0.55e-6)
     turned.pupil_x, turned.pupil_y = -turned.pupil_y, turned.pupil_x
     x, y, z = turned.reference_center

@@ -16,7 +16,9 @@ OPENINGS = [optics.Circle(), optics.Annulus(0.6), optics.Slit(0.5, 1.2), optics.
 
 
 def pupil_of(rng, waves, aperture=None):
-    """A pupil `waves` wavelengths in radius at f/1 to f/4, blurred by up to half a wave of spherical aberration."""
+    """Return a pupil with a radius of `waves` wavelengths at f/1 to f/4, with up to half a wave of spherical
+    aberration.
+    """
     radius = waves * WAVELENGTH
     focus = 2 * radius * rng.uniform(1, 4)
     blur = optics.Zernike({(4, 0): rng.uniform(0, 0.1)})
@@ -25,7 +27,9 @@ def pupil_of(rng, waves, aperture=None):
 
 @pytest.mark.parametrize("waves", RNG.uniform(0.6, 6, 6))
 def test_arriving_light_of_a_bare_circle_is_airys(waves):
-    """Light at frequencies beyond 1/λ is J₀² + J₁² of 2πR/λ. Its estimate from the edge has errors of up to 0.015."""
+    """The fraction of light beyond the frequency 1/λ is J₀² + J₁² of 2πR/λ. Its estimate from the edge has errors of up
+    to 0.015.
+    """
     seen = optics.psf(optics.Pupil(waves * WAVELENGTH), sensor_distance=5e-6, dx=0.2e-6, shape=(9, 9))
     light, unsure = arriving_light(seen, None)
     v = 2 * math.pi * waves
@@ -34,7 +38,8 @@ def test_arriving_light_of_a_bare_circle_is_airys(waves):
 
 @pytest.mark.parametrize("seed", [0, 6, 16, 38])
 def test_arriving_light_behind_steep_wavefronts_is_within_its_bound(seed):
-    """Rays near grazing lose light by diffraction: the former uncertainty of 1.2e-4 missed 2 % of the light.
+    """Light near grazing angles is lost by diffraction. An earlier version stated an uncertainty of 1.2e-4, although 2
+    % of the light was missing.
 
     The reference is the sum over a window that reaches to 76° from the axis.
     """
@@ -59,7 +64,9 @@ def steep_pupil(seed):
 
 @pytest.mark.parametrize(("aperture", "waves"), zip(OPENINGS, RNG.uniform(0.9, 2.5, 4), strict=True))
 def test_contrasts_of_narrow_pupils_are_within_their_bound(aperture, waves):
-    """MTFs of pupils a few wavelengths wide were refused, because the light that arrives was uncertain by 2 to 6 %."""
+    """Earlier versions refused MTFs of pupils a few wavelengths wide, because the light that arrives was uncertain by 2
+    to 6 %.
+    """
     pupil = pupil_of(RNG, waves, aperture)
     pitch = 0.4 * WAVELENGTH * math.hypot(pupil.radius, pupil.thin_lens_focal_length) / (2 * pupil.radius)
     narrow, wide = (
@@ -77,7 +84,9 @@ def test_contrasts_of_narrow_pupils_are_within_their_bound(aperture, waves):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_encircled_energy_is_within_its_bound(seed):
-    """Sums over coarse and fine samples differ by less than the bound, which was at least 2e-4."""
+    """Sums over coarse and fine samples differ by less than the bound. (In earlier versions, the bound was at least
+    2e-4.)
+    """
     rng = np.random.default_rng(seed)
     pupil = pupil_of(rng, rng.uniform(5, 40), OPENINGS[seed % 4])
     unit = WAVELENGTH * math.hypot(pupil.radius, pupil.thin_lens_focal_length) / (2 * pupil.radius)
@@ -137,7 +146,7 @@ def test_errors_of_contrasts_follow_the_frequency():
 
 
 def test_errors_of_a_profile_bound_those_of_airys_contrasts():
-    """A lens of NA 0.03, where the closed form of a circular pupil is accurate to 1e-4."""
+    """The lens has an NA of 0.03, for which the closed form of a circular pupil is accurate to 1e-4."""
     pupil = optics.Pupil(50e-6, thin_lens_focal_length=1.6e-3)
     found = optics.mtf(optics.psf(pupil, [WAVELENGTH], dx=3e-6, shape=(65, 65)))
     f = np.linspace(0.15, 0.9, 16) * found.cutoff[0]
@@ -149,7 +158,9 @@ def test_errors_of_a_profile_bound_those_of_airys_contrasts():
 
 
 def test_bounds_of_strehl_ratios_are_measured_at_the_peak():
-    """Bounds were 8 to 50 times the error or more. Each peak is now compared with the direct sum."""
+    """Bounds are close to the errors, because each peak is compared with the direct sum. In earlier versions, they were
+    at least 8 to 50 times the error.
+    """
     ratios = []
     for seed in range(12):
         rng = np.random.default_rng(seed)

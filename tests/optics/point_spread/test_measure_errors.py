@@ -77,7 +77,9 @@ def test_a_mean_over_wavelengths_is_not_mistaken_for_one_of_them():
 
 @pytest.mark.slow
 def test_a_mean_over_wavelengths_is_looked_at_again():
-    """The result is the mean over its wavelengths with finer samples: coarse samples give the measures of fine ones."""
+    """For coarse samples, the PSFs of all wavelengths are computed again on finer samples, so the measures are those of
+    fine samples.
+    """
     share = np.array([0.3, 0.7])
     coarse, fine = (
         optics.psf(LENS, [450e-9, 600e-9], FOCUS + 2e-5, dx=dx, shape=(n, n)).mean(share)
@@ -102,7 +104,7 @@ def test_a_window_without_the_peak_has_no_strehl_ratio():
 
 
 def test_the_higher_of_two_lobes_is_found_between_samples():
-    """The lobe with the lower sample can be the higher one."""
+    """The lobe with the lower sample can have the higher peak."""
     result = focus(0.45e-6, 41, source_angle=(0.05e-3, 0.03e-3))
     sampled = result.psf.max() / (focus(0.05e-6, 11).psf.max())
     assert sampled < 0.97
@@ -110,7 +112,9 @@ def test_the_higher_of_two_lobes_is_found_between_samples():
 
 
 def test_even_windows_are_split_about_their_own_cells():
-    """The middle of 20 samples is half a sample off: an even or odd number of finer ones must fill the same cells."""
+    """The middle of 20 samples is half a sample away from sample 10. Whether their number is even or odd, finer samples
+    must fill the same cells.
+    """
     off, whole = focus(3e-6, 20), focus(0.25e-6, 239, centre=(-1.5e-6, -1.5e-6))
     for pitch, parts in ((0.3e-6, 10), (0.29e-6, 11)):
         rim = 1.5e-6 - 1.5e-6 / parts
@@ -158,7 +162,7 @@ def test_measures_carry_derivatives_through_what_they_look_at_again():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_predicted_errors_hold_on_random_pupils(seed):
-    """Any aperture and relief, against sums over samples ten to a cycle at a tolerance of 1e-5."""
+    """Apertures and reliefs are random. The reference is a sum over ten samples per cycle, at a tolerance of 1e-5."""
     rng = np.random.default_rng(seed)
     while True:
         case = draw_case(rng)
@@ -193,7 +197,9 @@ def test_predicted_errors_hold_on_random_pupils(seed):
     ],
 )
 def test_a_side_lobe_does_not_pass_for_an_image_beside_the_window(pupil, angle, window):
-    """Without the comparison with the rays' hit points, the ratio would be 0.0015 with a predicted error of 1e-6."""
+    """Without the comparison with the points at which rays hit the sensor, the Strehl ratio would be 0.0015 with a
+    predicted error of 1e-6.
+    """
     seen = optics.psf(pupil, source_angle=(angle, 0.0), **window)
     with pytest.raises(
         optics.AccuracyError, match=r"rays land around .* outside the window, where the PSF is brighter"

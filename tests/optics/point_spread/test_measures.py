@@ -16,14 +16,13 @@ def ideal(f_number: float, dx: float, n: int, defocus: float = 0.0, **options) -
 
 
 def circular_mtf(f: np.ndarray, cutoff: float) -> np.ndarray:
-    """2/π (arccos s - s √(1 - s²)), s = f / cutoff (Goodman, eq. 6-32)."""
+    """Return 2/π (arccos s - s √(1 - s²)) with s = f / cutoff (Goodman, eq. 6-32)."""
     s = np.clip(f / cutoff, 0, 1)
     return 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
 
 
 def test_mtf_of_an_ideal_lens_is_the_overlap_of_two_disks():
-    """f/8: the window of 400 µm loses 1 % of the light in far rings, which raises low frequencies by the same
-    amount."""
+    """The window of 400 µm loses 1 % of the light at f/8, which raises the contrasts at low frequencies by 1 %."""
     result = ideal(8, 1.6e-6, 257)
     transfer = optics.mtf(result)
     f = np.linspace(0.1, 1, 10) * transfer.cutoff[0]
@@ -44,8 +43,9 @@ def test_mtf_is_one_at_zero_frequency_and_nothing_beyond_the_cutoff():
 
 
 def test_all_that_arrives_is_what_a_small_window_measures_contrast_by():
-    """Two rings hold 0.91 of the light. The missing light is computed; otherwise contrasts would be uncertain by its
-    whole amount."""
+    """Two rings contain 0.91 of the light. The missing light is computed; otherwise, contrasts would be uncertain by
+    0.09.
+    """
     result = ideal(8, 1.6e-6, 13)
     transfer, as_it_is = optics.mtf(result), optics.mtf(result, tolerance=1)
     f = np.array([0.3, 0.5, 0.7]) * transfer.cutoff[0]
@@ -63,7 +63,7 @@ def test_all_that_arrives_is_what_a_small_window_measures_contrast_by():
 
 
 def test_mtf_keeps_the_order_of_axes():
-    """A PSF stretched along x blurs along fx."""
+    """A PSF that is wide along x has low contrasts along fx."""
     result = ideal(8, 2e-6, 65)
     x, y = result.x[None, :], result.y[:, None]
     stretched = np.exp(-(x**2) / (2 * 8e-6**2) - y**2 / (2 * 4e-6**2))[None] / (2 * np.pi * 8e-6 * 4e-6)
@@ -78,7 +78,7 @@ def test_mtf_keeps_the_order_of_axes():
 
 @pytest.mark.parametrize("f_number", [2, 4, 16])
 def test_strehl_ratio_of_an_ideal_lens_is_one_at_any_aperture(f_number):
-    """The exact peak, which is [ln(1 + t)/t]² of Airy's πR²/(λf)², t = (R/f)²: 0.94 at f/2."""
+    """The exact peak is [ln(1 + t)/t]² times Airy's peak πR²/(λf)², where t = (R/f)². At f/2, the factor is 0.94."""
     result = ideal(f_number, 0.5e-6, 33)
     assert optics.strehl_ratio(result)[0] == pytest.approx(1, abs=1e-4)
     airy = result.pupil.area / (WAVELENGTH * FOCAL_LENGTH) ** 2
@@ -89,7 +89,9 @@ def test_strehl_ratio_of_an_ideal_lens_is_one_at_any_aperture(f_number):
 
 
 def test_strehl_ratio_under_defocus():
-    """sinc²(W/2) with W the defocus in waves at the edge; f/8 defocused by a tenth (Mahajan, Aberration Theory)."""
+    """For W waves of defocus at the edge, the ratio is (sin(πW) / πW)² (Mahajan, Aberration Theory). The sensor of the
+    f/8 lens is displaced by a twentieth of the focal length.
+    """
     defocus = 0.05 * FOCAL_LENGTH
     result = ideal(8, 0.5e-6, 65, defocus)
     radius = result.pupil.aperture_radius
@@ -99,7 +101,7 @@ def test_strehl_ratio_under_defocus():
 
 
 def test_encircled_energy_follows_airy_at_any_pitch():
-    """f/16 departs from Airy by 2e-3. Samples 8.8 µm apart would be the coarsest that can be summed."""
+    """The PSF at f/16 deviates from Airy's by 2e-3. Samples can be summed if they are at most 8.8 µm apart."""
     f_number = 16
     radius = FOCAL_LENGTH / (2 * f_number)
     radii = np.array([5e-6, 1.07e-5, 2e-5])
@@ -154,7 +156,9 @@ def test_one_sample_has_no_profile():
 
 
 def test_the_cutoff_is_the_mediums():
-    """Waves are shorter in water, so the same pupil passes finer gratings: the MTF reaches zero a third further on."""
+    """Wavelengths are shorter in water, so the same pupil resolves finer gratings: the cut-off frequency is higher by a
+    third.
+    """
     focus = 1.33 * FOCAL_LENGTH  # for a lens with this focal length in air
     pupil = optics.Pupil(15e-6, thin_lens_focal_length=focus, medium_n=1.33)
     result = optics.psf(pupil, [WAVELENGTH], focus, dx=1.3e-6, shape=(257, 257))
@@ -167,8 +171,9 @@ def test_the_cutoff_is_the_mediums():
 
 
 def test_contrasts_know_how_much_light_a_mask_leaves_at_the_rim():
-    """The derivative with respect to the mask's width agrees with differences: the evanescent part is proportional to
-    the light at the rim."""
+    """The derivative of contrasts with respect to the mask's width agrees with differences. It includes the evanescent
+    light, which is proportional to the light at the rim.
+    """
     import drjit as dr
 
     from tests.optics.device_types import Float64
@@ -208,7 +213,9 @@ def test_white_contrasts_know_it_too():
 
 @pytest.mark.parametrize("steepness", [2.3, 8.0])
 def test_a_perfect_lens_is_perfect_however_wide(steepness):
-    """Radius over distance: near the pupil slants are not polynomials and need more nodes."""
+    """The parameter is the ratio of radius and distance. Close to the pupil, the obliquity is not a polynomial, and
+    more nodes are needed.
+    """
     z = 100e-6
     pupil = optics.Pupil(steepness * z, thin_lens_focal_length=z)
     seen = optics.psf(pupil, [500e-9], sensor_distance=z, dx=0.05e-6, shape=(33, 33), tolerance=1e-4)
@@ -236,7 +243,7 @@ def test_a_mean_of_a_mean_is_the_mean():
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 @pytest.mark.parametrize("dx", [0.5e-6, 3e-6])
 def test_samples_extend_beyond_a_circle_by_the_reach_of_its_soft_edge(share, dx):
-    """This holds on all four sides, also for a circle beside the window's middle."""
+    """This holds on all four sides of the window, also for a circle that is not in the middle of the window."""
     result = ideal(4, dx, 9)
     middle = (0.3 * dx, -0.7 * dx)
     edge = float(result.x[-1]) - 0.7 * dx

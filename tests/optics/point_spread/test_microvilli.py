@@ -25,8 +25,9 @@ def slow(**others):
 @pytest.mark.parametrize("azimuth", [0.0, 30.0, 117.0])
 @pytest.mark.parametrize("ratio", [math.inf, 5.0])
 def test_flat_rays_obey_malus(azimuth, ratio):
-    """The signal is cos² of the angle between polarisation and microvilli, plus 1/ratio of the rest, up to sin²θ of the
-    rays."""
+    """The signal is cos² of the angle between polarisation and microvilli, plus sin² divided by the dichroic ratio,
+    except for errors of order sin²θ of the rays.
+    """
     cells = Microvilli(azimuth, ratio)
     for plane in np.radians([0.0, 25.0, 60.0, 90.0, 150.0]):
         light = slow(polarization=(math.cos(plane), math.sin(plane)))
@@ -49,7 +50,9 @@ def test_no_preference_absorbs_all():
 
 
 def test_steep_rays_lower_polarisation_sensitivity():
-    """It equals the dichroic ratio behind a slow lens, and the ratio of signals in the two planes behind any lens."""
+    """The polarisation sensitivity is the ratio of the signals for the two planes of polarisation. Behind a slow lens,
+    it equals the dichroic ratio.
+    """
     cells, window = Microvilli(0.0, 10.0), {"dx": 50e-9, "shape": (61, 61)}
     assert cells.polarization_sensitivity(slow(), 8e-6) == pytest.approx(10, rel=0.02)
     found = cells.polarization_sensitivity(optics.vector_focus(STEEP, WAVE, **window), 1e-6)
@@ -59,7 +62,7 @@ def test_steep_rays_lower_polarisation_sensitivity():
 
 
 def absorbed_at(x, y, lens, z, jones, cells):
-    """Absorbed light at places about the focus of a round lens, by Richards and Wolf's integrals."""
+    """Return the absorbed light at places around the focus of a round lens, by Richards and Wolf's integrals."""
     radius, focal = lens.radius, lens.thin_lens_focal_length
 
     def light(theta):
@@ -80,7 +83,7 @@ def absorbed_at(x, y, lens, z, jones, cells):
 
 
 def integral(radius, centre, picture):
-    """Integral of an image over a disk, by polar Gauss nodes."""
+    """Return the integral of an image over a disk, by Gauss nodes in polar coordinates."""
     nodes, weights = np.polynomial.legendre.leggauss(30)
     r, turns = radius * (nodes + 1) / 2, 2 * np.pi * np.arange(90) / 90
     x, y = centre[0] + np.outer(r, np.cos(turns)), centre[1] + np.outer(r, np.sin(turns))
@@ -92,8 +95,9 @@ def integral(radius, centre, picture):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", range(16))
 def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
-    """Receptors from a twentieth of λ/NA to four, anywhere about the focus; pitches up to 0.7 λ/NA, windows of at least
-    three samples. A sum under a hard disk has a median error of some 20 %."""
+    """Receptors are 0.05 to 4 λ/NA wide, and anywhere near the focus. Samples are up to 0.7 λ/NA apart, in windows of
+    at least three samples. A sum over the samples within the disk would have a median error of about 20 %.
+    """
     rng = np.random.default_rng(seed)
     sine = float(rng.choice([0.05, 0.2, 0.5, 0.8, 0.9]))
     lens = optics.Pupil(8e-3 * math.tan(math.asin(sine)), thin_lens_focal_length=8e-3)
@@ -124,8 +128,9 @@ def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
 @pytest.mark.parametrize("defocus", [0.0, 1.5, -4.0])
 @pytest.mark.parametrize(("tolerance", "worst"), [(0.3, 2.0), (1e-3, 4e-3)])
 def test_what_light_errs_by_is_told(sine, focal, wavefront, aperture, defocus, tolerance, worst):
-    """The scalar image, by plane waves or exactly, is compared with `psf`, which is right to 1e-6. The reported error
-    exceeds the tolerance if a disk holds less light than the window."""
+    """The scalar image, computed by plane waves or exactly, is compared with `psf` at a tolerance of 1e-6. The reported
+    error exceeds the tolerance if a disk holds less light than the window.
+    """
     lens = optics.Pupil(
         focal * math.tan(math.asin(sine)), thin_lens_focal_length=focal, wavefront=wavefront, aperture=aperture
     )
@@ -146,7 +151,9 @@ def test_what_light_errs_by_is_told(sine, focal, wavefront, aperture, defocus, t
 
 @pytest.mark.slow
 def test_signals_do_not_depend_on_samples():
-    """Signals of a tilted hexagon in coarse, narrow and even windows, and the polarisation sensitivity in them."""
+    """The signals and the polarisation sensitivity behind a rotated hexagon are the same in coarse windows, in narrow
+    ones, and in windows with an even number of samples.
+    """
     hexagon = optics.Pupil(1e-3, thin_lens_focal_length=2e-3, aperture=optics.Polygon.regular(6))
     cells, angle, place = Microvilli(20.0, 8.0), (0.1, -0.05), (0.3e-6, -0.2e-6)
     windows = [(0.1e-6, (61, 61)), (0.7e-6, (5, 5)), (1e-6, (4, 6))]

@@ -19,7 +19,7 @@ LENS, FOCUS, WAVELENGTH = optics.Pupil(1e-3, thin_lens_focal_length=4e-3), 4e-3,
 
 
 def radial_means(shares, dx, frequencies, orientations):
-    """|Σ shares e^{-2πi f·x}|, the mean over orientations."""
+    """Return the mean of |Σ shares e^{-2πi f·x}| over orientations."""
     y, x = ((np.arange(n) - n // 2) * dx for n in shares.shape)
     angle = 2 * np.pi * (np.arange(orientations) + 0.5) / orientations
     found = []
@@ -31,8 +31,9 @@ def radial_means(shares, dx, frequencies, orientations):
 
 
 def test_contrasts_between_the_grids_frequencies_are_the_pictures_own():
-    """Contrasts reverse within one step of the grid if light fills its window: straight lines have an error of 0.04
-    there."""
+    """Contrasts change sign within one step of the frequency grid if light fills the window. Linear interpolation would
+    have an error of 0.04 there.
+    """
     result = optics.psf(LENS, [WAVELENGTH], FOCUS + 1.6e-4, dx=0.5e-6, shape=(145, 145), tolerance=1e-4)
     transfer = optics.mtf(result, tolerance=1)
     assert transfer.fx.size == 145  # the samples are fine enough
@@ -52,7 +53,9 @@ def sure_to(error):
 
 
 def test_as_many_orientations_as_the_picture_needs():
-    """Two points d apart: |cos(π f d cos θ)|, which has 2 f d zeros in half a turn, up to 60."""
+    """The image of two points at the distance d has the contrast |cos(π f d cos θ)|, with 2 f d zeros (up to 60) within
+    180°.
+    """
     d, dx = 60, 1e-6
     shares = np.zeros((1, 81, 81))
     shares[0, 40, [40 - d // 2, 40 + d // 2]] = 0.5
@@ -101,7 +104,9 @@ def test_contrasts_carry_derivatives_by_the_focus():
 
 
 def test_quality_says_what_its_steps_may_miss(monkeypatch):
-    """Light over a wide window has a peak of contrast narrower than a step of the integral over frequency."""
+    """The contrast of light that fills a wide window has a peak that is narrower than a step of the integral over
+    frequency.
+    """
     pupil = optics.Pupil(0.1e-3, thin_lens_focal_length=2e-3)
     result = optics.psf(pupil, [WAVELENGTH], 4e-3, dx=3e-6, shape=(101, 101))
     f, profile = np.linspace(0, 1.6e5, 8193), MTF.profile

@@ -21,7 +21,7 @@ TOLERANCE = 1e-3
 
 @pytest.fixture
 def told(monkeypatch):
-    """Makes checks find these errors, one after the other, and returns the problems that were checked."""
+    """Return a function that lets the checks find given errors one after the other; it returns the checked problems."""
 
     def tell(*errors):
         checked, left = [], iter(errors)
@@ -48,8 +48,9 @@ def test_the_error_that_is_seen_is_the_one_that_is_stated(told):
 
 
 def test_an_exact_method_tries_again_for_a_smaller_tolerance(told):
-    """An error ten times too large leads to 0.3 of a tenth of the tolerance, for which the method takes more
-    samples."""
+    """A PSF whose error is ten times too large is computed again with 0.03 of the tolerance, for which the method takes
+    more samples.
+    """
     tight = 2e-4
     checked = told(10 * tight, 0.5 * tight)
     ask = {"sensor_distance": 400e-6, "method": "low_rank", "dtype": "float64", **WINDOW}
@@ -62,7 +63,9 @@ def test_an_exact_method_tries_again_for_a_smaller_tolerance(told):
 
 @pytest.mark.parametrize("error", [3.0, 20.0])
 def test_quick_samples_that_fail_give_way_to_samples_of_all_light(told, error):
-    """A little more accuracy comes from more of the quick samples; much more comes from samples of all light."""
+    """More of the quick samples are used if slightly more accuracy is needed. If much more is needed, samples for all
+    light are used instead.
+    """
     asked, ask = 1e-2, {"sensor_distance": 400e-6, "method": "low_rank", **WINDOW}
     checked = told(error * asked, 0.5 * asked)
     result = optics.psf(LENS, tolerance=asked, **ask)
@@ -106,8 +109,9 @@ def test_no_more_digits_are_asked_than_there_are(told):
 
 
 def test_where_no_check_was_made_the_picture_tells_how_dark_it_is(told):
-    """Rounding has more weight far off the focus, so float32 cannot reach the accuracy there that it has in the
-    middle."""
+    """Far away from the focus, rounding is larger relative to the light, so float32 is less accurate there than in the
+    focus.
+    """
     ask = {"sensor_distance": 400e-6, "method": "low_rank", "tolerance": 2e-5, "dx": 0.5e-6, "shape": (9, 9)}
     told(None, None)
     assert optics.psf(LENS, **ask).plan.predicted_error < 2e-5
@@ -116,8 +120,9 @@ def test_where_no_check_was_made_the_picture_tells_how_dark_it_is(told):
 
 
 def test_the_first_small_picture_waits_for_no_import_of_what_it_does_not_need():
-    """SciPy alone would take longer than `import numpy, scipy`; a pupil that bends light needs no SciPy. Reading the
-    packages' metadata for Dr.Jit's version takes longer than the PSF."""
+    """Importing all of SciPy's modules would take longer than `import numpy, scipy`. A pupil that deflects light does
+    not need SciPy. Reading the packages' metadata for Dr.Jit's version takes longer than the PSF.
+    """
     small = """
 import sys
 import optics

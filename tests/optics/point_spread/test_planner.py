@@ -59,8 +59,9 @@ def test_auto_takes_no_approximation_that_errs_by_more_than_the_tolerance(proble
 
 
 def test_a_method_is_not_asked_where_that_costs_more_than_it_can_save():
-    """Omitted methods are slower than the chosen one, or save less than their evaluation costs; for a problem that
-    takes long, all methods are evaluated."""
+    """A method is not examined if it is slower than the chosen one, or if it would save less time than its examination
+    takes. For a problem that takes long, all methods are examined.
+    """
     small = problem_of(LENS_PUPIL, 240e-6, Grid.square(33, 1e-6), 1e-2)
     plan, _ = choose(small)
     asked = {option.method for option in plan.options}
@@ -92,7 +93,7 @@ def test_more_digits_cost_more_samples(method):
 
 
 def test_sampling_resolves_the_lens():
-    """The phase of an ideal lens needs dx < λ / (2 NA)."""
+    """Sampling the phase of an ideal lens requires dx < λ / (2 NA)."""
     _, sampling = choose(LENS, "angular_spectrum")
     assert sampling.pupil.dx < 550e-9 / (2 * 0.124)
 

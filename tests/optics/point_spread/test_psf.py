@@ -19,7 +19,7 @@ def centroid(result):
 
 
 def prism(radius, sine, n=1.5, axis=1):
-    """A relief that deflects by the given sine towards +x (axis 1) or +y (axis 0), its thick side there."""
+    """Return a relief that deflects light by the given sine towards +x (axis 1) or +y (axis 0), where it is thicker."""
     ramp = sine / (n - 1) * (2 * np.arange(4) - 3) * radius
     points = np.broadcast_to(ramp if axis == 1 else ramp[:, None], (4, 4))
     return Pupil(radius, BSplineRelief(points), n=n)
@@ -29,7 +29,9 @@ METHODS = ["angular_spectrum", "split_angular_spectrum", "far_field", "low_rank"
 
 
 class TestOracles:
-    """a = 20 µm, z = 40 µm, 500 nm: Fresnel number 20, on-axis intensity 3.474 exactly and 0.000 after Fresnel."""
+    """For a radius of 20 µm, a distance of 40 µm and 500 nm, the Fresnel number is 20. The exact intensity on the axis
+    is 3.474; Fresnel's approximation gives 0.
+    """
 
     a, z, wavelength = 20e-6, 40e-6, 500e-9
 
@@ -56,7 +58,9 @@ class TestOracles:
         assert result.psf[0, 2, 2] * math.pi * self.a**2 == pytest.approx(exact, rel=error)
 
     def test_far_field_of_an_aperture_is_fraunhofers(self):
-        """Fresnel number 5e-4: |U|² = (πa²/λρ)² (z/ρ)² (2 J1(v)/v)², v = ka sin θ, up to the Fresnel number squared."""
+        """The intensity at the Fresnel number 5e-4 is (πa²/λρ)² (z/ρ)² (2 J1(v)/v)² with v = ka sin θ, except for
+        errors of the order of the Fresnel number squared.
+        """
         from scipy.special import j1
 
         a, z = 2e-6, 16e-3
@@ -70,8 +74,9 @@ class TestOracles:
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("method", METHODS[:3])
 def test_methods_agree_with_the_direct_sum_within_their_prediction(method, seed):
-    """Random reliefs, distances, and windows at other scales than the optics': the error never exceeds the plan's
-    prediction."""
+    """Reliefs and distances are random, and windows are not adapted to the optics. The error never exceeds the
+    prediction of the plan.
+    """
     rng = np.random.default_rng(seed)
     radius, z, n = 10 ** rng.uniform(0.2, 1.1) * 1e-6, 10 ** rng.uniform(-4, -3) * 1, rng.uniform(1, 2)
     pupil = Pupil(radius, BSplineRelief(rng.random((4, 4)) * 2 * radius), n=n)
@@ -86,7 +91,7 @@ def test_methods_agree_with_the_direct_sum_within_their_prediction(method, seed)
 
 @pytest.mark.parametrize("method", METHODS[:2])
 def test_error_follows_the_tolerance(method):
-    """Convergence is spectral in float64: every requested digit is obtained."""
+    """Every requested digit is obtained in float64."""
     r = np.hypot(*np.meshgrid(*[np.arange(-15, 16) * 0.5e-6] * 2))
     exact = np.abs(reference.ideal_lens_field(r.ravel(), 550e-9, 30e-6, 240e-6)).reshape(r.shape) ** 2 / LENS.area
     for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
@@ -110,7 +115,7 @@ class TestConventions:
         assert centroid(result) == pytest.approx(expected, abs=1e-6)
 
     def test_height_array_is_y_x(self):
-        """Glass that is thicker in the last rows bends light to +y."""
+        """Glass that is thicker in the last rows deflects light towards +y."""
         rows = np.repeat(np.linspace(-1, 1, 32)[:, None], 32, axis=1)
         result = optics.psf(
             Pupil(20e-6, 4e-6 * rows, n=1.5), [550e-9], 200e-6, dx=1e-6, shape=(121, 121), tolerance=1e-2
@@ -170,7 +175,9 @@ class TestWindow:
         np.testing.assert_allclose(part.y, whole.y[18:39], atol=1e-15)
 
     def test_follows_an_oblique_wave_with_few_samples(self):
-        """The focus of a wave from 20° off the axis, 100 µm from it: a small window there needs no large transform."""
+        """A wave from 20° off the axis has its focus 100 µm from the axis. A small window there does not need a large
+        transform.
+        """
         angle = math.radians(20)
         place = 240e-6 * math.tan(angle)
         result = optics.psf(
@@ -187,7 +194,7 @@ class TestWindow:
 class TestPower:
     @pytest.mark.parametrize("method", ["angular_spectrum", "far_field"])
     def test_a_wide_window_holds_all_power(self, method):
-        """The sum is the integral if samples are finer than the intensity's band (Parseval)."""
+        """The sum of samples equals the integral if they resolve the highest frequency of the intensity."""
         result = optics.psf(
             prism(8e-6, 0.1), [550e-9], 120e-6, dx=1e-6, shape=(281, 281), tolerance=2e-3, method=method
         )
@@ -196,7 +203,7 @@ class TestPower:
         assert result.power[0] < 1.001
 
     def test_evanescent_light_does_not_arrive(self):
-        """A relief so steep that its first order is evanescent blocks nearly all light."""
+        """Almost no light arrives behind a relief that is so steep that the deflected light is evanescent."""
         lost = optics.psf(
             prism(8e-6, 1.5), [550e-9], 120e-6, dx=2e-6, shape=(141, 141), tolerance=1e-2, dtype="float64"
         )
@@ -261,7 +268,9 @@ class TestRefusals:
             optics.psf(pupil, [550e-9], 4e-3, **window, source_angle=(0.1, 0.0))
 
     def test_a_dark_window_is_less_accurate_and_says_so(self):
-        """The focus of a tilted wave lies far outside: the remaining edge light is closer to float32's rounding."""
+        """The focus of a tilted wave is far outside the window. The little diffracted light in the window is closer to
+        the rounding of float32.
+        """
         window = {"wavelengths": [550e-9], "dx": 1e-6, "shape": (17, 17)}
         bright, dark = (
             optics.psf(LENS, **window, source_angle=(angle, 0.0), method="rayleigh_sommerfeld") for angle in (0.0, 0.6)

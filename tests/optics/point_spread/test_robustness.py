@@ -17,7 +17,7 @@ ODD = st.sampled_from([0.0, -1e-6, math.nan, math.inf, 1e-300, 1e-12, 1e-3, 1e6]
 
 
 def lengths(low, high):
-    """Mostly sensible lengths [m], some odd ones."""
+    """Return a strategy that usually draws sensible lengths [m], and sometimes odd ones."""
     return st.one_of(st.floats(low, high), st.floats(low, high), st.floats(low, high), ODD)
 
 
@@ -95,7 +95,9 @@ def test_predicted_error_holds(radius, z, n, field_of_view, height, seed):
 
 @pytest.mark.parametrize("radius", [1e-9, 1e-7])
 def test_pupils_smaller_than_the_wavelength(radius):
-    """A pinhole radiates Rayleigh-Sommerfeld's cos²θ lobe: PSF = πa² z² / (λρ²)² for ka ≪ 1."""
+    """For ka ≪ 1, a pinhole radiates with the factor cos²θ of Rayleigh and Sommerfeld's integral: PSF = πa² z² /
+    (λρ²)².
+    """
     result = optics.psf(Pupil(radius), [550e-9], 1e-3, dx=1e-4, shape=(11, 11), tolerance=1e-2)
     rho2 = result.x**2 + result.y[:, None] ** 2 + 1e-6
     assert relative_l2(result.psf[0], math.pi * radius**2 * 1e-6 / (550e-9 * rho2) ** 2) < 0.02 + (radius / 2e-7) ** 2

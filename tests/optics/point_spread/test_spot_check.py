@@ -17,7 +17,7 @@ from optics.point_spread.spot_check import CAUTION, spot_check
 
 
 def picture(shape, dx, tolerance=1e-4):
-    """Beam, problem and PSF of a lens at its focus, for a window of this shape."""
+    """Return beam, problem and PSF of a lens in focus, for a window of this shape."""
     beam = Beam(Pupil(50e-6, thin_lens_focal_length=250e-6), PointSource(), 550e-9, 250e-6)
     task = Problem.from_beam(beam, Grid(shape, dx), tolerance, "float64")
     image = choose(task, "rayleigh_sommerfeld")[1].intensity(beam, task).numpy() / beam.pupil.area
@@ -26,7 +26,9 @@ def picture(shape, dx, tolerance=1e-4):
 
 @pytest.mark.parametrize("dx", [0.2e-6, 1e-6, 4e-6])
 def test_an_even_error_of_the_amplitude_is_seen_at_any_concentration(dx):
-    """Rounding spreads evenly: δI = 2 Re(U* δU). At the coarse pitch nearly all the light is in one sample."""
+    """Rounding adds an error δU of the same size to all samples, so that δI = 2 Re(U* δU). With the coarse pitch,
+    nearly all light is in one sample.
+    """
     beam, task, image = picture((61, 61), dx)
     noise = np.random.default_rng(0).normal(size=image.size) * 1e-4 * np.sqrt(image.max())
     wrong = (np.sqrt(image) + noise) ** 2
@@ -54,7 +56,9 @@ def test_single_precision_is_never_promised_more_than_it_carries():
 @pytest.mark.parametrize("aperture", [optics.Circle(), optics.Annulus(0.4)])
 @pytest.mark.parametrize("cycles", [3.0, 3.7, 11.2])
 def test_half_the_nodes_sum_what_is_even_in_y(aperture, cycles):
-    """The sums agree up to rounding; a rule with nodes that are not mirrored at the x axis would not agree."""
+    """The sum over half of the nodes agrees up to rounding. If the nodes were not symmetric about the x axis, it would
+    not.
+    """
     whole, half = (cached_nodes(aperture, cycles, 8.0, halved) for halved in (False, True))
     assert len(half) < 0.6 * len(whole)
     for even in (lambda x, y: 1 + 0 * x, lambda x, y: np.cos(3 * x) * y**2, lambda x, y: np.exp(x) * np.cos(2 * y)):
@@ -64,8 +68,9 @@ def test_half_the_nodes_sum_what_is_even_in_y(aperture, cycles):
 
 @pytest.mark.parametrize("spare", [1.0, 2.0])
 def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
-    """A PSF made with the reference sum itself differs from it by nothing. The check then reports the accuracy of the
-    sum, which is lower in a dark window than in a bright one unless it gets spare digits."""
+    """A PSF that was computed by the reference sum itself does not differ from it. The check then reports the accuracy
+    of the sum. In a dark window, the accuracy is lower, unless the sum is computed with additional digits.
+    """
     effort = replace(spot_check_module.EFFORT, spare_digits=(spare,))
     monkeypatch.setattr(spot_check_module, "EFFORT", effort)
     beam, task, image = picture((61, 61), 4e-6)
@@ -81,7 +86,7 @@ def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
 
 
 def in_extended_precision(pupil, wavelength, distance, x, y):
-    """Return the PSF at points of a lens's image, from the Rayleigh-Sommerfeld sum with 64 bits of mantissa."""
+    """Return the PSF at points (x, y), by the Rayleigh-Sommerfeld sum in numbers with a mantissa of 64 bits."""
     real, beam = np.longdouble, Beam(pupil, PointSource(), wavelength, distance)
     window = Grid((1, 2), float(np.ptp(x)) or 1e-9, (float(x.mean()), float(y.mean())))
     rule = cached_nodes(pupil.aperture, turns(Problem.from_beam(beam, window, 1e-10, "float64"), 13.0), 13.0)
@@ -105,8 +110,9 @@ def in_extended_precision(pupil, wavelength, distance, x, y):
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="needs extended precision")
 @pytest.mark.parametrize("seed", range(8))
 def test_long_paths_round_more(seed):
-    """Lenses of centimetres have paths of thousands of waves. The check cannot see their rounding, because the direct
-    sum has the same paths. The actual error was up to ten times the stated one."""
+    """Lenses of centimetres have paths of thousands of waves. The check does not detect the rounding of paths, because
+    the direct sum uses the same paths. In an earlier version, the actual error was up to ten times the stated one.
+    """
     rng = np.random.default_rng(seed)
     radius, slope = 10 ** rng.uniform(-1.7, -1), rng.uniform(0.1, 0.25)
     distance = radius / slope
@@ -131,8 +137,9 @@ def test_ordinary_paths_round_as_before():
 
 @pytest.mark.parametrize("samples", range(1, 8))
 def test_windows_with_few_samples_are_checked(samples):
-    """The check of a single sample was omitted if it took longer than a third of the PSF. Its error can then be 0.63 of
-    the tolerance, and the prediction was 0.5."""
+    """Earlier versions omitted the check of a single sample if it took longer than a third of the PSF's time. The error
+    could then be 0.63 of the tolerance, while 0.5 was stated.
+    """
     beam = Beam(Pupil(1e-3, optics.BSplineRelief(1e-7 * np.eye(4))), PointSource(), 550e-9, 10e-3)
     task = Problem.from_beam(beam, Grid((1, samples), 3e-6, (1e-4, 2e-4)), 1e-4)
     sampling = choose(task, "rayleigh_sommerfeld")[1]
@@ -153,8 +160,9 @@ def stated_and_actual(pupil, distance, window, tolerance):
 
 @pytest.mark.parametrize("seed", [3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 12))])
 def test_detail_that_a_psf_neglects_is_checked(seed):
-    """Detail of a height map that is smaller than a tenth of the tolerance needs no nodes of the PSF. The check had
-    neglected it, too, so that the error of a single sample was larger than stated."""
+    """Detail of a height map whose effect is below a tenth of the tolerance needs no nodes. In an earlier version, the
+    check also neglected it, so that the error of a single sample was larger than stated.
+    """
     rng = np.random.default_rng(seed)
     pupil = Pupil(10 ** rng.uniform(-5.3, -4.6), rng.random((12, 12)) * rng.uniform(1e-6, 7e-6), n=1.5)
     distance = pupil.radius / rng.uniform(0.05, 0.3)
@@ -165,7 +173,7 @@ def test_detail_that_a_psf_neglects_is_checked(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_far_corner_of_a_window_off_the_axis_is_checked(seed):
-    """Quadratures fail where phases change fastest: at the corner that is farthest from the axis, and there alone."""
+    """Quadratures fail first where phases change fastest, which is at the corner farthest from the axis."""
     rng = np.random.default_rng(seed)
     for _ in range(8):
         inner = rng.uniform(0.3, 0.95)
@@ -182,7 +190,9 @@ def test_the_far_corner_of_a_window_off_the_axis_is_checked(seed):
 
 @pytest.mark.parametrize("shape", [(3, 3), (4, 5), (5, 5), (2, 6)])
 def test_direct_sums_of_few_samples_are_checked(shape):
-    """A check of eight points was too long for them, so that their plans stated half the tolerance."""
+    """Earlier versions omitted their check, because a check of eight points took too long. Their plans then stated half
+    the tolerance.
+    """
     rng = np.random.default_rng(sum(shape))
     distance = 1.5e-3
     pupil = optics.Pupil(0.35e-3, optics.BSplineRelief(rng.random((4, 4)) * 2e-6))
@@ -194,7 +204,9 @@ def test_direct_sums_of_few_samples_are_checked(shape):
 
 
 def test_the_check_of_a_window_of_few_samples_may_take_a_larger_share_of_the_time():
-    """The number of points is proportional to the time, between a least time and the largest number."""
+    """The number of checked points is proportional to the time of the PSF, except for very short times, and up to a
+    largest number.
+    """
     effort = spot_check_module.EFFORT
     beam = Beam(Pupil(5e-4, optics.BSplineRelief(5e-5 * np.eye(4))), PointSource(), 550e-9, 2.5e-3)
 

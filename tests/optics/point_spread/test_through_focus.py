@@ -13,7 +13,7 @@ LENS = optics.Pupil(RADIUS, thin_lens_focal_length=FOCAL)
 
 
 def test_peaks_are_lommels():
-    """The axis through the focus of an f/20 lens; paraxial theory has an error of (R/f)² = 6e-4 there."""
+    """The PSF on the axis of an f/20 lens, through focus. Paraxial theory has an error of (R/f)² = 6e-4."""
     distances = FOCAL * np.linspace(0.97, 1.04, 9)
     found = optics.through_focus(LENS, distances, wavelengths=[WAVELENGTH, 450e-9], dx=2e-6, shape=(5, 7))
     assert found.psf.shape == (9, 2, 5, 7)

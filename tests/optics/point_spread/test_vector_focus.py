@@ -23,7 +23,7 @@ APLANATIC = Light(lambda theta: np.sqrt(np.cos(theta)))
 
 
 def by_directions(window, z, sine, jones, light):
-    """Ex, Ey, Ez of a round lens in focus by Richards and Wolf's integrals, over the root of z²: (3, y, x)."""
+    """Return Ex, Ey and Ez of a round lens in focus by Richards and Wolf's integrals, divided by |z|, (3, y, x)."""
     x, y = window.x[None, :], window.y[:, None]
     rho, phi = np.hypot(x, y).ravel(), np.arctan2(y, x)
     found = focal_integrals(rho, 2 * math.pi / WAVE, 1.0, (0.0, math.asin(sine)), light).reshape(4, *phi.shape)
@@ -36,8 +36,10 @@ def by_directions(window, z, sine, jones, light):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.5, 0.9])
 def test_far_away_a_lens_in_focus_is_richards_and_wolfs(sine):
-    """The path bends by sin²θ/N less from place to place than plane waves predict. At ten times the distance the exact
-    field is ten times nearer to them, and the sum of plane waves agrees at once."""
+    """Plane waves ignore the curvature of the waves, which has an effect of sin²θ/N at the Fresnel number N. At ten
+    times the distance, the exact field is ten times closer to Richards and Wolf's, with which the sum of plane waves
+    agrees at any distance.
+    """
     jones, window = np.array([1, 0.5j]) / math.sqrt(1.25), {"dx": 0.05e-6, "shape": (41, 35)}
     off = {}
     for z in (0.2e-3, 2e-3):
@@ -64,8 +66,9 @@ def test_an_aplanatic_lens_is_richards_and_wolfs(sine):
 
 
 def by_smythe(pupil, angle, jones, z, places):
-    """½π⁻¹ ∇ × ∫ (ẑ × E) e^{ikR}/R dξ as it stands, by a midpoint sum, which converges spectrally behind a Gaussian
-    mask. E comes from Rodrigues' matrices, towards the lens' focus."""
+    """Return Smythe's integral (1/2π) ∇ × ∫ (ẑ × E) e^{ikR}/R dξ by a midpoint sum, which converges fast behind a
+    Gaussian mask. Rodrigues' matrices turn the field E towards the focus of the lens.
+    """
     n, k = 161, 2 * math.pi / WAVE
     at = ((np.arange(n) + 0.5) / n * 2 - 1) * pupil.radius
     x, y = (axis.ravel() for axis in np.meshgrid(at, at))
@@ -89,7 +92,9 @@ def by_smythe(pupil, angle, jones, z, places):
 
 @pytest.mark.parametrize(("angle", "z"), [((0.0, 0.0), 40e-6), ((0.0, 0.0), 30e-6), ((0.2, -0.1), 40e-6)])
 def test_a_small_eye_is_smythes_integral(angle, z):
-    """Fresnel number 1 within the mask: plane waves are wrong there, but fields still obey Maxwell's equations."""
+    """The Fresnel number of the mask is 1, for which a sum of plane waves is inaccurate. Smythe's integral still
+    satisfies Maxwell's equations.
+    """
     pupil = optics.Pupil(20e-6, thin_lens_focal_length=40e-6, mask=optics.GaussianMask(4.8e-6))
     window = {"dx": 0.8e-6, "shape": (5, 7), "source_angle": angle}
     jones = np.array([0.6, 0.8j])
@@ -105,7 +110,7 @@ def test_a_small_eye_is_smythes_integral(angle, z):
 
 
 def test_a_polygon_of_many_corners_has_the_published_spot():
-    """365 by 270 nm at NA 0.9 and 500 nm, through the sum."""
+    """The sum gives the published spot of 365 by 270 nm at NA 0.9 and 500 nm."""
     round_ = lens(0.9, aplanatic=True, aperture=optics.Polygon.regular(96))
     options = {"apodization": "aplanatic", "polarization": (1, 0), "dx": 5e-9, "shape": (161, 161)}
     spot = optics.vector_focus(round_, WAVE, **options)
@@ -141,7 +146,7 @@ def test_predicted_errors_hold_for_each_component(defocus, relief):
 
 
 def test_plane_waves_have_the_fields_phase():
-    """The path to the window's corners is five radians longer than to its middle."""
+    """The phase at the corners of the window differs from that in the middle by five radians."""
     pupil = optics.Pupil(50e-6, thin_lens_focal_length=1e-3)
     rough, exact = (
         optics.vector_focus(pupil, WAVE, polarization=(1, 1j), dx=1e-6, shape=(41, 41), tolerance=tolerance)
@@ -166,7 +171,9 @@ def test_a_plan_counts_every_field_that_is_propagated(monkeypatch):
 
 
 def test_where_single_precision_will_not_do_double_is_taken():
-    """The relief turns the light away, and a mask removes its rings: the window holds a ten thousand millionth."""
+    """A relief deflects the light away from the window, and a mask suppresses the rings. The window contains 1e-10 of
+    the light.
+    """
     ramp = np.broadcast_to(np.linspace(0, 10e-6, 4), (4, 4))
     view = {"dx": 0.2e-6, "shape": (9, 9), "tolerance": 1e-4}
     plans = {}
@@ -179,15 +186,18 @@ def test_where_single_precision_will_not_do_double_is_taken():
 
 
 def test_evanescent_rays_are_refused():
-    """The rays of a lens as wide as its distance, oblique by half a radian, would leave at a sine of 1.17."""
+    """Some rays of a lens as wide as its distance would have a sine of 1.17 if the light is oblique by half a
+    radian.
+    """
     with pytest.raises(optics.AccuracyError, match=r"sine of 1\.17: must be at most 0\.98"):
         optics.vector_focus(optics.Pupil(20e-6, thin_lens_focal_length=20e-6), source_angle=(0.5, 0.0))
 
 
 def test_single_components_behind_thin_rings():
-    """The bent path of a plane wave has a first-order effect on single components and a second-order effect on their
-    sum. It is largest for circular polarisation. It makes up nearly all of the predicted error here, which is less than
-    twice the actual one."""
+    """The curvature that plane waves ignore has a first-order effect on single components, and a second-order effect on
+    their sum. The effect is largest for circular polarisation. It is nearly all of the predicted error here, which is
+    less than twice the actual one.
+    """
     pupil = optics.Pupil(300e-6, thin_lens_focal_length=400e-6, aperture=optics.Annulus(0.98))
     view = {"polarization": (1, 1j), "dx": 0.06e-6, "shape": (9, 9)}
     rough, exact = (optics.vector_focus(pupil, WAVE, tolerance=tolerance, **view) for tolerance in (1e-2, 1e-8))
@@ -197,7 +207,9 @@ def test_single_components_behind_thin_rings():
 
 
 def test_flat_rays_aslant_keep_their_polarisation():
-    """A slow lens 0.3 rad off its axis: the chief ray goes straight on, with its field at right angles to it."""
+    """Light passes a slow lens 0.3 rad off the axis. The chief ray is not deflected, and its field is perpendicular to
+    it.
+    """
     narrow = optics.Pupil(0.1e-3, thin_lens_focal_length=F)
     light = optics.vector_focus(narrow, WAVE, polarization=(1, 0), source_angle=(0.3, 0.0), dx=1e-6, shape=(3, 3))
     ex, ey, ez = light.intensity.sum(axis=(1, 2)) / light.psf.sum()
@@ -260,7 +272,7 @@ def test_stokes_parameters_say_the_same_as_jones_vectors():
 
 
 def test_one_ring_ends_where_it_ends():
-    """A disk of 0.6 R is a circle of that radius."""
+    """The result for a disk of 0.6 R is that of a circular pupil of this radius."""
     view = {"dx": 0.4e-6, "shape": (9, 9)}
     part = optics.Pupil(200e-6, thin_lens_focal_length=800e-6, aperture=optics.Rings([0, 0.6]))
     disk = optics.Pupil(120e-6, thin_lens_focal_length=800e-6)

@@ -26,7 +26,7 @@ def mean(values, weight):
 
 @pytest.mark.parametrize("lamp", ["D65", "A", "FL11"])
 def test_peak_is_airys_weighed_by_photons(lamp):
-    """π R² / (λ f)² at each wavelength."""
+    """The peak at each wavelength is π R² / (λ f)²."""
     white = optics.white_psf(LENS, lamp, (GREEN, 600), waves=61, **SMALL)
     low, high = optics.receptors_of((GREEN, 600)).limits_nm
     nm = np.arange(low, high + 1)
@@ -130,7 +130,9 @@ def test_measures_take_white_light():
 
 
 def test_a_strehl_ratio_of_colours_side_by_side():
-    """For dispersive glass, the result is the peak of the mean, not the mean of separate peaks."""
+    """For dispersive glass, the peaks of different wavelengths are side by side. The result is the peak of the mean
+    PSF, not the mean of the peaks.
+    """
     x = np.linspace(-1, 1, 4) * 3 * R
     glass = optics.RefractiveIndex.from_abbe(1.5, 20)
     prism = Pupil(R, optics.BSplineRelief(np.outer(np.ones(4), 0.3 * x)), n=glass, thin_lens_focal_length=F)
@@ -197,7 +199,7 @@ def test_too_few_wavelengths_are_refused():
 
 
 def test_results_are_printed_in_a_line():
-    """The line does not print all contents, which are megabytes."""
+    """A result is printed as one line, without the contents of its arrays."""
     white = optics.white_psf(optics.Pupil(1e-3, thin_lens_focal_length=17e-3), dx=2e-6, shape=(9, 11))
     focus = optics.vector_focus(optics.Pupil(1e-3, thin_lens_focal_length=17e-3), dx=2e-6, shape=(9, 11))
     waves = f"<PSFResult {len(white.waves.wavelengths)} wavelengths, 9 x 11 samples 2e-06 m apart, predicted error "

@@ -20,16 +20,17 @@ SAMPLES_PER_WAIST = 4.2
 
 
 def spot(distance, share):
-    """A Gaussian whose Rayleigh length is share² times the distance, and its pitch and waist."""
+    """Return a Gaussian beam whose Rayleigh length is share² times the distance, the pitch of its samples, and its
+    waist.
+    """
     waist = share * np.sqrt(abs(distance) * WAVELENGTH / np.pi)
     x = (np.arange(SIDE) - SIDE // 2) * waist / SAMPLES_PER_WAIST
     return np.exp(-np.add.outer(x**2, x**2) / waist**2), float(waist / SAMPLES_PER_WAIST), waist
 
 
 def exact(u, dx, distance, x, y):
-    """The field without its carrier, ∫ Û exp(ikz (cos θ - 1)) exp(2πi f·x) df over the samples' band.
-
-    cos θ - 1 = -sin²θ / (1 + cos θ) has no rounding error proportional to the distance.
+    """Return the field without its carrier, ∫ Û exp(ikz (cos θ - 1)) exp(2πi f·x) df over the band of the samples. With
+    cos θ - 1 = -sin²θ / (1 + cos θ), the rounding error is not proportional to the distance.
     """
     nodes, weights = np.polynomial.legendre.leggauss(160)
     f, df = 0.5 / dx * nodes, 0.5 / dx * weights
@@ -58,7 +59,7 @@ def test_float64_keeps_its_accuracy_over_any_distance(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_phase_of_a_long_path_is_that_of_the_exact_quotient(seed):
-    """The carrier's whole waves are those of the exact quotient of the two float64 numbers z and λ."""
+    """The number of waves of the carrier is the exact quotient of the two float64 numbers z and λ, rounded once."""
     rng = np.random.default_rng(seed)
     distance = float(WAVELENGTH * 10 ** rng.uniform(4, 9))
     u, dx, waist = spot(distance, 1.0)
@@ -74,9 +75,9 @@ def test_the_phase_of_a_long_path_is_that_of_the_exact_quotient(seed):
 
 @pytest.mark.parametrize("distance", [5e-3, 0.5])
 def test_light_at_the_beginning_of_a_fade_is_in_the_prediction(distance):
-    """A narrow window lets most of a tilted beam be faded, but light near the window's sides only just.
-
-    The fade blurs this light back into the window. It dims it so little that the lost power does not show it.
+    """Most of a tilted beam is outside a narrow window, and is faded out. Light close to the sides of the window is at
+    the beginning of the fade, which blurs it back into the window. It loses too little power there for the lost power
+    to indicate the error.
     """
     side, tilt, stretch, outputs = 84, 0.15, 3.3, 40
     dx = float(np.sqrt(distance * WAVELENGTH / 3000))

@@ -16,7 +16,7 @@ WINDOW = {"wavelength": WAVELENGTH, "out_dx": 2e-6, "out_shape": (15, 15)}
 
 
 def kernel_sum(amplitudes, at, normal, targets):
-    """Rayleigh and Sommerfeld's first integral over nodes of a plane with this normal, at targets (n, 3)."""
+    """Return the first Rayleigh-Sommerfeld integral over nodes in a plane with this normal, at targets (n, 3)."""
     found = []
     for some in np.array_split(targets, max(1, len(targets) // 300)):
         offset = some[:, None] - at[None]
@@ -27,7 +27,7 @@ def kernel_sum(amplitudes, at, normal, targets):
 
 
 def tilted_disk(x, y, tilt):
-    """Normal of a tilted plane, and the points (n, 3) at x and y along the plane."""
+    """Return the normal of a tilted plane, and the points (n, 3) with the coordinates x and y in the plane."""
     slope = np.tan(tilt)
     steep, cosine = np.hypot(*slope), 1 / np.hypot(1, np.hypot(*slope))
     normal = np.array([-slope[0], -slope[1], 1]) * cosine
@@ -38,7 +38,7 @@ def tilted_disk(x, y, tilt):
 
 
 def exact(decentre, tilt):
-    """The field behind an aperture and a misaligned lens: two integrals over planes in space."""
+    """Return the field behind an aperture and a misaligned lens, by one integral over each of their planes."""
     nodes = optics.Circle().nodes(16.0, 5.0)
     first = APERTURE * np.stack([nodes.x, nodes.y, 0 * nodes.x], axis=-1)
     x, y = RADIUS * nodes.x, RADIUS * nodes.y
@@ -80,7 +80,9 @@ def test_integrals_over_planes_in_space_are_met(decentre, tilt, tolerances):
 
 
 def test_an_empty_tilted_pupil_changes_only_what_its_foreshortening_blocks():
-    """The field arrives on the tilted plane and leaves from it; far inside the rim nothing happens."""
+    """The field is propagated to the tilted plane, and from there to the output plane. Far inside the rim, the pupil
+    has no effect.
+    """
     x = (np.arange(65) - 32) * 4e-6
     u = np.exp(-np.add.outer((x - 6e-6) ** 2, (x + 8e-6) ** 2) / (24e-6) ** 2 + 0.1e6j * np.add.outer(x, -x))
     settings = {"dx": 4e-6, "wavelength": WAVELENGTH, "tolerance": 1e-3, "dtype": "float64"}
@@ -95,7 +97,7 @@ def test_an_empty_tilted_pupil_changes_only_what_its_foreshortening_blocks():
 
 @pytest.mark.parametrize("distance", [math.inf, 20e-3])
 def test_a_decentred_lens_moves_the_image(distance):
-    """A decentre d moves the image by d f⁻¹ / (f⁻¹ - s⁻¹): by d alone if the source is at infinity."""
+    """A lens that is decentred by d moves the image by d f⁻¹ / (f⁻¹ - s⁻¹), which is d for a source at infinity."""
     lens, source = Pupil(0.15e-3, thin_lens_focal_length=5e-3), optics.PointSource(distance, (0.002, 0.0))
     z, dx, decentre = 1 / (1 / 5e-3 - 1 / distance), 2e-6, np.array([12e-6, -6e-6])
     moved = decentre * z / 5e-3
@@ -112,7 +114,7 @@ def test_a_decentred_lens_moves_the_image(distance):
 
 
 def test_light_from_a_tilted_source_equals_a_tilted_system():
-    """A plane wave at the angle of a tilted lens sees an aligned lens. Its focus lies on the lens' own axis."""
+    """For a plane wave along the axis of a tilted lens, the lens is aligned, and the focus lies on its axis."""
     angle, f = 0.03, 2e-3
     lens = Pupil(80e-6, thin_lens_focal_length=f)
     tilted = [Misaligned(lens, (0.0, 0.0), (-angle, 0.0)), FreeSpace(f * math.cos(angle))]

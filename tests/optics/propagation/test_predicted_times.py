@@ -9,7 +9,7 @@ import optics
 
 
 def random_passage(rng):
-    """A field, and the settings of its propagation to a window of another size, pitch and centre."""
+    """Return a random field, and settings for its propagation to a window of another size, pitch and centre."""
     n, m = (int(2 ** rng.uniform(6, 9.5)) for _ in range(2))
     dx, side = 10 ** rng.uniform(-6, -5), np.arange(n) - n // 2
     settings = {

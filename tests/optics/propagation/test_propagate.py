@@ -15,7 +15,9 @@ def gaussian(n: int, dx: float, waist: float) -> np.ndarray:
 
 
 def gaussian_beam(r: np.ndarray, z: float, waist: float) -> np.ndarray:
-    """Paraxial beam with carrier (Siegman, Lasers, §17.1): 1/(1 + iz/z_R) exp(ikz - r²/(w₀²(1 + iz/z_R)))."""
+    """Return the paraxial beam 1/(1 + iz/z_R) exp(ikz - r²/(w₀²(1 + iz/z_R))), including the carrier (Siegman, Lasers,
+    §17.1).
+    """
     spread = 1 + 1j * z / (np.pi * waist**2 / WAVELENGTH)
     return np.exp(2j * np.pi * z / WAVELENGTH - r**2 / (waist**2 * spread)) / spread
 
@@ -38,7 +40,9 @@ def test_fresnel_is_the_gaussian_beam_in_amplitude_and_phase(dtype, bound, dista
 
 
 def test_angular_spectrum_departs_from_the_paraxial_beam_like_the_fourth_power_of_the_angle():
-    """Leading term of the phase error: kzθ⁴/8, so at a fixed distance half the waist gives 2⁴ times the error."""
+    """The leading term of the phase error is kzθ⁴/8. At a fixed distance, half the waist therefore gives 2⁴ times the
+    error.
+    """
     departures = []
     for waist in (4e-6, 2e-6):
         u = gaussian(128, waist / 8, waist)
@@ -49,7 +53,9 @@ def test_angular_spectrum_departs_from_the_paraxial_beam_like_the_fourth_power_o
 
 
 def test_on_axis_intensity_behind_a_circular_aperture_where_fresnel_says_darkness():
-    """a = 20 µm, z = 40 µm: exact 3.474 (Osterberg & Smith), paraxial 0.000."""
+    """For a radius of 20 µm and a distance of 40 µm, the intensity is 3.474 (Osterberg & Smith), and 0 in paraxial
+    theory.
+    """
     exact = reference.circular_aperture_on_axis(20e-6, 40e-6, WAVELENGTH)
     assert exact == pytest.approx(3.474, abs=5e-4)
     dx = 0.125e-6
@@ -71,7 +77,7 @@ def test_psf_gives_the_same_on_axis_intensity_to_its_tolerance():
 
 
 def random_field(n: int, cut: int, seed: int) -> np.ndarray:
-    """Band-limited random field under a Gaussian, so that it stays inside its window."""
+    """Return a band-limited random field times a Gaussian, so that it stays inside its window."""
     rng = np.random.default_rng(seed)
     spectrum = np.zeros((n, n), complex)
     block = rng.normal(size=(2 * cut + 1, 2 * cut + 1)) + 1j * rng.normal(size=(2 * cut + 1, 2 * cut + 1))
@@ -105,8 +111,9 @@ def test_backwards_undoes_forwards():
 
 
 def test_tilted_light_walks_to_the_side_it_is_tilted_to():
-    """exp(+2πi fx x) leaves towards +x by z tan θ, sin θ = λ fx: the test covers the sign, the axis, and the tangent
-    instead of the sine."""
+    """A field exp(+2πi fx x) moves towards +x by z tan θ, where sin θ = λ fx. The test fails for a wrong sign or axis,
+    and for the sine instead of the tangent.
+    """
     n, dx, sine = 128, 0.25e-6, 0.6
     x = (np.arange(n) - n // 2) * dx
     u = gaussian(n, dx, 4e-6) * np.exp(2j * np.pi * sine / WAVELENGTH * x)[None, :]
@@ -127,7 +134,7 @@ def test_output_pitch_and_window_sample_the_same_field():
 
 
 def test_evanescent_waves_decay_and_do_not_return():
-    """A grating of period λ/2 in a Gaussian: its orders are evanescent, decaying by exp(-2πz √3 / λ)."""
+    """The orders of a grating of period λ/2 are evanescent, and decay like exp(-2πz √3 / λ)."""
     n, dx = 256, 62.5e-9
     x = (np.arange(n) - n // 2) * dx
     u = gaussian(n, dx, 3e-6) * np.cos(2 * np.pi * 2 / WAVELENGTH * x)[None, :]
@@ -196,7 +203,9 @@ def test_a_window_off_the_axis_shows_what_a_larger_one_does():
 
 
 def test_darkness_around_the_light_costs_nothing():
-    """A field in a wide dark frame gives the same image and the same period as the field alone."""
+    """A field within a wide dark frame is computed with the same period, and gives the same image, as the field
+    alone.
+    """
     u = gaussian(48, 0.5e-6, 4e-6)
     settings = {"dx": 0.5e-6, "wavelength": WAVELENGTH, "distance": 80e-6, "out_shape": (40, 40), "tolerance": 1e-5}
     framed = optics.propagate(np.pad(u[None], ((0, 1), (100, 100), (60, 61))), **settings)
@@ -207,7 +216,7 @@ def test_darkness_around_the_light_costs_nothing():
 
 
 def test_evanescent_power_is_the_given_fields_whatever_becomes_of_it():
-    """It is computed on request, when the array may already hold other values."""
+    """The evanescent power is computed on request, when the user's array may already contain other values."""
     waist, dx = 0.2 * WAVELENGTH, WAVELENGTH / 20
     u = gaussian(81, dx, waist)
     result = optics.propagate(u, dx=dx, wavelength=WAVELENGTH, distance=0.5e-6, tolerance=2e-2)
@@ -217,7 +226,9 @@ def test_evanescent_power_is_the_given_fields_whatever_becomes_of_it():
 
 @pytest.mark.parametrize("size", [1e-23, 1e20])
 def test_faint_and_bright_fields_are_carried_alike(size):
-    """Powers of these fields exceed the range of float32, but propagation is linear."""
+    """The powers of these fields are outside the range of float32. This has no effect, because propagation is
+    linear.
+    """
     x = (np.arange(48) - 24) * 1e-6
     u = np.exp(-np.add.outer(x**2, x**2) / 8e-6**2).astype(complex)
     plain, scaled = (optics.propagate(f * u, dx=1e-6, wavelength=5e-7, distance=1e-4) for f in (1.0, size))

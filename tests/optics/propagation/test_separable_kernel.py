@@ -19,14 +19,16 @@ WAVELENGTH = 633e-9
 
 
 def tilted(n, dx, waist, sines):
-    """A Gaussian with a random phase of low order, tilted towards a window."""
+    """Return a Gaussian with a random phase of low order, which travels obliquely towards a window."""
     x = (np.arange(n) - n // 2) * dx
     shape = np.exp(-(np.add.outer(x**2, x**2) / waist**2) + 2j * np.outer(x, x**2) / waist**3)
     return shape * np.exp(2j * np.pi * (sines[0] * x[None, :] + sines[1] * x[:, None]) / WAVELENGTH)
 
 
 def direct_sum(u, dx, z, x, y):
-    """Rayleigh-Sommerfeld's first integral over the samples, at points (x, y), without a matrix or a transform."""
+    """Return the first Rayleigh-Sommerfeld integral over the samples at points (x, y), without a matrix or a
+    transform.
+    """
     at, k = (np.arange(len(u)) - len(u) // 2) * dx, 2 * np.pi / WAVELENGTH
     found = []
     for px, py in zip(x, y, strict=True):
@@ -63,7 +65,9 @@ def test_the_direct_sum_is_met_to_the_predicted_error(name, tolerance, dtype):
 
 
 def test_the_paraxial_kernel_is_wrong_where_the_separable_kernel_is_right():
-    """20 mm beside the axis at 0.3 m: Fresnel's phase k ρ⁴/8z³ moves light by ρ³/2z² = 44 µm, 4 samples."""
+    """The phase k ρ⁴/8z³ that Fresnel neglects displaces light by ρ³/2z² = 44 µm (4 samples) at a distance of 0.3 m, 20
+    mm off the axis.
+    """
     n, dx, z, out_dx, shape, centre = CASES["0.3 m, oblique"]
     u = tilted(n, dx, n * dx / 6, (0.06, 0.08))
     settings = {"dx": dx, "wavelength": WAVELENGTH, "distance": z, "out_dx": out_dx, "out_shape": shape}
@@ -73,7 +77,7 @@ def test_the_paraxial_kernel_is_wrong_where_the_separable_kernel_is_right():
 
 @pytest.mark.parametrize("distance", [2.0, -2.0])
 def test_a_tilted_gaussian_beam_lands_beside_the_axis(distance):
-    """The paraxial beam (Siegman, Lasers, §17.1) of a tilt sin θ = λf is displaced by λfz."""
+    """The paraxial beam (Siegman, Lasers, §17.1) with the tilt sin θ = λf is displaced by λfz."""
     n, dx, waist, f = 96, 20e-6, 0.25e-3, np.array([15e3, -8e3])
     x = (np.arange(n) - n // 2) * dx
     u = np.exp(-np.add.outer(x**2, x**2) / waist**2 + 2j * np.pi * np.add.outer(f[1] * x, f[0] * x))
@@ -90,7 +94,7 @@ def test_a_tilted_gaussian_beam_lands_beside_the_axis(distance):
 
 @pytest.mark.parametrize("paraxial", [False, True])
 def test_transforms_and_products_give_the_same_field(paraxial):
-    """Both are exact in amplitude and phase, so they may differ by their predicted errors."""
+    """Both are exact in amplitude and phase, so they differ at most by their predicted errors."""
     source, window = Grid((64, 50), 4e-6), Grid((40, 60), 12e-6, (1e-3, -0.6e-3))
     passage = Passage(WAVELENGTH, 60e-3, paraxial, EVERYTHING, WRAP_RIPPLE_PER_TOLERANCE * 1e-7, window.centre)
     u = tilted(64, 4e-6, 40e-6, (0.016, -0.01))[:, 7:57]
@@ -103,7 +107,9 @@ def test_transforms_and_products_give_the_same_field(paraxial):
 
 
 def test_each_term_divides_the_error():
-    """The coupling of x and y is a phase of 0.8 rad here, so errors of the kernel fall like those of exp's series."""
+    """The phase that couples x and y is 0.8 rad here, so the error of the kernel falls with the number of terms like
+    that of the exponential series.
+    """
     source, window = Grid((96, 96), 10e-6), Grid((512, 512), 2e-4, (30e-3, -20e-3))
     passage = Passage(WAVELENGTH, 5.0, False, EVERYTHING, 1e-9, window.centre)
     errors = {}

@@ -56,8 +56,9 @@ def test_a_pupil_and_free_space_are_psf(name, dtype, tolerance):
 
 
 def test_two_apertures_converge_spectrally_to_two_exact_integrals():
-    """Each requested digit is obtained through two hard edges: Rayleigh-Sommerfeld's integral of the reference's
-    field."""
+    """Each requested digit is obtained behind two hard edges. The reference is the Rayleigh-Sommerfeld integral of the
+    field on the second aperture.
+    """
     (a, z), (b, y) = (10e-6, 60e-6), (8e-6, 50e-6)
     nodes = optics.Circle().nodes(30.0, 9.0)
     at_nodes = reference.ideal_lens_profile(b, WAVELENGTH, a, distance=z)(b * np.hypot(nodes.x, nodes.y))
@@ -75,7 +76,7 @@ def test_two_apertures_converge_spectrally_to_two_exact_integrals():
 
 
 def test_two_halves_are_a_whole():
-    """Free space adds up, so a wide open pupil between the halves makes a plane of its own."""
+    """Adjacent free spaces are combined. A wide open pupil between the halves makes them separate."""
     whole = propagate_through([FreeSpace(200e-6)], OBJECT, **SETTINGS)
     half = propagate_through([FreeSpace(100e-6), Pupil(40e-6), FreeSpace(100e-6)], OBJECT, **SETTINGS)
     assert len(half.steps) == 2
@@ -103,8 +104,9 @@ def test_a_relief_of_the_mediums_index_changes_nothing():
 
 
 def test_a_relay_of_two_lenses_inverts_its_object():
-    """4-f: -u(-x) e^{4ikf} paraxially, (1/iλf)² = -1/(λf)². Rays from x at angle θ depart from that by a phase of order
-    k x² θ²/f."""
+    """A relay of length 4f gives -u(-x) e^{4ikf} in paraxial theory, with the sign of (1/iλf)². Rays from x at the
+    angle θ deviate by a phase of order k x² θ²/f.
+    """
     focal_lengths, errors = np.array([75e-6, 150e-6]), []
     for f in focal_lengths:
         lens = Pupil(0.3 * f, thin_lens_focal_length=f)
@@ -126,7 +128,9 @@ def test_backwards_undoes_forwards():
 
 
 def test_what_decays_does_not_come_back():
-    """g (1 + cos 2πfx), f = 1.5/λ: two orders of amplitude 1/2 are evanescent, 1/3 of the power; 2 µm remove them."""
+    """The field is g (1 + cos 2πfx) with f = 1.5/λ. Its two orders of amplitude 1/2, with 1/3 of the power, are
+    evanescent, and vanish within 2 µm.
+    """
     n, dx = 128, 0.1e-6
     x = (np.arange(n) - n // 2) * dx
     smooth = np.exp(-(x[None, :] ** 2 + x[:, None] ** 2) / (1.2e-6) ** 2)
@@ -180,8 +184,9 @@ def test_a_shape_may_be_an_array():
 
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-10, 1e-11])
 def test_behind_a_disk_light_on_the_axis_is_two_waves_to_the_last_digits(tolerance):
-    """Rayleigh-Sommerfeld's integral over a disk, e^{ikz} - z/s e^{iks}, s² = z² + R². Edges are at most as soft as
-    1e-13, without an error about a ripple that the user did not set."""
+    """The Rayleigh-Sommerfeld integral over a disk is e^{ikz} - z/s e^{iks} with s² = z² + R². The ripple of the soft
+    edge is limited to 1e-13, so that no error mentions a ripple that the user did not set.
+    """
     radius, z, k = 10e-6, 60e-6, 2 * np.pi / WAVELENGTH
     where = {"out_dx": 1e-6, "out_shape": (9, 9), "wavelength": WAVELENGTH}
     seen = propagate_through([Pupil(radius), FreeSpace(z)], **where, tolerance=tolerance, dtype="float64")
@@ -210,7 +215,7 @@ def test_derivatives_are_refused_not_dropped():
 
 @pytest.mark.parametrize("distance", [np.inf, 0.1])
 def test_numbers_of_drjit_are_plain_numbers_of_a_source(distance):
-    """Derivatives are refused, also of a source at a finite distance from a decentred pupil."""
+    """Numbers with derivatives are refused, also for a source at a finite distance from a decentred pupil."""
     import drjit as dr
 
     from optics.numerics.precision import precision
@@ -240,7 +245,9 @@ LENS_TRAIN = [
 
 
 def test_loose_tolerances_take_fewer_samples_and_keep_their_predictions():
-    """The light that few diffracted frequencies carry is that of a tight tolerance, to within the predicted error."""
+    """Fewer diffracted frequencies are included with a loose tolerance. The result agrees with that of a tight
+    tolerance to within the predicted error.
+    """
     where = {"wavelength": 550e-9, "out_dx": 1e-6, "out_shape": (96, 96)}
     tight, loose, looser = (
         propagate_through(LENS_TRAIN, **where, tolerance=tolerance) for tolerance in (1e-3, 1e-2, 0.05)
@@ -254,7 +261,9 @@ def test_loose_tolerances_take_fewer_samples_and_keep_their_predictions():
 
 @pytest.mark.slow
 def test_light_outside_both_margins_is_in_the_prediction():
-    """Without the allowance, opposite rims of these lenses would exceed the prediction by 7 %."""
+    """Light from the rims of these lenses leaves the window on both sides. If only one side were included, the error
+    would exceed the prediction by 7 %.
+    """
     aberrations = optics.Zernike({(2, 2): -0.0547, (3, 1): -0.1252, (4, 0): 0.0333})
     system = [
         Pupil(0.1684e-3, thin_lens_focal_length=3.805e-3, wavefront=aberrations), FreeSpace(1.424e-3),

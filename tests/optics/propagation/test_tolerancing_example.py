@@ -11,12 +11,14 @@ SCRIPT = Path(__file__).parents[3] / "examples" / "08_tolerancing.py"
 
 
 def aligned(example, shift):
-    """The lens without errors except of the last distance."""
+    """Return the lens with an error of the last distance only."""
     return example["system"](np.zeros((3, 2)), np.zeros((3, 2)), np.array([0.0, 0.0, shift]))
 
 
 def exit_pupil(example):
-    """Radius of the first lens' image through the other lenses, and its distance from the focus."""
+    """Return the radius of the exit pupil, which is the image of the first lens by the other lenses, and its distance
+    from the focus.
+    """
     radius, behind = example["RADIUS"], 0.0
     for f, spacing in zip(example["FOCAL_LENGTHS"][1:], example["SPACINGS"], strict=True):
         before = spacing - behind
@@ -26,9 +28,10 @@ def exit_pupil(example):
 
 
 def test_defocus_lowers_the_peak_as_in_closed_form():
-    """A cone of light has the radius h at the exit pupil, at a distance z before the focus. On the axis, its intensity
-    at z' is (z/z')² sinc²(W/λ) with W = h² (1/z - 1/z')/2 (Born & Wolf, §8.8). The rims of the other
-    lenses diffract a few percent."""
+    """The light converges from the exit pupil of radius h to the focus at the distance z. On the axis at the distance
+    z', the intensity is (z/z')² sinc²(W/λ) with W = h² (1/z - 1/z')/2 (Born & Wolf, §8.8). The rims of the other lenses
+    diffract a few percent.
+    """
     example = runpy.run_path(str(SCRIPT))
     (radius, near), shifts = exit_pupil(example), np.array([0.0, 7e-3, -7e-3])
     peaks = np.array([example["peak"](aligned(example, shift)) for shift in shifts])

@@ -34,7 +34,7 @@ def noise(n, dx, radius):
 
 
 def carried(u, dx, z, window, spare, paraxial):
-    """The field in the window, and the relative error of its intensity predicted by `blurred_back`."""
+    """Return the field in the window, and the relative error of its intensity that `blurred_back` predicts."""
     how = sampling(Passage(WAVELENGTH, z, paraxial, EVERYTHING, 3e-6, window.centre), Grid(u.shape, dx), window, spare)
     assert how.passage.band == EVERYTHING  # otherwise nothing would be cut off
     period, n, m = how.period, u.shape[0], window.shape[0]
@@ -73,8 +73,9 @@ class TestBlur:
 
     @pytest.mark.slow
     def test_falls_with_the_room(self):
-        """The error falls like 1 / padding far away; the nearest light of a 130 µm source and a 120 µm window is
-        closer."""
+        """The error falls like 1 / padding if the padding is wide. For a source of 130 µm and a window of 120 µm, the
+        nearest repeated light is closer than that.
+        """
         u, window = disk(215, 0.47e-6, 50e-6), Grid((129, 129), 0.94e-6)
         said = [carried(u, 0.47e-6, 200e-6, window, room, True)[1] for room in (200e-6, 400e-6, 800e-6)]
         assert 1.4 < said[0] / said[1] < 2
@@ -97,7 +98,9 @@ class TestBlur:
 
 
 def test_no_room_where_none_would_do():
-    """White noise has much light at Nyquist's frequency, so its blur reflects the limited accuracy of such samples."""
+    """White noise has much light at the Nyquist frequency. More padding cannot reduce its error, because the samples
+    themselves do not determine the field.
+    """
     dx, z, window = 0.47e-6, 200e-6, Grid((129, 129), 0.94e-6)
     u = noise(213, dx, 50e-6)
     settings = {"dx": dx, "wavelength": WAVELENGTH, "distance": z, "out_dx": window.dx, "out_shape": window.shape}

@@ -43,7 +43,7 @@ def test_white_in_daylight_gives_one(bands):
 
 
 def test_bands_converge_in_second_order():
-    """A smooth reflectance in n bands: half the bands' width gives a quarter of the error."""
+    """For a smooth reflectance, bands of half the width have a quarter of the error."""
 
     def catch(bands):
         spectral = SpectralBands.uniform(bands)
@@ -57,7 +57,7 @@ def test_bands_converge_in_second_order():
 
 
 def test_channels_tell_colours_apart():
-    """Red, green and blue lights each excite their own channel most."""
+    """Red, green and blue light each give the largest signal in the channel of this colour."""
     spectral = SpectralBands.uniform(15)
     strongest = [
         np.argmax(spectral.weights[:, np.argmin(np.abs(spectral.wavelengths - nm))]) for nm in (640e-9, 530e-9, 440e-9)
@@ -82,8 +82,9 @@ def scene_signal(bands, reflectance):
 
 @pytest.mark.parametrize("tolerance", [0.1, 0.02, 0.005, 0.002])
 def test_bands_for_a_tolerance_against_64(tolerance):
-    """Reflectances of one cycle over the visible range, with all phases: the bands are within the tolerance, and half
-    the number is not."""
+    """The reflectances are sinusoids of one cycle over the visible range, with all phases. The chosen bands are
+    accurate enough, and half as many are not.
+    """
     chosen = choose_bands(tolerance)
     count, fine = len(chosen.wavelengths), SpectralBands.uniform(64)
 
@@ -103,7 +104,7 @@ def test_more_bands_for_a_smaller_tolerance():
 
 
 def test_coloured_blur_needs_more_bands():
-    """A kernel that moves from cell to cell as the wavelength grows: bands must resolve the movement."""
+    """The kernel moves from cell to cell with increasing wavelength. The bands must resolve this movement."""
 
     def hopping(wavelengths):
         kernels = np.zeros((len(wavelengths), 1, 41))
@@ -178,7 +179,7 @@ class TestLightInBands:
 
 
 def test_an_error_of_reflectances_is_the_worst_channels():
-    """The error of the wrong one of two channels is reported, although the other one is right."""
+    """The error of one of two channels is reported, although the other channel has none."""
     wavelengths = np.linspace(410e-9, 690e-9, 8)
     weights = np.vstack([np.full(8, 0.1), np.linspace(0.0, 0.2, 8)])
     exact = SimpleNamespace(wavelengths=wavelengths, weights=weights)

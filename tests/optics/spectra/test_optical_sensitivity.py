@@ -13,12 +13,12 @@ BEE = {"diameter": 20e-6, "focal_length": 66e-6, "receptor": 66e-6 * math.radian
 
 
 def test_the_sensitivity_of_a_honeybee_is_the_published_one():
-    """Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1: 0.11 µm² sr."""
+    """The published value is 0.11 µm² sr (Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1)."""
     assert optical_sensitivity(**BEE) * 1e12 == pytest.approx(0.11, abs=0.005)
 
 
 def test_without_a_length_it_is_the_etendue_of_a_round_receptor():
-    """Pupil area times solid angle of the receptor, π/4 D² · π/4 (d/f)²."""
+    """The étendue is the area of the pupil times the solid angle of the receptor, π/4 D² · π/4 (d/f)²."""
     area, angle = math.pi / 4 * 20e-6**2, math.pi / 4 * math.radians(1.75) ** 2
     assert optical_sensitivity(20e-6, 66e-6, BEE["receptor"]) == pytest.approx(area * angle)
 

@@ -17,7 +17,9 @@ def white(eye, samples, size):
 
 
 def test_daylight_carries_the_published_number_of_photons():
-    """Sunlight: 54 lx per µmol/m²/s between 400 and 700 nm (Thimijan & Heins 1983, HortScience 18:818)."""
+    """Sunlight of 54 lx has 1 µmol/m²/s of photons between 400 and 700 nm (Thimijan & Heins 1983, HortScience
+    18:818).
+    """
     wavelengths = np.arange(400, 701) * 1e-9
     energy = 6.62607015e-34 * 299792458.0 / wavelengths
     flux = float(np.sum(BRIGHT.spectral_irradiance * daylight(wavelengths) / energy)) * 1e-9
@@ -50,7 +52,7 @@ def test_photons_are_proportional_to(field):
 
 
 def test_photons_grow_with_the_receptor_and_fall_with_the_focal_length():
-    """Land's (D d / f)²; the number of bands has no effect."""
+    """The number of photons is proportional to (D d / f)² (Land). The number of bands has no effect."""
     eye = Eye(photon_budget=BRIGHT)
     np.testing.assert_allclose(replace(eye, bands=16).photons, eye.photons)
     np.testing.assert_allclose(replace(eye, resolution=(30, 30)).photons, eye.photons / 4)
@@ -63,8 +65,9 @@ def test_photons_grow_with_the_receptor_and_fall_with_the_focal_length():
 @pytest.mark.parametrize("radius", [50e-6, 25e-6])
 @pytest.mark.parametrize("time", [1e-5, 4e-5])
 def test_variance_is_the_mean_over_the_photons(radius, time):
-    """Poisson: var = mean / N in signal units, so that the relative noise falls with a and with √Δt. A Gaussian of
-    fixed width would have the same variance in all four cases."""
+    """The variance of a signal is its mean divided by N (Poisson distribution). The relative noise is therefore
+    proportional to 1/a and to 1/√Δt. A Gaussian of fixed width would have the same variance in all four cases.
+    """
     budget = PhotonBudget(illuminance=1e3, integration_time=time)
     lens = Pupil(radius, thin_lens_focal_length=Eye().sensor_distance)
     eye = Eye(lens, (40, 40), noise_sigma=0.0, photon_budget=budget)

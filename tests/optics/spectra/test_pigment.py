@@ -10,18 +10,20 @@ NM = np.arange(300.0, 780.0, 0.1)
 
 
 def alpha_band(sensitivity, peak_nm):
-    """Wavelengths from the long-wave foot to the point where the β band becomes significant."""
+    """Return the wavelengths from the long-wave end of the α band to those at which the β band becomes significant."""
     return (peak_nm * 0.93 < NM) & (sensitivity > 0.02)
 
 
 def stavenga_1993(nm, peak_nm, a0, a1):
-    """Stavenga, Smits & Hoenders (1993), Vision Research 33:1011, eq. 2: the α band as a modified lognormal."""
+    """Return the α band, a modified lognormal function (Stavenga, Smits & Hoenders 1993, Vision Research 33:1011, eq.
+    2).
+    """
     x = np.log10(nm / peak_nm)
     return np.exp(-a0 * x**2 * (1 + a1 * x + 3 / 8 * (a1 * x) ** 2))
 
 
 def lamb_1995(nm, peak_nm):
-    """Lamb (1995), Vision Research 35:3083, eq. 2': A1 pigments."""
+    """Return the template for A1 pigments of Lamb (1995), Vision Research 35:3083, eq. 2'."""
     x = peak_nm / nm
     return 1 / (np.exp(70 * (0.880 - x)) + np.exp(28.5 * (0.924 - x)) + np.exp(-14.1 * (1.104 - x)) + 0.655)
 
@@ -37,7 +39,9 @@ def test_the_alpha_band_peaks_at_one_where_it_says(peak_nm, chromophore):
 
 @pytest.mark.parametrize("peak_nm", [500.0, 530.0, 560.0])
 def test_a1_is_lambs_template_where_both_hold(peak_nm):
-    """They differ by the refit alone: 2 % of the peak (A2's parameters have an error of 10 %)."""
+    """The two templates have the same form, and differ by 2 % of the peak because their parameters were fitted to other
+    data. (The parameters of A2 would give an error of 10 %.)
+    """
     ours = pigment_absorptance(NM * 1e-9, peak_nm * 1e-9)
     band = alpha_band(ours, peak_nm)
     assert np.abs(ours - lamb_1995(NM, peak_nm))[band].max() < 0.02
@@ -63,7 +67,9 @@ def test_alpha_bands_are_those_of_stavenga(peak_nm, chromophore, a0, a1, least):
     ("chromophore", "height", "centre"), [("A1", 0.26, 189 + 0.315 * 560), ("A2", 0.37, 216.7 + 0.287 * 560)]
 )
 def test_the_beta_band_is_a_gaussian_of_the_published_height_and_place(chromophore, height, centre):
-    """Far below the α band of a 560 nm pigment nothing else absorbs: eqs. 5a and 8a by hand."""
+    """Far below the α band of a pigment of 560 nm, only the β band absorbs. The expected values follow from eqs. 5a and
+    8a by hand.
+    """
     at = pigment_absorptance(np.array([centre]) * 1e-9, 560e-9, chromophore)[0]
     alpha_foot = 0.09  # of the α band there, at most
     assert height <= at <= height + alpha_foot

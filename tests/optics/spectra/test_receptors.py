@@ -12,7 +12,9 @@ BAYER = ((0, 1), (1, 2))
 
 
 def test_the_default_is_three_rgb_like_channels_from_400_to_700_nm():
-    """All digits agree: pigments of 600, 520 and 460 nm, trapezoids of 1 nm, linear between the bands' centres."""
+    """All digits agree with an independent sum: pigments of 600, 520 and 460 nm, steps of 1 nm, and values that are
+    linear between the centres of bands.
+    """
     bands = SpectralBands.uniform(4)
     nm = np.arange(400.0, 700.5)
     catch = np.stack(
@@ -77,7 +79,7 @@ def test_a_measured_sensitivity_is_as_good_as_the_pigment_it_samples():
 
 
 def scene(eye, samples, seed=0):
-    """Random patches of light, each a receptor wide, and a margin for the kernel."""
+    """Return a scene of random patches, each as wide as a receptor, with a margin for the kernel."""
     height, width = (n + 8 for n in eye.resolution)
     patches = np.random.default_rng(seed).uniform(0.1, 1.0, (eye.bands, height, width))
     return patches.repeat(samples, axis=1).repeat(samples, axis=2)
@@ -161,7 +163,9 @@ def test_pigments_of_both_chromophores_differ():
 
 
 def test_derivatives_flow_through_a_mosaic():
-    """d signal / d radius of every receptor's own type, backward, against central differences (error O(step⁴))."""
+    """The derivatives of all signals with respect to the radius, in backward mode, agree with central differences
+    (error O(step⁴)).
+    """
     import drjit as dr
 
     from optics.numerics.precision import precision

@@ -16,7 +16,7 @@ def colour():
 
 
 def at(distribution, nm):
-    """Values of one of colour-science's tables at wavelengths that it holds."""
+    """Return the values of a table of colour-science at wavelengths that it contains."""
     return np.array([distribution[float(x)] for x in nm])
 
 
@@ -42,8 +42,7 @@ def test_reflectances_are_those_of_colour_science(colour):
 
 @pytest.mark.filterwarnings("ignore")
 def test_cone_fundamentals_are_those_of_colour_science(colour):
-    """colour-science's tables are in units of energy: quantal ones are lower by the factor λ, and have a peak of 1
-    again."""
+    """The tables of colour-science refer to energy. Divided by λ, and scaled to a peak of 1, they refer to photons."""
     theirs = colour.MSDS_CMFS["Stockman & Sharpe 2 Degree Cone Fundamentals"]
     nm = np.arange(390.0, 781.0, 5.0)
     energy = np.array([theirs[float(x)] for x in nm])

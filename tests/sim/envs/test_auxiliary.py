@@ -28,8 +28,9 @@ class Told(Face):
 
 
 def met(model, data, eye, pupil, frame):
-    """Return the depth along the axis (0 for no hit) and the geom that MuJoCo's rays hit through the receptors'
-    centres.
+    """Return the depths along the axis (0 for no hit) and the ids of the geoms that MuJoCo's rays hit.
+
+    The rays pass through the receptors' centres.
     """
     geom, centres = np.zeros(1, np.int32), directions_of(eye, receptor_centres(eye))
     found = []

@@ -246,7 +246,7 @@ def test_renderers_take_the_materials_of_datas_own_models():
             {"thing.material": ("plain", "stripes"), "thing.size": (1, 2)},
             "thing.size: must be a sphere, .* without a t",
         ),
-        ({"floor.material": ("plain",)}, "floor.material: the geom's own rgba takes the place of its materials'"),
+        ({"floor.material": ("plain",)}, "floor.material: the geom's own rgba replaces the colours of its materials"),
     ],
 )
 def test_what_cannot_differ_is_refused(vary, said):

@@ -53,7 +53,9 @@ def test_everybody_is_told_how_the_world_differs():
 
 
 def test_it_is_the_world_that_one_of_them_learns_in(env):
-    """The learner has the same observations, bit for bit, with the same seed and actions."""
+    """The learner has the same observations, bit for bit, as in the environment for one learner with the same seed and
+    actions.
+    """
     env.reset(seed=5)
     alone = sim.make_vec_env(hunt().alone("Prey", {"Predator": lambda seen: np.array([[0.3, -0.4]])}), n_envs=1, seed=5)
     alone.reset()

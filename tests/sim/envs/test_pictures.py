@@ -1,4 +1,4 @@
-"""Renderings for people through stable-baselines3's `render`, its wrappers, and PettingZoo."""
+"""Images for human viewers, from stable-baselines3's `render` and its wrappers, and from PettingZoo."""
 
 import numpy as np
 import pytest

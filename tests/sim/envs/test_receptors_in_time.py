@@ -45,7 +45,9 @@ def test_receptors_without_memory_see_as_without_dynamics():
 
 
 def test_the_observation_is_the_filtered_light_of_all_frames():
-    """An independent sum: the impulse response, integrated over frames, times the signals at each frame."""
+    """The reference is an independent sum over frames: the integral of the impulse response over a frame, times its
+    signals.
+    """
     task = task_of(sim.build_world("detection"), "training", eyes=eyes(None), fidelity=RAYS)
     renderer = sim.BatchedRenderer(task.world, eyes(None), 2, RAYS)
     light = []
@@ -94,7 +96,9 @@ def test_a_stored_state_contains_the_receptors(dynamics):
 
 
 def test_photons_are_counted_once():
-    """Shot noise after a slow filter: its variance follows from 1/∫h², and not from the integration time as well."""
+    """Behind a slow filter h, the variance of shot noise follows from ∫h² alone. It must not be reduced by the
+    integration time as well.
+    """
     budget = optics.PhotonBudget(30.0, 0.02)
     pupil = optics.Pupil(20e-6, thin_lens_focal_length=240e-6)
     for tau in (400.0, 1600.0):

@@ -141,7 +141,7 @@ def test_who_sleeps_is_in_no_state():
     sleepy = sim.make_vec_env(task, n_envs=1)
     sleepy.reset()
     for ask in (sleepy.get_state, lambda: sleepy.set_state({})):
-        with pytest.raises(RuntimeError, match="get_state: the model has <flag sleep>, which no state contains"):
+        with pytest.raises(RuntimeError, match="get_state: the model enables <flag sleep>, which no state contains"):
             ask()
 
 

@@ -67,7 +67,9 @@ def test_peaks_that_are_not_the_receptors_are_refused(count, peaks, words):
 
 @pytest.mark.parametrize("wrong", [-1.0, 0.0, np.inf, 550e-9, *(-(10 ** np.random.default_rng(6).uniform(-9, 3, 3)))])
 def test_wavelengths_are_nanometres(wrong):
-    """Metres round to the same channel, so that the former message spoke of distinct wavelengths. -1 was accepted."""
+    """Wavelengths in metres round to the same name of a channel. An earlier version therefore stated that wavelengths
+    must differ, and it accepted -1.
+    """
     says = r"must be finite numbers in nanometres \(550, not 550e-9\)"
     with pytest.raises(ValueError, match=f"View 'eye': wavelengths_nm = .*{says}"):
         View("eye", np.array([wrong, 650e-9]), np.ones((2, 2, 2)))

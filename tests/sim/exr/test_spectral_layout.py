@@ -80,7 +80,7 @@ def test_spectra_of_other_programs_are_read(tmp_path, quantity, label, seed):
 
 
 def test_light_and_surfaces_of_one_file(tmp_path):
-    """A light may stand in front of a surface, in the same part or in parts of their own."""
+    """A file may contain both radiance and reflectance, in the same part or in separate parts."""
     rng = np.random.default_rng(5)
     light, surface = rng.random((2, 3, 2, 4), dtype=np.float32)
     glow, matt = ([f"{quantity}.{nm},0nm" for nm in (450, 550, 650)] for quantity in ("S0", "T"))
@@ -167,7 +167,7 @@ def test_reflectance_round_trip(tmp_path):
 
 
 def test_reflectance_must_match():
-    with pytest.raises(ValueError, match=r"reflectance has shape .*: must have that of the radiance"):
+    with pytest.raises(ValueError, match=r"reflectance has shape .*: must have the shape of the radiance"):
         View("a", [500.0], np.ones((1, 2, 2)), reflectance=np.ones((1, 2, 3)))
     with pytest.raises(ValueError, match="one distinct wavelength per band"):
         View("a", [500.0, 600.0], reflectance=np.ones((1, 2, 2)))

@@ -19,8 +19,9 @@ NEAR, FAR = 0.3, 20.0  # [m]
 
 @pytest.fixture(scope="module")
 def close_by():
-    """Return a scene with an object at arm's length and others behind it, and an eye of a vertebrate's size in focus at
-    infinity. Light from NEAR is blurred over 1.7 receptors.
+    """Return a scene with an object at arm's length and others behind it, and an eye in focus at infinity.
+
+    The eye has the size of a vertebrate's. Light from the distance NEAR is blurred over 1.7 receptors.
     """
     eyes = sim.Eyes(2, (5, 21), fov_deg=12, placement_range_deg=40, sensor_width=2e-2, bands=1, noise_sigma=0)
     focus = eyes.eye().sensor_distance

@@ -38,8 +38,8 @@ def error(e, per_receptor, tolerance=None):
 
 @pytest.mark.parametrize(("pupil", "most"), [(focused(), 0.004), (prism(), 0.02)], ids=["focused", "prism"])
 def test_agrees_with_the_convolution(pupil, most):
-    """Error with one area per receptor, relative to the mean signal; 16 rays are allowed 0.01. The prism's light comes
-    from 1.5 receptors around each direction, and so varies within one area.
+    """The error with one area per receptor is relative to the mean signal. (With 16 rays, an error of 0.01 is allowed.)
+    The prism's light comes from 1.5 receptors around each direction, and so varies within one area.
     """
     assert error(eye(pupil=pupil), 1) < most
 
@@ -81,8 +81,8 @@ def test_areas_of_several_receptors_err_as_the_square_of_their_sides(a):
 
 
 def test_areas_are_shared_where_fields_are_twice_as_wide():
-    """Behind a pinhole, the field has about the pinhole's width; behind a lens in focus, a receptor's. The retina has
-    15 receptors.
+    """Behind a pinhole, a field is about as wide as the pinhole; behind a lens in focus, it is as wide as a receptor.
+    The retina has 15 receptors.
     """
     for pupil, width in ((optics.Pupil(0.3 * L / 2), 4.5), (optics.Pupil(0.9 * L / 2), 13.5), (focused(), 1.0)):
         sampling = sampling_of(eye((15, 15), pupil))

@@ -31,8 +31,9 @@ def focused(a=0.3):
 
 
 def prism(a=0.3):
-    """Return a glass wedge. Its PSF is off centre, so that a sensor with a flipped kernel would shift it to the other
-    side.
+    """Return a glass wedge, whose PSF is off centre.
+
+    A sensor with a flipped kernel would shift it to the other side.
     """
     slope = np.linspace(-1, 1, 65)
     return optics.Pupil(aperture_radius=a * L / 2, height=6e-6 * np.add.outer(0.5 * slope, slope), n=1.5)

@@ -192,7 +192,9 @@ def test_all_animals_are_those_of_optics():
 
 
 def test_near_edges_are_blurred_by_a_disk():
-    """A source at distance z fills a disk of angular diameter D/z, which an edge divides: t√(1 - t²) + asin t."""
+    """A point at the distance z is blurred to a disk with the angular diameter D/z. At an edge, the blurred light is
+    1/2 + (t√(1 - t²) + asin t)/π.
+    """
     edge = np.zeros((40, 60, 3))
     edge[:, 30:] = 1
     z, across = 8e-3, 1e-3

@@ -81,8 +81,11 @@ def references():
 
 @dataclasses.dataclass(frozen=True)
 class Disagreement:
-    """Largest |z| of an eye's mean over its image; share of receptors beyond 3 standard errors; largest relative error
-    of a band's share in an image's light. The last has hardly any noise in Mitsuba, because its bands share their rays.
+    """Differences from Mitsuba's renderings.
+
+    They are the largest |z| of an eye's mean over its image, the share of receptors beyond 3 standard errors, and the
+    largest relative error of a band's share in an image's light. The last one has hardly any noise in Mitsuba, because
+    its bands share their rays.
     """
 
     mean: float

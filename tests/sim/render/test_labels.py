@@ -1,6 +1,6 @@
 """Labels of each receptor: the geom that it sees, its optic flow, and their export as tensors.
 
-MuJoCo's own rays say which geom it is; closed forms say how what is seen moves on the retina.
+The references are MuJoCo's own rays for the geoms, and closed forms for the motion on the retina.
 """
 
 import mujoco
@@ -84,7 +84,7 @@ def wall():
 
 
 def closed_form(where, there):
-    """Return x f(X): the displacements (2, height, width) [receptors] of points (right, down, ahead) between two
+    """Return the displacements (2, height, width) [receptors] on the retina of points (right, down, ahead) between two
     states.
     """
     side = EYE.receptor_pitch / EYE.sensor_distance

@@ -58,8 +58,8 @@ def seen(posed, light="bounce", rays=RAYS):
 
 
 def test_light_that_is_reflected_twice_is_mitsubas(posed, truth):
-    """The means agree within 3 standard errors, from the scatter over receptors, which are some thousandths. Direct
-    light alone is noticed, and so is a reference without the second reflection.
+    """The means agree within 3 standard errors, which are a few thousandths and follow from the scatter over receptors.
+    The test fails for direct light alone, and for a reference without the second reflection.
     """
     found, once = seen(posed), seen(posed, "direct")
     error = (found - truth[3]).std(axis=(1, 2), ddof=1) / np.sqrt(truth[3][0].size)  # standard error of both sides

@@ -12,7 +12,9 @@ ALLOWED = 0.01
 
 
 def level(reached, missing, receptors=10, allowed=ALLOWED):
-    """The level for `receptors` receptors of three channels, of which `reached` lack `missing` in one channel."""
+    """Return the level of light that is chosen for receptors of three channels. In direct light, `reached` of them lack
+    the signal `missing` in one channel.
+    """
     bounce = np.full((1, 1, 3, 1, receptors), 0.5)
     bounce[:, :, 1, :, :reached] += missing
     bounce[:, :, 2, :, :reached] -= 0.3 * missing
@@ -32,7 +34,9 @@ def test_the_error_is_that_of_the_receptors_that_bounced_light_reaches(sign):
 
 
 def test_the_root_mean_square_counts():
-    """One receptor lacks 1.3 of the allowed error and another one 0.5: together they lack 0.985 of it."""
+    """One receptor has 1.3 times the allowed error, and another one 0.5 times. Their root mean square is 0.985 times
+    the allowed error.
+    """
     bounce = np.zeros((1, 1, 3, 1, 2))
     bounce[..., 0, :, 0], bounce[..., 0, :, 1] = 1.3 * ALLOWED, 0.5 * ALLOWED
     found = _light("auto", {lighting.BOUNCE: bounce, lighting.DIRECT: np.zeros_like(bounce)}.__getitem__, ALLOWED)

@@ -46,7 +46,7 @@ def signals(world, eye, mounts=HEAD, rays=2048):
 
 
 def of_mounts(world, ommatidium, degrees):
-    """Signals (channel, mount) of an eye with one receptor at each direction, relative to white, for HEAD unrolled."""
+    """Return the signals (channel, mount), relative to white, of mounts in these directions, each with one receptor."""
     guide, lens = ommatidium.rhabdom, ommatidium.pupil
     focal = ommatidium.rhabdom_distance * lens.index_before(550e-9) / lens.index_behind(550e-9)
     eye = optics.Eye(

@@ -49,7 +49,9 @@ def test_latency_delays_by_whole_frames():
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("ms", [2.0, 10.0])
 def test_the_variance_of_filtered_shot_noise_depends_on_the_filter_and_not_on_the_frames(order, ms):
-    """Var = s Δt / N ∫h², for N photons in the integration time Δt, in the limit of short frames."""
+    """For short frames and N photons in the integration time Δt, the variance of a signal s is s Δt / N ∫h², where h is
+    the impulse response.
+    """
     tau, s, photons, integration = 30.0, 0.5, 400.0, 20.0
     dynamics = ReceptorDynamics(tau, order)
     shot, rest = NoiseModel(0.0, np.full((1,), photons)).in_frames(ms / integration)
@@ -108,7 +110,9 @@ def test_events_count_changes_of_the_logarithm():
 
 
 def moving(detector, velocity, period=8.0, tau=40.0, ms=1.0, contrast=1.0):
-    """Mean output of detectors that see a grating which moves to the right at this velocity [receptors/s]."""
+    """Return the mean output of detectors that see a grating, which moves to the right at this velocity
+    [receptors/s].
+    """
     dynamics = ReceptorDynamics(1e-3, motion=detector, motion_ms=tau)
     cycle = 1e3 * period / abs(velocity) / ms
     t = ms * np.arange(int(math.ceil(12 * tau / ms / cycle + 4) * cycle)) * MS

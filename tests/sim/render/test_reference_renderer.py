@@ -80,9 +80,11 @@ def seen(request):
 
 @dataclasses.dataclass(frozen=True)
 class Disagreement:
-    """Share of receptors beyond 3 standard errors in any band; largest and root-mean-square |z| of image means. All
-    bands of a receptor share Mitsuba's samples. With bounced light, our samples are as random as Mitsuba's, and equal
-    in number.
+    """Differences from the reference.
+
+    They are the share of receptors beyond 3 standard errors in any band, and the largest and the root-mean-square |z|
+    of image means. All bands of a receptor share Mitsuba's samples. With bounced light, our samples are as random as
+    Mitsuba's, and equal in number.
     """
 
     beyond: float
@@ -98,8 +100,10 @@ class Disagreement:
 
     @property
     def significant(self):
-        """True beyond these limits: P(|t_11| > 3) = 1.2 %, and receptors at an edge add our own sampling error. Among
-        fourteen images, one |t_11| beyond 5 has p = 6e-3. Their root mean square is 1.1 ± 0.2.
+        """True if a difference is larger than chance explains.
+
+        By chance, |t| with 11 degrees of freedom exceeds 3 in 1.2 % of receptors, and receptors at an edge add our own
+        sampling error. One of fourteen images exceeds 5 with p = 6e-3. The root mean square of images is 1.1 ± 0.2.
         """
         return self.beyond > 0.04 or self.largest > 5 or self.usual > 1.8
 

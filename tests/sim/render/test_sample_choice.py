@@ -153,7 +153,7 @@ def test_what_cannot_be_lessened_costs_no_more_than_it_must():
 
 
 class FormulaTrials:
-    """Trials whose errors are formulas: of rays, rays / n; of areas, a floor plus areas / n."""
+    """Trials whose errors are formulas of the number n of samples: rays / n, and for areas a floor plus areas / n."""
 
     def __init__(self, rays, areas, floor):
         self._rays, self._areas, self._floor = rays, areas, floor

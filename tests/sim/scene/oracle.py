@@ -9,7 +9,8 @@ from optics.numerics.device import device
 def first_hits(model, data, position, rotation, fovy_deg, width, height, without_body=-1):
     """Return geom ids (y, x), -1 for none, and depth along the camera's axis [m], inf for none.
 
-    without_body: id of a body that rays ignore. rotation: MuJoCo's camera frame (x right, y up, looking along -z).
+    rotation: MuJoCo's camera frame (x right, y up, looking along -z)
+    without_body: id of a body that rays ignore
     """
     half = np.tan(np.radians(fovy_deg) / 2)
     y, x = np.indices((height, width))

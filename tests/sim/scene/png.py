@@ -11,7 +11,9 @@ KINDS = {1: 0, 2: 4, 3: 2, 4: 6}  # colour type by number of channels: grey, gre
 def png(pixels, bits=8, is_tagged=False):
     """Return a PNG (PNG specification, third edition, sections 5 and 11).
 
-    pixels: (height, width, channel) uint8 · bits: 8 or 16 per channel · is_tagged: whether it has an sRGB chunk
+    pixels: (height, width, channel) uint8
+    bits: 8 or 16 per channel
+    is_tagged: True for a file with an sRGB chunk
     """
     height, width, channels = pixels.shape
     values = (pixels.astype(">u2") * 257).astype(">u2") if bits == 16 else pixels

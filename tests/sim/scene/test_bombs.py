@@ -71,7 +71,7 @@ def test_what_a_file_includes_is_counted_too(tmp_path):
 
 @pytest.mark.parametrize("element", ["<include file='pipe'/>", "<asset><mesh name='a' file='pipe'/></asset>"])
 def test_pipes_in_the_place_of_files_are_refused(tmp_path, element):
-    """MuJoCo would wait for such a pipe forever."""
+    """MuJoCo would wait forever for someone to write into such a pipe."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "main.xml").write_text(f"<mujoco><compiler meshdir='.'/>{element}</mujoco>")
     with pytest.raises(ValueError, match=r"main.xml': (include|mesh) '.*pipe': must be a regular file"):

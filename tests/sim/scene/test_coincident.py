@@ -79,7 +79,7 @@ def model_of(first, last, seed, bodies):
 
 
 def views(model):
-    """Return red and blue light (2, y, x), and ids, of all paths to an image."""
+    """Return red and blue light (2, y, x), and ids, for each way to render an image."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     mirror = sim.mirror(model, data)

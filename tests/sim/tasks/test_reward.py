@@ -19,7 +19,9 @@ def test_the_formulas_weights_are_those_in_use():
 
 @pytest.mark.parametrize("mode", MODES)
 def test_terms_add_up_to_the_formula(mode):
-    """Metres count in proportion, and events count once; the cases have all four terms at once, and none."""
+    """The term for progress is proportional to the distance, and each event counts once. In one case all four terms
+    occur together, and in another one none.
+    """
     price, goal, adversary, contact = table()[mode]
     terms = reward_terms(MODES[mode], np.array([0.5, 0.0]), *np.array([[True, False]] * 3))
     assert terms.shape == (len(TERMS), 2)

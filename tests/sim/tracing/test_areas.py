@@ -97,7 +97,7 @@ def sums_off_by_a_stripe(monkeypatch):
 
 
 def no_filter(monkeypatch):
-    """A mutant that looks up textures in the middle of a patch, like a ray."""
+    """A mutant that reads the texture in the middle of a patch only, as for a ray."""
     right = stripes.Stripes.mean_over
     monkeypatch.setattr(
         stripes.Stripes,

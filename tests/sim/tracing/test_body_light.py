@@ -77,9 +77,9 @@ def test_on_its_own_slope_it_is_what_is_found_by_itself(scene, side):
 
 
 def test_slopes_nearby_have_their_own_light(scene):
-    """An eye of 15 x 15 receptors may see a body in one receptor, whose rim is then twelve degrees off. The
-    root-mean-square error is 1 % of the brightest light; with the light of the middle's slope it would be five times as
-    large.
+    """An eye of 15 x 15 receptors may see a whole body in one receptor, in which slopes differ from that in the middle
+    by up to twelve degrees. The root-mean-square error is 1 % of the brightest light. If the light at the middle's
+    slope were used everywhere, it would be five times as large.
     """
     turned = np.array([np.cos(np.radians(12)), np.sin(np.radians(12)), 0.0])
     with variant():

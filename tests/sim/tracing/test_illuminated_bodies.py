@@ -50,8 +50,9 @@ def lit_by_rays(scene, disk, radius, centres, others):
 
 
 def errors(scene, side):
-    """Return the root-mean-square error over bodies, worlds and lights, for whole bodies or for one side, and the dark
-    share.
+    """Return the root-mean-square error over bodies, worlds and lights, and the mean share of light that is blocked.
+
+    side: normal of one side of the bodies; None: whole bodies
     """
     centres = bodies_of(scene)
     found, dark, radii = [], [], scene.upright.bodies.radii
@@ -85,7 +86,9 @@ def test_shares_are_those_of_disks(scene, side):
 
 @pytest.mark.parametrize("side", [(-0.6, 0.0, 0.8), (0.4, 0.3, -0.8)])
 def test_shares_between_the_tables_places_are_near_them(scene, side):
-    """The limit is 1.5 times the measured error. A table of twice the density has 0.015 there."""
+    """The limit is 1.5 times the measured error. If the table had twice as many places per axis, the error would be
+    0.015.
+    """
     assert errors(scene, side)[0] < 0.075
 
 

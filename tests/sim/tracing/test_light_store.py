@@ -24,7 +24,10 @@ def own_store(monkeypatch, tmp_path):
 
 
 class Bakery:
-    """A world whose tables are baked at once. number: distinguishes worlds of the same layout"""
+    """A world whose tables are baked in no time.
+
+    number: distinguishes worlds of the same layout
+    """
 
     def __init__(self, number=0):
         self.ingredients, self.baked = [np.array(float(number))], 0

@@ -211,8 +211,8 @@ def share_of(found, truth):
 
 
 def test_light_that_is_reflected_more_often(monkeypatch, empty_store):
-    """These reflections are 3.9 times the noise here, and Mitsuba's samples have an error of 0.55. A table that ends
-    one reflection early lacks a third.
+    """The light of these reflections is 3.9 times the noise, and Mitsuba's samples have an error of 0.55 times the
+    noise. If the table ended one reflection earlier, a third of this light would be missing.
     """
     world, eyes = stairs(), sim.Eyes(n_eyes=4, resolution=(1, 4))
     state = views(world, 3)

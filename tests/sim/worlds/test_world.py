@@ -128,7 +128,7 @@ def test_objects_differ_only_in_the_orientation_of_their_stripes(field):
 
 
 def stripe_bounds(values):
-    """Return the boundaries between dark and light texels; a threshold halfway decides about grey ones."""
+    """Return the boundaries between dark and light texels, with the mean of both as the threshold."""
     dark = values < (values.min() + values.max()) / 2
     return np.flatnonzero(np.diff(dark))
 

@@ -34,7 +34,7 @@ def test_every_part_is_measured(name, tmp_path, capsys):
 
 
 def test_parts_do_what_they_are_called():
-    """Physics moves the worlds without rendering, sight renders without moving, and a step does both."""
+    """The part "physics" moves the worlds without rendering, "sight" renders without moving, and a step does both."""
     with contextlib.closing(steps_per_second.environments()["ant"](2)) as env:
         env.reset()
         (sight,) = env.animals.learners[0].sights.values()

@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[3]
 
 
 def rows(order, seconds=(1.0, 1.0, 2.0, 4.0)):
-    """Animals whose fitness on each rung is `order` (rung, animal)."""
+    """Return rows of animals whose fitness after each rung is `order` (rung, animal)."""
     found = []
     for animal in range(len(order[0])):
         for rung in range(RUNGS):
@@ -35,7 +35,9 @@ def rows(order, seconds=(1.0, 1.0, 2.0, 4.0)):
 
 
 def test_rank_correlation():
-    """Spearman: 1 - 6 Σd² / (n (n² - 1)), here d = (1, 1, 0, 0) for n = 4."""
+    """Spearman's coefficient is 1 - 6 Σd² / (n (n² - 1)). Here, the differences of ranks are d = (1, 1, 0, 0), and n =
+    4.
+    """
     assert correlation(np.array([1.0, 2, 3, 4]), np.array([2.0, 1, 3, 4]))[0] == pytest.approx(1 - 6 * 2 / 60)
 
 

@@ -25,7 +25,9 @@ LIFE = Life("detection", 0, THROUGHOUT, 200.0, 90.0, 0.75, (10.0, 50.0, 90.0))
 
 
 def lives(gains, saved=50.0, tasks=fewer_epochs.EYES):
-    """A pair of training runs per task and gain: fewer epochs earn `gain` more and take `saved` seconds less."""
+    """Return a pair of training runs for each task and gain. The run with fewer epochs has a fitness that is higher by
+    the gain, and takes `saved` seconds less.
+    """
     found = []
     for task in tasks:
         for seed, gain in enumerate(gains):
@@ -49,7 +51,9 @@ def test_only_lives_that_were_trained_in_both_ways_are_compared():
 
 
 def test_bounds():
-    """Gains of -3 to -1 have a mean of -2 with a standard error of 0.35; gains of -4 to 2 have -1 and 1.14."""
+    """Gains of -3 to -1 have a mean of -2 with a standard error of 0.35. Gains of -4 to 2 have a mean of -1 with a
+    standard error of 1.14.
+    """
     assert verdicts(lives([1, 2, 3, 4, 5])) == verdicts(lives([-4, -3, -1, 1, 2])) == []
     assert verdicts(lives([-3, -2.5, -2, -1.5, -1], tasks=["detection"]))[0] == (
         "detection: fewer epochs reduce the return, by 2.0 ± 0.4"
@@ -59,7 +63,7 @@ def test_bounds():
 
 
 def test_time_is_spread_as_passes_are():
-    """The sum is the whole time; an epoch costs the same early and late."""
+    """The times of all parts add up to the whole time. An epoch costs the same early and late in training."""
     times = seconds("detection", (200.0, 140.0), 10)
     assert times[:, -1] == pytest.approx([200, 140])
     assert np.diff(times[0]) == pytest.approx([20.0] * 9)

@@ -57,7 +57,7 @@ def learning(case, *goals, seed=0):
 
 
 def test_wilson_interval():
-    """Newcombe (1998), table I: 81 of 263 gives 0.2553 to 0.3662."""
+    """The interval for 81 of 263 is 0.2553 to 0.3662 (Newcombe 1998, table I)."""
     assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
     assert wilson(0, 20)[0] == pytest.approx(0, abs=1e-12)
 
@@ -86,9 +86,10 @@ def test_verdicts_name_what_is_not_learnt():
 
 
 def test_ten_eyes_must_beat_one_by_more_than_chance():
-    """10 m and 2 contacts: fitness 1.5 x 10 - 2 x 2 = 11. Standard errors of 0.3 m and 0.1 of the return give at most
-    1.5 x 0.3 + 2 x (0.25 x 0.3 + 0.1) = 0.8. The standard error of a difference is then 1.13 and its 95 % limit 2.22;
-    for distances the limit is 0.83 m."""
+    """A distance of 10 m with 2 contacts gives the fitness 1.5 x 10 - 2 x 2 = 11. Standard errors of 0.3 m of the
+    distance and 0.1 of the return give at most 1.5 x 0.3 + 2 x (0.25 x 0.3 + 0.1) = 0.8. The standard error of a
+    difference is then 1.13 and its 95 % limit 2.22; for distances the limit is 0.83 m.
+    """
     many = replace(ROW, case="maze, 10 x (1 x 4)", goals=0, contacts=2.0, distance=10.0)
     one = replace(many, case="maze, 1 x (1 x 4)", contacts=2.4, distance=9.0)
     assert learning_curves.verdicts([many, one]) == []  # 8.7 and 9 m
@@ -102,7 +103,9 @@ def test_ten_eyes_must_beat_one_by_more_than_chance():
 
 
 def test_a_journey_ends_where_its_first_episode_ends():
-    """Two worlds walk 1 m per action from (3, 4). The first one's episode ends after two actions and starts again."""
+    """Animals in two worlds walk 1 m per action from (3, 4). In the first world, the episode ends after two actions and
+    a new one begins.
+    """
     worlds = Journey(Walkers())
     worlds.reset()
     for _ in range(4):
@@ -112,7 +115,7 @@ def test_a_journey_ends_where_its_first_episode_ends():
 
 
 def test_a_training_is_watched():
-    """Two rollouts and two evaluations, with an eye so small that the test takes seconds."""
+    """The training has two rollouts and two evaluations. The eye is so small that the test takes seconds."""
     learning = LearningConfig(total_steps=512, n_envs=16, n_steps=16, batch_size=64, eval_interval=256)
     case = Case("x", sim.Eyes(n_eyes=1, resolution=(1, 2)), learning=learning, memory=2, neurons=8, episodes=8)
     rows = list(watched(case, seed=3))

@@ -101,7 +101,7 @@ def copy(tmp_path):
 
 
 def test_killed_and_surviving_are_told_apart_and_the_tree_is_mended(copy):
-    """A test that fails without any mutation kills nothing."""
+    """A test that fails without any mutation does not count as killing a mutant."""
     root, tree = copy
     source = (root / "optics/odd/a.py").read_bytes()
     plus, _, unseen, _ = sites("optics/odd/a.py", source)

@@ -30,7 +30,7 @@ def test_a_propagator_that_wraps_around_is_caught(measured):
 
 
 def test_a_textbook_that_does_not_fail_is_caught(measured):
-    """The map must show the failure: a padded or band-limited "textbook" would converge."""
+    """The chart must show that the textbook method fails. A padded or band-limited version of it would converge."""
     rows, wrapped = measured
     broken = aliasing.broken_bounds(
         [replace(row, textbook=row.propagate) for row in rows], [(0.0, o) for _, o in wrapped]
@@ -40,8 +40,9 @@ def test_a_textbook_that_does_not_fail_is_caught(measured):
 
 
 def test_wrap_around_falls_like_the_beam_on_the_periods_edge(measured):
-    """The repeated beam's tail is exp(-(P/2w)²) in amplitude at the edge. Integrated, it makes the logarithm of the
-    error against (P/w)² a straight line of slope near -1/4 to -1/2."""
+    """The amplitude of the repeated beam of waist w is exp(-(P/2w)²) at the edge of the period P. The logarithm of the
+    integrated error is therefore a linear function of (P/w)², with a slope of -1/4 to -1/2.
+    """
     p = np.array(aliasing.PERIODS[1:6])
     slope = np.polyfit(p**2, np.log([naive for naive, _ in measured[1][1:6]]), 1)[0]
     assert -0.55 < slope < -0.25

@@ -35,8 +35,9 @@ def test_evanescent_waves_that_are_kept_or_left_unreported_are_caught(measured):
 
 
 def test_growth_is_that_of_the_finest_wave(measured):
-    """exp(2πz √(f²λ² - 1)) with f = √2 / (2 dx) = 2.8/λ: the slope of the logarithm agrees within 10 % beyond 3
-    wavelengths."""
+    """The finest wave has the frequency f = √2 / (2 dx) = 2.8/λ and grows like exp(2πz √(f²λ² - 1)), with z in
+    wavelengths. The slope of the logarithm agrees to 10 % beyond 3 wavelengths.
+    """
     rows = [row for row in measured[0] if 3 <= row.distance <= 20]
     slope = np.polyfit([row.distance for row in rows], np.log([row.float64 for row in rows]), 1)[0]
     assert slope == pytest.approx(2 * np.pi * np.sqrt(7), rel=0.1)

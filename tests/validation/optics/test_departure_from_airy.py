@@ -17,7 +17,9 @@ def test_all_bounds_hold(rows):
 
 
 def test_known_departure_at_f2(rows):
-    """4.5e-2 at NA 0.24, where f/2 is NA 0.2425: the same value as in `ideal_lens_psf` at Fresnel number 27."""
+    """The deviation at NA 0.24, which is close to f/2 (0.2425), is 4.5e-2, as in `ideal_lens_psf` at the Fresnel number
+    27.
+    """
     row = next(row for row in rows if row.aperture == 0.24)
     assert row.tangent_misfit == pytest.approx(4.52e-2, rel=0.03)
     assert row.peak_ratio == pytest.approx(1 - 0.24**2, abs=2e-3)

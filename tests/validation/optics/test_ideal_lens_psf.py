@@ -29,7 +29,9 @@ def test_actual_error_is_below_the_predicted_one(rows, slow):
 
 
 def test_airy_in_place_of_the_psf_is_caught_at_every_small_eye(rows, slow):
-    """A paraxial method gives Airy's pattern. The exact oracle must reject it at f/16 (1.8e-3) as well as at f/2."""
+    """A paraxial method gives Airy's pattern. The exact oracle must reject it at f/16, where its error is 1.8e-3, as
+    well as at f/2.
+    """
     paraxial = [replace(row, error=reference.relative_l2(row.airy(row.x), row.exact(row.x), row.x)) for row in rows]
     complaints = ideal_lens_psf.broken_bounds(paraxial, slow)
     assert [c.split(":")[0] for c in complaints] == ["f/2", "f/4", "f/8", "f/16"]
@@ -41,7 +43,9 @@ def test_a_psf_that_fits_airy_at_f2_is_caught(rows, slow):
 
 
 def test_first_zero_lies_outside_airys_by_the_cosine(rows):
-    """The exact dark ring is wider by a factor like 1/cos θ, of order NA²: 2 % at f/2, a quarter of that at f/4."""
+    """The exact dark ring is wider by a factor like 1/cos θ, which differs from 1 by order NA²: 2 % at f/2, and a
+    quarter of that at f/4.
+    """
     excess = [row.first_zero / row.airy_first_zero - 1 for row in rows[:3]]
     assert excess[0] == pytest.approx(0.0225, abs=2e-3)
     assert np.log2(excess[0] / excess[1]) == pytest.approx(2, abs=0.3)

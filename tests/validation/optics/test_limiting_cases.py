@@ -37,7 +37,9 @@ def test_wrong_values_and_wrong_errors_are_caught():
 
 
 def test_a_lobe_without_obliquity_is_caught():
-    """cos²θ distinguishes Rayleigh-Sommerfeld's lobe from a spherical wave by far more than the page's bound."""
+    """Without the factor cos²θ of Rayleigh and Sommerfeld's integral, the light of a small hole differs by far more
+    than the page's bound.
+    """
     x = (np.arange(17) - 8) * 2e-4
     rho2 = x[None, :] ** 2 + x[:, None] ** 2 + 1e-6
     assert limiting_cases.relative_l2(1 / rho2, 1e-6 / rho2**2) > 0.1

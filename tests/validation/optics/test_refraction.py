@@ -8,8 +8,9 @@ from validation.optics import refraction
 
 @pytest.mark.parametrize("slope", [0.0, 0.1, -0.4, 0.85])
 def test_snells_law_and_unit_length(slope):
-    """n sin i = sin t to the surface's normal, in the plane of incidence, with the ray bent towards the thicker
-    glass."""
+    """The angles to the normal satisfy n sin i = sin t. The ray stays in the plane of incidence, and is deflected
+    towards the thicker glass.
+    """
     tx, tz = refraction.refract(np.array(slope), 1.5)
     normal = np.array([-slope, 1]) / np.hypot(slope, 1)
     assert np.hypot(tx, tz) == pytest.approx(1)
@@ -35,7 +36,9 @@ def test_all_three_prisms_agree_for_small_angles():
 
 
 def test_transmission_has_its_known_values():
-    """4 % are reflected at normal incidence on n = 1.5; p-polarised light passes at Brewster's angle arctan(1/n)."""
+    """Glass with n = 1.5 reflects 4 % of the light at normal incidence, and no p-polarised light at Brewster's angle
+    arctan(1/n).
+    """
     assert refraction.transmission(0.0, 1.5) == pytest.approx(0.96)
     brewster = np.arctan(1 / 1.5)
     s = np.sin(2 * brewster - np.pi / 2) ** 2

@@ -21,7 +21,7 @@ def test_all_bounds_hold(measured):
 
 
 def test_a_psf_that_refracts_is_caught(measured):
-    """The real prism already deviates 7e-4 rad more than the mask at 10 deg."""
+    """The real prism deflects light by 7e-4 rad more than the mask at a slope of 10°."""
     prisms, lenses, limits = measured
     broken = thin_element.broken_bounds([replace(p, psf=p.real) for p in prisms], lenses, limits)
     assert len(broken) >= 6

@@ -41,7 +41,7 @@ def test_a_psf_from_the_undersampled_lens_is_caught(measured):
 
 
 def test_slow_lens_has_airys_energy(measured):
-    """0.8378 at f/13.5; f/2 has less, because the exact PSF differs from Airy's."""
+    """The encircled energy is 0.8378 at f/13.5. At f/2 it is lower, because the exact PSF differs from Airy's."""
     published, _ = measured
     lens = published[2].lens
     airy = airy_encircled_energy(np.array(lens.dark_ring), undersampled_lens.WAVELENGTH, lens.radius, lens.focal_length)
@@ -50,7 +50,9 @@ def test_slow_lens_has_airys_energy(measured):
 
 
 def test_energy_of_a_known_function():
-    """A Gaussian between its samples: 1 - exp(-2r²/w²). Aliases of a Gaussian this coarse are near 1e-9."""
+    """The encircled energy of a Gaussian, interpolated between samples, is 1 - exp(-2r²/w²). With this sampling, its
+    aliases are about 1e-9.
+    """
     dx, waist = 1.0, 2.5
     x = (np.arange(64) - 32) * dx
     u = np.exp(-(x[None, :] ** 2 + x[:, None] ** 2) / waist**2)

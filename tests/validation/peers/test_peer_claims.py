@@ -27,7 +27,7 @@ def test_there_are_enough_claims_of_several_sources():
 
 
 def test_a_wrong_wavelength_is_noticed(monkeypatch):
-    """A unit that is 1 % too long moves every dark ring."""
+    """Every dark ring is displaced if the wavelength is 1 % too long."""
     monkeypatch.setattr(systems, "UNIT", 1.01 * systems.UNIT)
     asked = [each for each in of_circles() if each.says.startswith("dark ring")]
     assert len(peer_claims.answered(asked)[2]) == len(asked) == 3

@@ -43,7 +43,9 @@ def test_errors_that_exceed_what_was_predicted_are_broken(monkeypatch):
 
 @pytest.mark.parametrize("parts", [1, 4])
 def test_what_peers_are_given_is_the_field(parts):
-    """Its Fourier sum to the focal plane is Fresnel's image, except for the error of the edge."""
+    """The Fourier sum of the field gives Fresnel's image in the focal plane, except for an error due to the sampled
+    edge.
+    """
     [pupil] = population_speed.eyes(1)
     field, pitch = population_speed.pupil_field(pupil, 256, parts)
     at = (np.arange(population_speed.N) - population_speed.N // 2) * population_speed.DX

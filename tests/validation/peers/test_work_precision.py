@@ -34,7 +34,7 @@ def test_exact_is_what_is_known_in_closed_form_on_the_axis():
 
 
 def test_exact_refuses_to_be_the_airy_pattern():
-    """A paraxial answer has an error of 5e-4 at f/16 even after its scale is fitted, and the oracle detects it."""
+    """A paraxial result has an error of 5e-4 at f/16, even if its scale is fitted. The oracle detects this error."""
     case = NAMED["f/16"]
     r = np.hypot(case.window.x[None, :], case.window.x[:, None])
     airy = reference.airy_psf(r, WAVELENGTH, case.radius, case.focal_length)
@@ -101,7 +101,7 @@ def test_a_spoilt_file_is_named_with_its_line(tmp_path, old, new, said):
 
 
 def test_stored_points_are_of_known_cases_and_peers_that_came_close():
-    """An error above 10 % at the best setting of a package would mean that we set it up wrongly."""
+    """An error above 10 % with the best settings of a package would indicate that we use it incorrectly."""
     points = read_points()
     assert {p.case for p in points} == set(NAMED)
     for case in NAMED:

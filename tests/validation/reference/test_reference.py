@@ -18,7 +18,7 @@ K = 2 * math.pi / WAVELENGTH
 
 
 def cartesian_rayleigh_sommerfeld(point, radius, focal_length, z, n=240):
-    """The integral in other coordinates, chords of the disk: x = R sin α, |y| < R cos α."""
+    """Return the integral in other coordinates: along chords of the disk at x = R sin α, with |y| < R cos α."""
     x, weight_x = gauss_legendre(n, -np.pi / 2, np.pi / 2)
     along, weight_x = radius * np.sin(x), weight_x * radius * np.cos(x)
     unit, weight_y = gauss_legendre(n, -1, 1)
@@ -51,7 +51,9 @@ class TestCircular:
             assert reference.airy_encircled_energy(edge, *arguments) == pytest.approx(total, rel=1e-12)
 
     def test_mtf_is_the_overlap_of_two_disks(self):
-        """Goodman's other definition, the pupil's autocorrelation: the area common to two disks s diameters apart."""
+        """The MTF is also the autocorrelation of the pupil (Goodman): the common area of two disks whose centres are s
+        diameters apart.
+        """
         radius, focal_length = 30e-6, 240e-6
         cutoff = 2 * radius / (WAVELENGTH * focal_length)
         for s in (0.0, 0.1, 0.5, 0.9, 1.0, 1.2):
@@ -78,7 +80,9 @@ class TestCircular:
         assert abs(reference.converging_wave_at_focus(radius, z, WAVELENGTH) - complex(focus)) < 1e-12 * abs(focus)
 
     def test_fraunhofer_at_any_angle_is_the_exact_integral_at_small_fresnel_number(self):
-        """The pattern lacks the phase kρ²/2D, so the intensity's error is the Fresnel number squared."""
+        """Fraunhofer's pattern lacks the phase kρ²/2D, so the error of the intensity is proportional to the Fresnel
+        number squared.
+        """
         radius, errors = 2e-6, []
         for z in (1e-3, 4e-3, 16e-3):
             r = np.linspace(0, z, 21)
@@ -89,7 +93,9 @@ class TestCircular:
         assert reference.order_of_convergence([1e-3, 4e-3, 16e-3], errors) == pytest.approx(-2, abs=0.1)
 
     def test_power_of_an_aperture_is_what_fraunhofers_pattern_carries(self):
-        """Flux through the half sphere against the closed form: ∫ |πR²/λ 2J1(v)/v|² dΩ / cos θ = ∫ ... ds dt."""
+        """The integral of |πR²/λ 2J1(v)/v|² over the direction sines s and t of the half sphere agrees with the closed
+        form (ds dt = cos θ dΩ).
+        """
         radius = 0.7e-6
         sine, weight = gauss_legendre(200)
         pattern = reference.airy_psf(sine, WAVELENGTH, radius, 1.0)
@@ -115,7 +121,9 @@ class TestRayleighSommerfeld:
 
     @pytest.mark.parametrize("f_number", [1.4, 2, 2.8, 4, 5.6, 8, 11, 16])
     def test_nodes_suffice_for_every_lens_of_the_chart(self, f_number):
-        """Windows of ±10 λ f#, to the corner. Twice the number of nodes changes nothing above 1e-12 of the peak."""
+        """Twice the number of nodes changes the field by less than 1e-12 of the peak, in windows of ±10 λ f/D including
+        the corners.
+        """
         radius, f = 300e-6 / (2 * f_number), 300e-6
         r = np.linspace(0, 14.2 * WAVELENGTH * f_number, 24)
         self.check(r, radius, f, f)
@@ -168,8 +176,9 @@ class TestDefocus:
         assert reference.lommel_intensity(u, v) == pytest.approx(float(abs(value) ** 2), rel=1e-9, abs=1e-13)
 
     def test_the_edges_of_the_formula(self):
-        """The limits are sinc² on the axis, Airy in the focal plane, and (1 - 2 J0 cos u + J0²)/u² at the shadow's edge
-        (§8.8.1)."""
+        """The limits are sinc² on the axis, Airy's pattern in the focal plane, and (1 - 2 J0 cos u + J0²)/u² at the
+        edge of the shadow (Born & Wolf, §8.8.1).
+        """
         u = np.linspace(0.01, 50, 200)
         np.testing.assert_allclose(reference.lommel_intensity(u, 0), np.sinc(u / (4 * np.pi)) ** 2, atol=1e-12)
         edge = [float((1 - 2 * mpmath.besselj(0, x) * mpmath.cos(x) + mpmath.besselj(0, x) ** 2) / x**2) for x in u]
@@ -183,13 +192,13 @@ class TestDefocus:
         )
 
     def test_it_carries_all_the_power(self):
-        """All power is there, up to the part of Airy's tail beyond v = 200: 2/(πv)."""
+        """The pattern contains all power except for the part 2/(πv) beyond v = 200."""
         r, weight = gauss_legendre(600, 0, 200 / (K * 0.03e-3 / 2e-3))
         psf = reference.defocused_psf(r, WAVELENGTH, 30e-6, 3e-3, 2e-3)
         assert np.sum(weight * 2 * np.pi * r * psf) == pytest.approx(1 - 2 / (200 * np.pi), abs=2e-4)
 
     def test_the_exact_defocused_lens_departs_from_it_like_the_angle_squared(self):
-        """The paraxial pattern in (u, v) is the same at a fixed Fresnel number and a fixed defocus in waves."""
+        """For a fixed Fresnel number and a fixed defocus in waves, the paraxial pattern in (u, v) is the same."""
         fresnel_number, apertures, errors = 20.0, (0.02, 0.04, 0.08), []
         for aperture in apertures:
             f = fresnel_number * WAVELENGTH / aperture**2

@@ -24,7 +24,7 @@ class TestAberrations:
         np.testing.assert_allclose(gram, np.eye(36), atol=1e-12)
 
     def test_nolls_order_signs_and_norms(self):
-        """Noll's table I, and R_n^m(1) = 1."""
+        """The polynomials are those of Noll's table I, and R_n^m(1) = 1."""
         first = [(0, 0), (1, 1), (1, -1), (2, 0), (2, -2), (2, 2), (3, -1), (3, 1), (3, -3), (3, 3), (4, 0), (4, 2)]
         assert [reference.noll_index(j) for j in range(1, 13)] == first
         rho, theta = np.array([0.3, 0.8]), np.array([0.2, 2.0])
@@ -50,7 +50,7 @@ class TestAberrations:
     @pytest.mark.parametrize("w", [-1.3, -0.2, 0.1, 0.25, 0.6, 1.7])
     @pytest.mark.parametrize("balance", [0.0, 0.4, -1.0])
     def test_strehl_ratios_are_the_integral_over_the_disk(self, w, balance):
-        """Spectral quadrature in two dimensions against closed forms and one-dimensional integrals."""
+        """Closed forms and one-dimensional integrals agree with quadrature in two dimensions."""
         rho, theta, weight = disk_nodes()
         cosine = rho * np.cos(theta)
 
@@ -120,7 +120,7 @@ class TestLenses:
         assert height / math.tan(bend) == pytest.approx(f, rel=1e-6)
 
     def test_kinoforms_axis_is_fresnels_integral(self):
-        """Over t = ρ², the field is -i(π/λz) ∫ exp(iφ(t) + ikt/2z) dt, zone by zone."""
+        """The field on the axis is -i(π/λz) ∫ exp(iφ(t) + ikt/2z) dt over t = ρ², integrated zone by zone."""
         design, f, wavelength, zones = 550e-9, 1e-3, 480e-9, 5
         step = 2 * design * f
         for order in (1, 2):

@@ -42,7 +42,7 @@ class TestWaves:
 
     @pytest.mark.parametrize(("waist", "z"), [(0.2e-6, 0.3e-6), (0.5e-6, 4e-6), (3e-6, 30e-6)])
     def test_exact_gaussian_is_the_rayleigh_sommerfeld_integral(self, waist, z):
-        """Two different integrals of the same field: over frequencies, and over the source plane."""
+        """Two integrals of the same field agree: one over frequencies, and one over the plane of the source."""
         r = np.array([0.0, waist, 3 * waist])
         rho, weight = gauss_legendre(700, 0, 6.5 * waist)
         angle = np.pi * (np.arange(300) + 0.5) / 300
@@ -92,14 +92,16 @@ class TestWaves:
             assert abs(reference.slit_field(np.array(x), 10e-6, WAVELENGTH, z) - slit) < 1e-12
 
     def test_known_intensities_of_the_edge(self):
-        """1/4 at the edge; the first maximum 1.370 at s = 1.217, the first minimum 0.778 at s = 1.873 (Born & Wolf)."""
+        """The intensity is 1/4 at the edge. The first maximum is 1.370 at s = 1.217, and the first minimum 0.778 at s =
+        1.873 (Born & Wolf).
+        """
         s = np.array([0.0, 1.2172, 1.8725])
         field = reference.knife_edge_field(s * math.sqrt(WAVELENGTH * 1e-4 / 2), WAVELENGTH, 1e-4)
         np.testing.assert_allclose(np.abs(field) ** 2, [0.25, 1.3704, 0.7782], atol=1e-4)
 
 
 def fourier_coefficient(phase, order, breaks, n=40):
-    """∫₀¹ e^{iφ(x)} e^{-2πimx} dx, by Gauss-Legendre between the phase's jumps."""
+    """Return ∫₀¹ e^{iφ(x)} e^{-2πimx} dx, by Gauss-Legendre quadrature between the jumps of the phase."""
     total = 0
     for low, high in itertools.pairwise(breaks):
         x, weight = gauss_legendre(n, low, high)

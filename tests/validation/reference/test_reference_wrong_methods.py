@@ -16,8 +16,9 @@ def intensity(field):
 
 
 def fresnel_on_axis():
-    """Radius 20 µm at 40 µm: Fresnel's approximation gives darkness on the axis at Fresnel number 20; the exact value
-    is 3.474."""
+    """For a radius of 20 µm at 40 µm (Fresnel number 20), Fresnel's approximation is 0 on the axis; the exact value is
+    3.474.
+    """
     exact = reference.circular_aperture_on_axis(20e-6, 40e-6, WAVELENGTH)
     return exact, 4 * math.sin(math.pi * 20e-6**2 / (2 * WAVELENGTH * 40e-6)) ** 2
 
@@ -34,8 +35,9 @@ def airy_peak_at_f1():
 
 
 def parabolic_lens_at_f2():
-    """exp(-ikr²/2f) in place of the sphere: Fresnel's method gives it an ideal focus, which the exact lens does not
-    have."""
+    """A lens exp(-ikr²/2f) in place of a spherical wave has an ideal focus in Fresnel's approximation, but not in the
+    exact theory.
+    """
     radius, f = 75e-6, 300e-6
     edge_waves = (radius**2 / (2 * f) - (math.hypot(radius, f) - f)) / WAVELENGTH
     return 1.0, reference.strehl_spherical(edge_waves)
@@ -57,7 +59,7 @@ def fraunhofer_in_the_near_field():
 
 
 def tangent_in_the_far_field():
-    """The pattern at 45° needs sin θ instead of tan θ, and the slant factor."""
+    """The pattern at 45° depends on sin θ, not on tan θ, and has the obliquity factor."""
     r, z = np.linspace(0, 16e-3, 200), 16e-3
     exact = reference.circular_aperture_fraunhofer(r, WAVELENGTH, 0.7e-6, z)
     return exact, reference.airy_psf(r, WAVELENGTH, 0.7e-6, z) * np.pi * 0.7e-6**2
@@ -136,7 +138,7 @@ def four_levels_as_a_sawtooth():
 
 
 def amplitude_grating_in_place_of_a_phase_grating():
-    """A chrome grating in place of glass has (1/π)² = 10 % instead of (2/π)² = 40.5 %."""
+    """A grating of chrome instead of glass has an efficiency of (1/π)² = 10 % instead of (2/π)² = 40.5 %."""
     return reference.binary_grating_efficiency(1, 0.5), (1 / math.pi) ** 2
 
 
@@ -157,7 +159,7 @@ def radians_for_waves():
 
 
 def unnormalised_zernike():
-    """ρ² alone has RMS 1/(2√3), not 1."""
+    """The mode ρ² without normalisation has the root mean square 1/(2√3) instead of 1."""
     return reference.marechal_strehl(0.1), reference.marechal_strehl(0.1 * reference.RMS_PER_WAVE["defocus"])
 
 
@@ -168,14 +170,14 @@ def image_in_the_focal_plane():
 
 
 def glass_that_disperses_like_a_grating():
-    """Blue light (440 nm) through a lens made for 550 nm."""
+    """Blue light (440 nm) passes a lens made for 550 nm."""
     return reference.refractive_focal_length(1e-3, 1.53), reference.diffractive_focal_length(
         1e-3 / 0.52, 550e-9, 440e-9
     )
 
 
 def pinhole_as_its_shadow():
-    """A geometric PSF, one over the aperture's area."""
+    """The PSF of geometric optics is the reciprocal of the aperture's area."""
     radius = reference.pinhole_radius(WAVELENGTH, 1e-3)
     return reference.defocused_psf(0.0, WAVELENGTH, radius, math.inf, 1e-3), 1 / (np.pi * radius**2)
 

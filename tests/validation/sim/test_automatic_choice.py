@@ -50,7 +50,7 @@ def test_what_is_wrong_is_named(changes, complaint):
 
 
 def test_a_cliff_is_named():
-    """A cliff between resolutions far apart, or between tasks, is none."""
+    """Only a jump of the cost between neighbouring resolutions of one task counts as a cliff."""
     costly = replace(GOOD, receptors=63, number=4.0)
     assert automatic_choice.broken_bounds([GOOD, costly]) == ["detection: 62 and 63 receptors differ by 4"]
     assert automatic_choice.broken_bounds([GOOD, replace(costly, number=3.0)]) == []

@@ -13,13 +13,13 @@ PAGE = Path(__file__).parents[3] / "docs/validation/equal_brightness.md"
 
 
 def test_shipped_bands_are_balanced_and_even_ones_are_not():
-    """Even bands differ by the noise level if an eye just misses the top of an object."""
+    """Objects with bands of equal width differ by the noise level if an eye just misses their top."""
     assert abs(difference(BAND_EDGES_DEG, 2.0).mean()) < 0.2
     assert abs(difference(np.arange(1, 6) * 30.0, 2.0).mean()) > 0.8
 
 
 def test_light_is_lamberts_seen_through_a_square_field():
-    """A distant sphere lit by one light from behind the viewer has a mean of cos over the disc of 2/3."""
+    """For a distant sphere with one light behind the viewer, the mean of the cosine over the visible disc is 2/3."""
     (towards, level) = np.array([1.0, 0, 0]), 1.0
     lights, equal_brightness._lights = equal_brightness._lights, lambda: [(towards, level)]
     light_seen.cache_clear()

@@ -89,8 +89,9 @@ def test_a_small_eye_is_measured_as_the_page_says(tmp_path, monkeypatch):
 
 
 def test_areas_are_held_against_finer_ones_in_their_own_light(monkeypatch):
-    """The fidelity chosen for a perfect lens includes all light, which rays do not, so direct light is not its
-    reference."""
+    """The fidelity that is chosen for a perfect lens includes reflected light, so rays in direct light are not its
+    reference.
+    """
     monkeypatch.setitem(receptive_field_sampling.RETINAS, (2, 3), 40.0)
     world = sim.build_world("detection", seed=3)
     state = lived_through(world, 2)

@@ -26,7 +26,9 @@ AUTO = Point(
 
 
 def series(light):
-    """Errors fall like n^-0.7 to the error of the missing light, and are higher on objects; speed falls like 1/n."""
+    """Return settings whose errors fall like n^-0.7 to the error of the missing light, and are higher on objects. Their
+    speed falls like 1/n.
+    """
     left = {"direct": 0.3, "bounce": 0.05}[light]
     return [
         Point(
@@ -77,7 +79,9 @@ def test_the_front_is_what_no_point_beats(chart):
 
 
 def test_what_is_good_over_all_receptors_alone_is_not_on_the_front(chart):
-    """It does not compete with auto either, unless the errors over all receptors are the criterion."""
+    """A setting that is accurate over all receptors, but not on objects, is not compared with "auto" either, unless
+    errors over all receptors are the criterion.
+    """
     blind = Point(Setting("mitsuba", 1), Errors(0.01, 0.9), sampling=0.1, speed=850)
     charted = replace(chart, points=(*chart.points, blind))
     assert blind not in charted.front

@@ -53,7 +53,7 @@ def across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
 
 
 def amplitude_across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
-    """Return |U| at the same positions, relative to the centre."""
+    """Return the amplitude |U| in the focus at positions [λ f/D] along x, relative to the centre."""
     n = 2 * (len(at) - 1) + 1
     dx = float(at[1] - at[0]) * UNIT
     result = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), field=True, **ASKED)

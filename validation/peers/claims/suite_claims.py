@@ -213,7 +213,7 @@ def of_poppy() -> Iterator[Case]:
 
 
 def over_disk(n: int, m: int, other_n: int, other_m: int) -> float:
-    """Return the mean over the unit disk of two of our modes' product."""
+    """Return the mean, over the unit disk, of the product of two of our Zernike modes."""
     nodes, weights = gauss_legendre(16)
     angle = 2 * np.pi * (np.arange(32) + 0.5) / 32
     x, y = nodes[:, None] * np.cos(angle), nodes[:, None] * np.sin(angle)

@@ -17,13 +17,13 @@ FINE = 0.001  # λ f/D
 
 
 def dark(pupil: optics.Pupil, near: float) -> float:
-    """Return the position of a minimum of the light."""
+    """Return the position [λ f/D] of the minimum of the light near a position."""
     at = np.arange(near - 0.05, near + 0.05, FINE)
     return float(at[across(pupil, np.round(at / FINE) * FINE).argmin()])
 
 
 def ring(near: float) -> tuple[float, float]:
-    """Return the position of a maximum of the light off the centre, and its height."""
+    """Return the position [λ f/D] and the height of the maximum of the light near a position."""
     at = np.round(np.arange(near - 0.05, near + 0.05, FINE) / FINE) * FINE
     found = across(lens(), at)
     return float(at[found.argmax()]), float(found.max())
@@ -98,7 +98,7 @@ def of_openings() -> Iterator[Case]:
 
 
 def on_the_axis() -> Iterator[Case]:
-    """Yield light behind apertures, with exact closed forms."""
+    """Yield claims on the light on the axis behind apertures, which has exact closed forms."""
     for z in (15e-6, 40e-6, 100e-6):
 
         def light(z: float = z) -> float:

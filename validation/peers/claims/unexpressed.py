@@ -7,24 +7,24 @@ __all__ = ["UNEXPRESSED"]
 UNEXPRESSED = (
     (
         "spacetelescope/poppy, test_core: test_basic_functionality",
-        "its 0.201 is a sample half a cell off the peak, normalised by the test's own window",
+        "the value 0.201 is that of a sample half a cell off the peak, normalised by the light in its window",
     ),
     (
         "spacetelescope/poppy, test_fresnel: test_fresnel_optical_system_Hubble",
-        "two mirrors: systems of planes here have pupils, but no sequence of lenses in a converging beam",
+        "a telescope of two mirrors; systems in `optics` have pupils, but no sequence of lenses in a converging beam",
     ),
     (
         "spacetelescope/poppy, test_fresnel: test_GaussianBeamParams",
-        "requires beam radius and waist, which fields here do not store",
+        "requires the radius and waist of a beam, which the fields of `optics` do not store",
     ),
     (
         "spacetelescope/poppy, test_matrixFTcoronagraph",
         "coronagraphs need a mask in the focal plane and a second pupil",
     ),
-    ("spacetelescope/poppy, test_zernike: test_cross_hexikes", "there are no modes of a hexagon"),
+    ("spacetelescope/poppy, test_zernike: test_cross_hexikes", "`optics` has no Zernike modes of a hexagon"),
     (
         "ehpor/hcipy, test_propagation: backward propagators",
-        "PSFs are computed forwards; `optics.propagate` goes backwards, which `backward_propagation` tests",
+        "`optics.propagate` propagates backwards, and the proof `backward_propagation` tests it",
     ),
     (
         "brandondube/prysm, test_thinfilm and ray tracing",
@@ -32,6 +32,6 @@ UNEXPRESSED = (
     ),
     (
         "opticspy/lightpipes, examples of diffraction",
-        "plot images without assertions; their spot of Poisson is the ring's light on the axis",
+        "the examples only plot images; their Poisson spot corresponds to the light on the axis behind a ring",
     ),
 )
