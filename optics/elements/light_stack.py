@@ -152,10 +152,8 @@ class LightStack:
                 total -= ahead
         return total
 
-    def amplitude(self, x: np.ndarray, y: np.ndarray) -> np.ndarray | None:
-        """Return the amplitudes that masks transmit at points (x, y) [m], (beam, y, x); None without masks."""
-        if all(beam.pupil.mask is None for beam in self.beams):
-            return None
+    def amplitude(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the amplitudes that masks transmit at points (x, y) [m], (beam, y, x)."""
         found = np.ones(x.shape)
         for place, (beam, radius) in enumerate(zip(self.beams, self.radius, strict=True)):
             if beam.pupil.mask is not None:

@@ -62,7 +62,6 @@ class Problem:
     differentiated: whether the PSF carries derivatives.
     moves: whether derivatives with respect to the distance are requested.
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
-    mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: largest phase [rad] of neglected detail, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
     steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Light beyond `reach` is lost.
@@ -86,7 +85,6 @@ class Problem:
     differentiated: bool = False
     moves: bool = False
     knots: DerivativeKnots | None = None
-    mask_detail: float = 0.0
     detail_part: float = DETAIL_PART
     all_light: bool = False
     steep: bool = False
@@ -134,11 +132,6 @@ class Problem:
     def slopes(self) -> Slopes:
         """Slopes of the wavefront, on a grid that resolves all maps."""
         return self.light.pupil.slopes(self.light.wavelength, self.light.source)
-
-    @cached_property
-    def sampled_slopes(self) -> Slopes:
-        """Slopes of the wavefront at a limited number of points, which may miss the steepest point."""
-        return self.light.pupil.sampled_slopes(self.light.wavelength, self.light.source)
 
     @cached_property
     def detail(self) -> float:
@@ -254,9 +247,7 @@ class Problem:
     def steepest_sine(self) -> float:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
         straight = self.radius / math.hypot(self.radius, self.distance)
-        slopes = (
-            self.sampled_slopes.steepest_inside if self.pixelated is not None else float(self.stack.slopes.steepest[0])
-        )
+        slopes = self.slopes.steepest_inside if self.pixelated is not None else float(self.stack.slopes.steepest[0])
         if SLOPE_MARGIN * slopes >= straight * self.medium_n:
             return straight  # all slopes and finer detail can only increase the sine of light that leaves the pupil
         band = SLOPE_MARGIN * slopes / self.light.wavelength + self.detail
@@ -300,7 +291,6 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float
         tolerance=tolerance,
         dtype=dtype,
         masked=pupil.mask is not None,
-        mask_detail=0.0 if pupil.mask is None else pupil.mask.bandwidth(min(tolerance, 0.1), pupil.radius),
         medium_n=beam.index,
         spread=light_spread(pupil),
         even=on_axis and window.centre == (0.0, 0.0) and pupil.mirror_symmetric(wavelength),

@@ -119,17 +119,14 @@ class SineStack(SineGeometry):
         dtype: type of the real and imaginary parts, in which the phase is rounded, "float32" or "float64".
         """
         size = self._sizes(dtype) / stack.wavelength[:, None, None].astype(dtype)
-        near = (2 * np.pi * stack.distance / stack.wavelength).min() < FAR
-        if not near and all(beam.pupil.mask is None for beam in stack.beams):
-            return np.asarray(turned(size, self._waves(stack), dtype))
-        x, y = self.points
-        amplitude = stack.amplitude(x, y)
-        size = size if amplitude is None else size * amplitude
+        if any(beam.pupil.mask is not None for beam in stack.beams):
+            size = size * stack.amplitude(*self.points)
         waves = self._waves(stack)
-        if near:
-            there = (self.distance[:, None, None] / np.sqrt(self._cosine2())) / stack.wavelength[:, None, None]
-            size = size * np.sqrt(1 + 1 / np.square(2 * np.pi * there))
-            waves = waves + np.arctan(1 / (2 * np.pi * there)) / (2 * np.pi)
+        if (2 * np.pi * stack.distance / stack.wavelength).min() < FAR:
+            near = (
+                stack.wavelength[:, None, None] * np.sqrt(self._cosine2()) / (2 * np.pi * self.distance[:, None, None])
+            )
+            size, waves = size * np.sqrt(1 + near * near), waves + np.arctan(near) / (2 * np.pi)
         return np.asarray(turned(size, waves, dtype))
 
     @cached_property
@@ -213,7 +210,7 @@ class SineStack(SineGeometry):
         return np.asarray(self.known[key])
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def single_stack(samples: SineSamples) -> SineStack:
     """Return the samples of a single pupil as a stack of one. Many PSFs have the same samples, so it is cached."""
     numbers = samples.distance, samples.steepest, samples.elsewhere, samples.edge.radius

@@ -31,8 +31,7 @@ RIPPLES, RIPPLE_EXPONENT = (0.015, 0.004), 0.5
 # Choices for the passband of the soft edge, in cycles per radius: margin at a tolerance of 0.01, exponent of the
 # tolerance, and the largest passband of the check, relative to that of the samples.
 EDGE_CYCLES, EXPONENT, SHARPER = 3.0, -0.6, 2.0
-# Choices: light that is neglected, as a share of all light; part of the stopband that may not be aliased.
-NEGLECTED, ALIASED = 3e-4, 1.0
+NEGLECTED = 3e-4  # choice: light that is neglected, as a share of all light, at a tolerance of 0.01
 # Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
 # diffraction spreads the light of a ray.
 NEAR_CYCLES, SPREAD_CYCLES = 5.0, 2.0
@@ -187,8 +186,7 @@ class WindowPlan:
             widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
             sharp = sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT
             return np.asarray(np.maximum(direct + sharp + masks, widest + self._window_cycles / 2))
-        edge = self._passband + _transitions(self._ripples[0])
-        edges = self._near_cycles + self._rim + ALIASED * edge
+        edges = self._near_cycles + self._rim + self._passband + _transitions(self._ripples[0])
         return np.asarray(masks + np.maximum(direct + SPREAD_CYCLES, edges))
 
     @cached_property
@@ -241,7 +239,7 @@ class WindowPlan:
         """Soft apertures that are as sharp as the finer samples allow."""
         if self.derivatives is not None:
             return self._narrow(FINER * self._density, CARRIED_RIPPLES[1])
-        stopband = (FINER * self._density - self._near_cycles - self._rim) / ALIASED
+        stopband = FINER * self._density - self._near_cycles - self._rim
         passband = np.maximum(stopband - _transitions(self._ripples[1]), self._passband)
         return self._wide(np.minimum(passband, SHARPER * self._passband), self._ripples[1])
 

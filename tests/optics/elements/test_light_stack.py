@@ -52,7 +52,6 @@ def test_amplitudes_and_parts():
         np.testing.assert_allclose(found, np.broadcast_to(beam.pupil.amplitude(*at), found.shape))
     some = [30, 2, 17]
     np.testing.assert_allclose(stack.part(some).waves(x[some], y[some]), stack.waves(x, y)[some], atol=1e-5)
-    assert LightStack(BEAMS[:4]).amplitude(x[:4], y[:4]) is None
 
 
 def test_slopes_are_differences_of_the_path():
