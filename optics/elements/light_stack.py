@@ -147,7 +147,7 @@ class LightStack:
             total += pupil.index_before(wavelength) * beam.source.path(x, y)
         if place in self._polynomials[1]:
             if pupil.bends(wavelength):
-                total += number(pupil.index_step(wavelength)) * relief_height(pupil, x, y)
+                total += number(pupil.index_step(wavelength)) * np.asarray(relief_height(pupil, x, y))
             if (ahead := wavefront_ahead(pupil, x, y)) is not None:
                 total -= ahead
         return total

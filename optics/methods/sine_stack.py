@@ -193,14 +193,14 @@ class SineStack(SineGeometry):
         excess /= np.sqrt(excess + rho * rho) + rho
         return np.asarray(excess)
 
-    def to_middle(self, wavelength: float, dtype: str) -> np.ndarray:
+    def to_middle(self, wavelength: float | np.ndarray, dtype: str) -> np.ndarray:
         """Return the factor between the light of samples and their contribution to the middle, (pupil, y, x), complex.
 
         It is the factor in `arriving`, for light whose amplitude includes the areas of the samples.
 
-        wavelength: wavelength [m] in the medium.
+        wavelength: wavelength [m] in the medium, a number.
         """
-        key = "to_middle", wavelength, dtype
+        key = "to_middle", float(wavelength), dtype
         if key not in self.known:
             z, cosine2 = self.distance[:, None, None], self._cosine2()
             near = wavelength * np.sqrt(cosine2) / (2 * np.pi * z)
@@ -230,7 +230,8 @@ def rim_sines(
     outermost: radii [m] of the rims.
     """
     angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)
-    rim = _sines(*(outermost[:, None] * part for part in (np.cos(angle), np.sin(angle))), centre, distance[:, None])
+    x, y = (outermost[:, None] * part for part in (np.cos(angle), np.sin(angle)))
+    rim = _sines(x, y, centre, distance[:, None])
     middle = _sines(np.zeros(len(distance)), np.zeros(len(distance)), centre, distance)
     steepest = np.hypot(*rim).max(axis=1)
     half = np.max([np.abs(at - own[:, None]).max(axis=1) for at, own in zip(rim, middle, strict=True)], axis=0)

@@ -62,7 +62,8 @@ class Path:
 
     def rounded(self, dtype: str) -> Path:
         """Return the same path with numbers of another type."""
-        return Path(*(np.asarray(part, dtype) for part in (self.wavelength, self.distance)), self.window)
+        wavelength, distance = (np.asarray(part, dtype) for part in (self.wavelength, self.distance))
+        return Path(wavelength, distance, self.window)
 
     def numbers(self, axes: int) -> tuple[float | np.ndarray, float | np.ndarray]:
         """Return wavelength and distance, with as many axes as the arrays with which they broadcast."""
@@ -165,9 +166,7 @@ def remaining_factor(
     none, points = np.zeros((1,) * directions[0].ndim), samples.points_at(*directions)
     if dtype == "float32" and path.short(samples.steepest):
         path = path.rounded(dtype)
-        points, directions, window = (
-            tuple(part.astype(dtype) for part in pair) for pair in (points, directions, window)
-        )
+        points, directions, window = (_rounded(pair, dtype) for pair in (points, directions, window))
         none = none.astype(dtype)
     size, waves = _slow(path, points, directions, window)
     middle = _slow(path, points, directions, (none, none))
@@ -198,6 +197,10 @@ def _slow(
     return z * z / distance2, excess
 
 
+def _rounded(pair: tuple[np.ndarray, np.ndarray], dtype: str) -> tuple[np.ndarray, np.ndarray]:
+    return pair[0].astype(dtype), pair[1].astype(dtype)
+
+
 def _along(
     path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -206,7 +209,7 @@ def _along(
     other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
     other = other.astype(places.dtype)
     directions, window = ((sines, other), (places, none)) if axis == 0 else ((other, sines), (none, places))
-    points = tuple(part.astype(places.dtype) for part in samples.points_at(*directions))
+    points = _rounded(samples.points_at(*directions), str(places.dtype))
     size, waves = _slow(path, points, directions, window)
     middle = _slow(path, points, directions, (none, none))
     size /= middle[0]
@@ -229,7 +232,7 @@ def cross_term(
     """
     (s, t), (u, v) = directions, window
     wavelength, z = path.numbers(s.ndim)
-    cosine = np.sqrt(1 - 2 * np.square(samples.elsewhere)).reshape(-1, *[1] * (s.ndim - 1))
+    cosine = np.sqrt(np.maximum(1 - 2 * np.square(samples.elsewhere), 0)).reshape(-1, *[1] * (s.ndim - 1))
     return u * s * (cosine * (-2j * np.pi) / (wavelength * z)), v * t
 
 
@@ -256,8 +259,8 @@ def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.n
     sides = [part[:, [0, -1]] for part in (at, place[None, :])]
     sines, few = (side.mean(axis=1)[:, None] + np.diff(side) / 2 * nodes for side in sides)
     to_sines, to_places = (even_weights(count, SMOOTH) for count in (at.shape[1], len(place)))
-    parts = (to_places @ part @ to_sines.T for part in _whole(path, samples, axis, sines, few))
-    return np.asarray(turned(*parts, dtype))
+    size, waves = (to_places @ part @ to_sines.T for part in _whole(path, samples, axis, sines, few))
+    return np.asarray(turned(size, waves, dtype))
 
 
 def _whole(
@@ -271,7 +274,7 @@ def _whole(
 
 
 def fourier_kernel(
-    at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float, dtype: str
+    at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float | np.ndarray, dtype: str
 ) -> np.ndarray:
     """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u = `at` [m] relative to the window's centre.
 

@@ -140,8 +140,8 @@ def _errors(
     (directions, (u, v), weight, _), total = at, np.zeros(1)
     for a, across in enumerate(lagrange_basis(u, nodes)):
         for b, down in enumerate(lagrange_basis(v, nodes)):
-            place = (np.full((1,) * exact.ndim, node) for node in (nodes[a], nodes[b]))
-            total = total + across * down * remaining_factor(path, geometry, directions, tuple(place))
+            place = np.full((1,) * exact.ndim, nodes[a]), np.full((1,) * exact.ndim, nodes[b])
+            total = total + across * down * remaining_factor(path, geometry, directions, place)
     return _rms(exact - total, weight)
 
 

@@ -38,7 +38,7 @@ CROSSED_RANK = 3  # Rank 2 is less accurate than `cross_term`.
 class WindowSampling:
     """Samples of the pupil, finer samples for the check, and the rank of the slow factor over the window.
 
-    crossed: whether sums without derivatives include `cross_term`. Other sums have at least the rank CROSSED_RANK instead.
+    crossed: whether `plain_intensity` includes `cross_term`. Other sums have at least the rank CROSSED_RANK instead.
     half_width: distance [m] from the middle of the window within which the interpolation points lie.
     """
 
