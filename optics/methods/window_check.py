@@ -88,7 +88,7 @@ def _ratios(
     """Return interpolation points in sines, (pupil, a), and the factor there, (stack, v, u, b, a).
 
     The factor is the slow factor relative to the middle of the window, divided by its values along both axes. Its
-    interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. The
+    interpolation is compared with the factor at the rim, for the outermost columns and rows of each window. The
     search starts with a number of points that is usually sufficient for the phase there.
     """
 
@@ -101,8 +101,8 @@ def _ratios(
 
     angle, outermost = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None]
     rim = samples.directions(outermost * np.cos(angle), outermost * np.sin(angle))
-    ends = [np.array([[part.min(), part.max()]]) for part in place]
-    exact = ratio(rim, *ends)
+    ends = [0, -1]  # rows and columns ascend
+    exact = ratio(rim, *(part[:, ends] for part in place))
     phase = float(np.abs(np.angle(exact)).max())
     side = samples.at[:, [0, -1]]
     middle, half = side.mean(axis=1)[:, None], np.diff(side) / 2
@@ -110,10 +110,11 @@ def _ratios(
         nodes = middle + half * chebyshev_points(order)
         own = np.broadcast_to(nodes[:, None, :], (len(nodes), order, order))
         weight = [lagrange_basis((part - middle) / half, chebyshev_points(order)) for part in rim]
-        at_nodes = ratio((own, own.swapaxes(1, 2)), *ends)
-        if np.abs(np.einsum("nvuba,bnk,ank->nvuk", at_nodes, weight[1], weight[0]) - exact).max() < most:
+        found = ratio((own, own.swapaxes(1, 2)), *place)
+        outer = found[:, ends][:, :, ends]
+        if np.abs(np.einsum("nvuba,bnk,ank->nvuk", outer, weight[1], weight[0]) - exact).max() < most:
             break
-    return nodes, ratio((own, own.swapaxes(1, 2)), *place)
+    return nodes, found
 
 
 def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -34,7 +34,7 @@ EDGE_CYCLES, EXPONENT, SHARPER = 3.0, -0.6, 2.0
 NEGLECTED = 3e-4  # choice: light that is neglected, as a share of all light, at a tolerance of 0.01
 # Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
 # diffraction spreads the light of a ray.
-NEAR_CYCLES, SPREAD_CYCLES = 5.0, 2.0
+NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
 # Choices: distance from the axis [radii] beyond which rays count as rays of the edge, and cycles of most of these rays,
 # relative to their median.
 RIM, RIM_CYCLES = 0.85, 1.2

@@ -18,7 +18,7 @@ __all__ = ["DERIVATIVE_ERROR", "Derivatives", "WindowRays", "window_ranks"]
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
 # Choices: parts of these errors that the rank may take, and with `cross_term`, whose remaining phase depends mostly on
 # the position in the window alone.
-RANK_SHARE, CROSSED_SHARE = 0.25, 0.9
+RANK_SHARE, CROSSED_SHARE = 0.3, 0.9
 RAYS, PLACES = 100, 6  # choices: numbers of rays, and of places along a side of the window, that determine the rank
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
 OUTSIDE = 1e-3  # choice: weight of rays that miss the window
@@ -138,6 +138,8 @@ def _errors(
     exact: the slow factor at these points and positions.
     """
     (directions, (u, v), weight, _), total = at, np.zeros(1)
+    if len(nodes) == 1:
+        return _rms(exact - 1, weight)
     for a, across in enumerate(lagrange_basis(u, nodes)):
         for b, down in enumerate(lagrange_basis(v, nodes)):
             place = np.full((1,) * exact.ndim, nodes[a]), np.full((1,) * exact.ndim, nodes[b])
