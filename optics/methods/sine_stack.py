@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from optics.apertures.aperture import SoftAperture
+from optics.apertures.circular import SoftAnnulus
+from optics.apertures.curved_disk import curved_ring
 from optics.elements.light_stack import LightStack
 from optics.methods.sine_samples import MOST_SQUARE, MOST_STRETCH, RIM, SineSamples
 from optics.numerics.array_library import turned
@@ -72,11 +74,13 @@ class SineStack(SineGeometry):
     at: sines along either axis minus those of the pupil's centre, (pupil, sample), evenly spaced.
     edges: soft apertures, (pupil,).
     radius: radii [m], (pupil,).
+    curvature: curvatures of waves that are smoothed with the edges, see `curved_ring`, (pupil,).
     """
 
     at: np.ndarray
     edges: tuple[SoftAperture, ...]
     radius: np.ndarray
+    curvature: np.ndarray
 
     def smooth(self, reach: float) -> bool:
         """Return whether paths to points up to `reach` [m] from the axis vary smoothly over all samples."""
@@ -127,7 +131,11 @@ class SineStack(SineGeometry):
                 stack.wavelength[:, None, None] * np.sqrt(self._cosine2()) / (2 * np.pi * self.distance[:, None, None])
             )
             size, waves = size * np.sqrt(1 + near * near), waves + np.arctan(near) / (2 * np.pi)
-        return np.asarray(turned(size, waves, dtype))
+        if not self.curvature.any():
+            return np.asarray(turned(size, waves, dtype))
+        found = turned(1.0, waves, dtype)
+        found *= size
+        return np.asarray(found)
 
     @cached_property
     def known(self) -> dict[Any, Any]:
@@ -135,7 +143,10 @@ class SineStack(SineGeometry):
         return {}
 
     def _sizes(self, dtype: str) -> np.ndarray:
-        """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x)."""
+        """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x).
+
+        The transmittance of smoothed waves is complex.
+        """
         if dtype not in self.known:
             self.known[dtype] = self._new_sizes(dtype)
         return np.asarray(self.known[dtype])
@@ -143,8 +154,11 @@ class SineStack(SineGeometry):
     def _new_sizes(self, dtype: str) -> np.ndarray:
         cosine2 = self._cosine2(dtype)
         size = (self.distance * np.square(self.pitch))[:, None, None].astype(dtype) / cosine2
-        first: dict[int, int] = {}
-        same = np.array([first.setdefault(id(edge), place) for place, edge in enumerate(self.edges)])
+        if self.curvature.any():
+            size = size.astype(np.result_type(dtype, np.complex64))
+        first: dict[tuple[int, float], int] = {}
+        kinds = zip(map(id, self.edges), self.curvature.tolist(), strict=True)
+        same = np.array([first.setdefault(kind, place) for place, kind in enumerate(kinds)])
         for place in first.values():
             own = slice(None) if len(first) == 1 else np.flatnonzero(same == place)
             edge, radius = self.edges[place], self.radius[own, None, None]
@@ -157,7 +171,8 @@ class SineStack(SineGeometry):
                 else:
                     x, y = self.points
                     level = (np.square(x[own]) + np.square(y[own])) * per_level
-                size[own] *= _profile(edge).astype(dtype).take(level.astype(np.int32), mode="clip")
+                profile = _profile(edge, float(self.curvature[place])).astype(size.dtype)
+                size[own] *= profile.take(level.astype(np.int32), mode="clip")
             else:
                 x, y = self.points
                 size[own] *= _transmittance(edge, x[own] / radius, y[own] / radius)
@@ -216,7 +231,7 @@ def single_stack(samples: SineSamples) -> SineStack:
     numbers = samples.distance, samples.steepest, samples.elsewhere, samples.edge.radius
     distance, steepest, elsewhere, radius = (np.array([value]) for value in numbers)
     edges = (samples.edge.aperture,)
-    return SineStack(distance, samples.centre, steepest, elsewhere, samples.at[None], edges, radius)
+    return SineStack(distance, samples.centre, steepest, elsewhere, samples.at[None], edges, radius, np.zeros(1))
 
 
 def rim_sines(
@@ -267,9 +282,11 @@ def even_weights(samples: int, count: int) -> np.ndarray:
     return np.ascontiguousarray(lagrange_basis(np.linspace(-1, 1, samples), chebyshev_points(count)).T)
 
 
-@lru_cache(maxsize=128)
-def _profile(edge: SoftAperture) -> np.ndarray:
+@lru_cache(maxsize=256)
+def _profile(edge: SoftAperture, curvature: float) -> np.ndarray:
     """Return the transmittance in the middle of LEVELS equal steps of r², up to the rim, and 0 beyond."""
+    if curvature and isinstance(edge, SoftAnnulus):
+        return np.append(curved_ring(edge.edge, edge.inner, curvature, LEVELS), 0)
     types = precision("float64")
     r = np.sqrt((np.arange(LEVELS) + 0.5) / LEVELS) * (1 + edge.reach)
     found = edge.transmittance(types.Float64(r), types.Float64(np.zeros(LEVELS)), types).numpy()

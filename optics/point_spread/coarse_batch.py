@@ -44,7 +44,7 @@ def coarse_psfs(
     for attempt in range(TRIES):
         if not places:
             return
-        plan = WindowPlan(stack, window, wanted)
+        plan = WindowPlan(stack, window, wanted, smoothed=True)
         failed = []
         for mine, images, errors in _computed(plan, dtype):
             for place, image, error in zip(mine, images, errors, strict=True):
