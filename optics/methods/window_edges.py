@@ -45,6 +45,7 @@ RIM, RIM_CYCLES = 0.85, 1.2
 CARRIED_RIPPLES, CARRIED_PASSBAND = (0.03, 0.0075), 0.35
 CARRIED_CYCLES, CARRIED_RIM_CYCLES, CARRIED_EXPONENT, CELL_CYCLES = 7.6, 5.7, -0.4, 0.375
 EDGES = 4  # choice: number of sharpnesses of the edge per octave; equal ones share tables
+SMOOTHED_RIPPLE = 0.1  # choice: ripple for smoothed waves, whose brightest light it affects, relative to others
 CURVATURE_STEP = 1.0  # choice: step of the curvature in cycles per radius; equal ones share tables
 WORTH = 0.9  # choice: ratio of numbers of samples along an axis below which a smoothed wave saves time
 FINER = 2.0 ** (1 / 3)  # choice: density of the finer samples of the check, relative to that of the samples
@@ -82,7 +83,7 @@ class WindowEdges:
         """Soft apertures of the samples, (beam,)."""
         if self.derivatives is not None:
             return self._narrow(self.density, CARRIED_RIPPLES[0])
-        return self._wide(self._choice[1].passband, self._ripples[0])
+        return self._wide(self._choice[1].passband, self._ripples(self.curvature)[0])
 
     @cached_property
     def finer_edges(self) -> list[SoftAperture]:
@@ -90,8 +91,8 @@ class WindowEdges:
         if self.derivatives is not None:
             return self._narrow(FINER * self.density, CARRIED_RIPPLES[1])
         bands = self._choice[1]
-        passband = np.maximum(FINER * self.density - bands.around - _transitions(self._ripples[1]), bands.passband)
-        return self._wide(np.minimum(passband, SHARPER * bands.passband), self._ripples[1])
+        passband = np.maximum(FINER * self.density - bands.around - _transitions(self._ripples(self.curvature)[1]), bands.passband)
+        return self._wide(np.minimum(passband, SHARPER * bands.passband), self._ripples(self.curvature)[1])
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, _Bands]:
@@ -132,7 +133,7 @@ class WindowEdges:
         passband = near + EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
         seen = np.where(along <= (cycles + SPREAD_CYCLES)[:, None], np.abs(bend) * r, 0).max(axis=1)
         passband = np.maximum(passband, seen)
-        stopband = passband + _transitions(self._ripples[0])
+        stopband = passband + _transitions(self._ripples(curvature)[0])
         reach = self._reach(np.where(np.abs(bend) * r > stopband[:, None], 0, along))
         return _Bands(self._masks + np.maximum(cycles + reach + SPREAD_CYCLES, near + stopband), passband, near)
 
@@ -186,10 +187,10 @@ class WindowEdges:
         cycles = (stack.radius / stack.vacuum_wavelength)[:, None]
         return (slopes.along_x + x * scale) * cycles, (slopes.along_y + y * scale) * cycles
 
-    @cached_property
-    def _ripples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ripples of the soft edges of the samples and of the finer samples, which fall in steps, (beam,)."""
+    def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ripples of the soft edges of the samples and of the finer samples, which fall in steps, (beam,)."""
         share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0) ** RIPPLE_EXPONENT
+        share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
         return RIPPLES[0] * share, RIPPLES[1] * share
 
     def _wide(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
