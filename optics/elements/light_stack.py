@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ __all__ = ["LightStack", "StackSlopes"]
 SPHERE_POINTS = (
     8  # choice: number of Chebyshev points across the pupil for spheres, in addition to those of polynomials
 )
-FEW, MANY = 27, 53  # choices: points across the pupil at which slopes are evaluated, without and with fine detail
+FEW, MANY = 21, 53  # choices: points across the pupil at which slopes are evaluated, without and with fine detail
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +71,27 @@ class LightStack:
         """Distances of the window behind the pupils [m], (beam,)."""
         return np.array([number(beam.distance) for beam in self.beams])
 
-    @cached_property
+    @property
     def index(self) -> np.ndarray:
         """Refractive indices behind the pupils, (beam,)."""
-        return np.array([beam.index for beam in self.beams])
+        return self._indices[0]
+
+    @cached_property
+    def _indices(self) -> np.ndarray:
+        """Refractive indices behind and before the pupils, and the steps of the reliefs, (3, beam).
+
+        Pupils of a population often have the same media, whose curves are then evaluated once.
+        """
+        known: dict[Any, tuple[float, float, float]] = {}
+        found = []
+        for beam in self.beams:
+            pupil, wavelength = beam.pupil, beam.wavelength
+            media = pupil.n, pupil.medium_n, pupil.object_n, wavelength
+            if media not in known:
+                step = number(pupil.index_step(wavelength))
+                known[media] = beam.index, pupil.index_before(wavelength), step
+            found.append(known[media])
+        return np.array(found).reshape(-1, 3).T
 
     @cached_property
     def vacuum_wavelength(self) -> np.ndarray:
@@ -91,7 +109,7 @@ class LightStack:
         """Spherical waves: their indices (negative for waves that converge) and the distances of their centres [m]."""
         focal = [beam.pupil.thin_lens_focal_length for beam in self.beams]
         lenses = np.array([math.inf if f is None else number(f) for f in focal])
-        before = np.array([beam.pupil.index_before(beam.wavelength) for beam in self.beams])
+        before = self._indices[1]
         sources = np.array([math.inf if self._tilted[k] else b.source.distance for k, b in enumerate(self.beams)])
         known = (-np.sign(lenses) * self.index, np.abs(lenses)), (before, sources)
         return [(index, distance) for index, distance in known if np.isfinite(distance).any()]
@@ -103,7 +121,8 @@ class LightStack:
     @cached_property
     def _polynomials(self) -> tuple[np.ndarray, list[int]]:
         """Coefficients of `powers_of` for each beam, and the beams whose reliefs or wavefronts are no polynomials."""
-        known = [powers_of(beam.pupil, beam.wavelength) for beam in self.beams]
+        steps = self._indices[2].tolist()
+        known = [powers_of(beam.pupil, beam.wavelength, step) for beam, step in zip(self.beams, steps, strict=True)]
         size = max([len(one) for one in known if one is not None], default=1)
         found = np.zeros((len(known), size, size))
         for place, one in enumerate(known):
@@ -142,12 +161,12 @@ class LightStack:
     def _other_path(self, place: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the part of the path [m] of one beam that is neither a polynomial nor a sphere about the axis."""
         beam, total = self.beams[place], np.zeros(np.broadcast_shapes(x.shape, y.shape))
-        pupil, wavelength = beam.pupil, beam.wavelength
+        pupil = beam.pupil
         if self._tilted[place]:
-            total += pupil.index_before(wavelength) * beam.source.path(x, y)
+            total += self._indices[1][place] * beam.source.path(x, y)
         if place in self._polynomials[1]:
-            if pupil.bends(wavelength):
-                total += number(pupil.index_step(wavelength)) * np.asarray(relief_height(pupil, x, y))
+            if pupil.height is not None and self._indices[2][place] != 0:
+                total += self._indices[2][place] * np.asarray(relief_height(pupil, x, y))
             if (ahead := wavefront_ahead(pupil, x, y)) is not None:
                 total -= ahead
         return total

@@ -14,7 +14,7 @@ import numpy as np
 from optics.elements.relief import BSplineRelief
 from optics.elements.wavefront import UM, Zernike
 from optics.elements.zernike_modes import norm
-from optics.numerics.autodiff import number, plain
+from optics.numerics.autodiff import plain
 
 if TYPE_CHECKING:
     from optics.elements.pupil import Pupil
@@ -27,21 +27,21 @@ SPLINES = np.array([[1, -3, 3, -1], [23, -15, -3, 3], [23, 15, -3, -3], [1, 3, 3
 FEW_WAVES = 50.0  # choice: sum of all coefficients [waves] up to which float32 is sufficient
 
 
-def powers_of(pupil: Pupil, wavelength: float) -> np.ndarray | None:
+def powers_of(pupil: Pupil, wavelength: float, step: float) -> np.ndarray | None:
     """Return coefficients of the phase of relief and wavefront [waves], (power of y, power of x), without the constant.
 
     Positions are in units of the pupil's radius. The result is None if a part is not a polynomial of moderate order.
 
     wavelength: wavelength [m] in vacuum.
+    step: difference of refractive indices at the relief.
     """
-    relief = pupil.height if pupil.bends(wavelength) else None
-    wavefront, found = pupil.wavefront, np.zeros((1, 1))
+    relief, wavefront, found = pupil.height if step else None, pupil.wavefront, np.zeros((1, 1))
     if relief is not None and not isinstance(relief, BSplineRelief):
         return None
     if wavefront is not None and not (isinstance(wavefront, Zernike) and wavefront.order <= HIGHEST_ORDER):
         return None
     if relief is not None:
-        found = SPLINES.T @ plain(relief.control_points) @ SPLINES * (number(pupil.index_step(wavelength)) / wavelength)
+        found = SPLINES.T @ plain(relief.control_points) @ SPLINES * (step / wavelength)
     if wavefront is not None:
         size = max(len(found), wavefront.order + 1)
         found = np.pad(found, (0, size - len(found)))

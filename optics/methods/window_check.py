@@ -21,7 +21,7 @@ __all__ = ["window_errors"]
 
 CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_sampling.py
 UNSEEN = 0.05  # choice: error that both sums may share, relative to the tolerance
-ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
+ACROSS = 10  # choice: number of rows and of columns in which the check computes the PSF
 SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
 INTERPOLATED = 0.5  # choice: largest error of the interpolated kernel of the check, relative to the tolerance
 # Choices: numbers of interpolation points across the pupil, and phases [rad] from which on each is too small.

@@ -46,7 +46,8 @@ CARRIED_RIPPLES, CARRIED_PASSBAND = (0.03, 0.0075), 0.35
 CARRIED_CYCLES, CARRIED_RIM_CYCLES, CARRIED_EXPONENT, CELL_CYCLES = 7.6, 5.7, -0.4, 0.375
 EDGES = 4  # choice: number of sharpnesses of the edge per octave; equal ones share tables
 SMOOTHED_RIPPLE = 0.1  # choice: ripple for smoothed waves, whose brightest light it affects, relative to others
-CURVATURE_STEP = 1.0  # choice: step of the curvature in cycles per radius; equal ones share tables
+# Choices: step of the curvature in cycles per radius, so that pupils share tables, and the least useful curvature.
+CURVATURE_STEP, LEAST_CURVATURE = 1.0, 3.0
 WORTH = 0.9  # choice: ratio of numbers of samples along an axis below which a smoothed wave saves time
 FINER = 2.0 ** (1 / 3)  # choice: density of the finer samples of the check, relative to that of the samples
 
@@ -91,7 +92,9 @@ class WindowEdges:
         if self.derivatives is not None:
             return self._narrow(FINER * self.density, CARRIED_RIPPLES[1])
         bands = self._choice[1]
-        passband = np.maximum(FINER * self.density - bands.around - _transitions(self._ripples(self.curvature)[1]), bands.passband)
+        passband = np.maximum(
+            FINER * self.density - bands.around - _transitions(self._ripples(self.curvature)[1]), bands.passband
+        )
         return self._wide(np.minimum(passband, SHARPER * bands.passband), self._ripples(self.curvature)[1])
 
     @cached_property
@@ -101,7 +104,9 @@ class WindowEdges:
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
             return none, flat
-        curvature = np.where(self._round, self._rim_curvature, 0)
+        curvature = np.where(self._round & (np.abs(self._rim_curvature) >= LEAST_CURVATURE), self._rim_curvature, 0)
+        if not curvature.any():
+            return none, flat
         curved = self._bands(curvature)
         chosen = (curvature != 0) & (curved.density < WORTH * flat.density)
         return np.where(chosen, curvature, 0), curved.where(chosen, flat)
@@ -168,7 +173,8 @@ class WindowEdges:
         """
         share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
         last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
-        return np.asarray(np.take_along_axis(np.sort(along, axis=1), last[:, None], axis=1)[:, 0])
+        ordered = np.partition(along, np.unique(last), axis=1)
+        return np.asarray(np.take_along_axis(ordered, last[:, None], axis=1)[:, 0])
 
     @cached_property
     def _window_cycles(self) -> np.ndarray:

@@ -77,10 +77,11 @@ def _computed(plan: WindowPlan, dtype: str) -> Iterator[tuple[np.ndarray, np.nda
 
 def _plan(plan: WindowPlan, place: int, dtype: str, error: float) -> Plan:
     stack, across = plan.stack, 2 * int(plan.counts[place]) + 1
-    pupil, wavelength = stack.beams[place].pupil, stack.wavelength[place]
+    pupil, wavelength, distance = stack.beams[place].pupil, stack.wavelength[place], float(stack.distance[place])
     band = SLOPE_MARGIN * stack.slopes.steepest[place] / stack.vacuum_wavelength[place] + 1 / pupil.radius
-    band += pupil.bandwidth(stack.beams[place].wavelength, DETAIL_PART * plan.tolerance[place])
-    sine = steepest_sine(pupil.radius, float(stack.distance[place]), band * wavelength)
+    if steepest_sine(pupil.radius, distance, band * wavelength) == band * wavelength:  # else the rim limits the sine
+        band += pupil.bandwidth(stack.beams[place].wavelength, DETAIL_PART * plan.tolerance[place])
+    sine = steepest_sine(pupil.radius, distance, band * wavelength)
     scalar = scalar_theory_error(sine, light_spread(pupil))
     why = "as few samples as the light in the window needs"
     return Plan("low_rank", (across, across), dtype, error, why, float(plan.seconds[place]), scalar_error=scalar)

@@ -69,11 +69,11 @@ def test_zernike_polynomials_are_sums_of_powers():
     for n in range(HIGHEST_ORDER + 1):
         for m in range(-n, n + 1, 2):
             pupil = optics.Pupil(10e-6, wavefront=optics.Zernike({(n, m): 1e-3}))
-            waves = power_sum(1e3 * powers_of(pupil, 1e-6)[None], x, y)
+            waves = power_sum(1e3 * powers_of(pupil, 1e-6, 0.0)[None], x, y)
             expected = mode(n, m, np.zeros(1), np.zeros(1)) - mode(n, m, x, y)
             np.testing.assert_allclose(waves, expected, atol=3e-5)
 
 
 @pytest.mark.parametrize("name", ["high mode", "maps"])
 def test_other_elements_are_no_polynomials(name):
-    assert powers_of(PUPILS[name], WAVE) is None
+    assert powers_of(PUPILS[name], WAVE, 0.5) is None
