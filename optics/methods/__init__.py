@@ -21,6 +21,7 @@ low_rank             one matrix product, with a Fourier kernel times a slow fact
 slow_factor          the slow factor of `low_rank`, and the points of the window that interpolate it
 window_sampling      `low_rank` at coarse tolerances, for one PSF
 window_plan          samples of several pupils that the light in a window needs, at coarse tolerances
+window_edges         soft edges and densities of these samples, smoothed waves of wide pupils without a lens
 window_rank          rank of the slow factor for the samples of `window_plan`
 window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         several sources and wavelengths through one pupil, from the same samples

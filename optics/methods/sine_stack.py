@@ -24,7 +24,8 @@ from optics.numerics.precision import padded_for_packets, precision
 
 __all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines", "single_stack"]
 
-LEVELS = 16384  # choice: number of values in a table of the transmittance against r²
+# Choices for tables of the transmittance against r²: number of values per cycle of the edge, and of smoothed waves.
+PER_CYCLE, SMOOTHED_LEVELS = 1000, 16384
 SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a few points
 FAR = 1000.0  # choice: smallest kz for which the near-field term of the kernel is constant over the pupil
 
@@ -163,7 +164,8 @@ class SineStack(SineGeometry):
             own = slice(None) if len(first) == 1 else np.flatnonzero(same == place)
             edge, radius = self.edges[place], self.radius[own, None, None]
             if edge.rotationally_symmetric:
-                per_level = LEVELS / ((1 + edge.reach) * radius) ** 2
+                profile = _profile(edge, float(self.curvature[place])).astype(size.dtype)
+                per_level = (len(profile) - 1) / ((1 + edge.reach) * radius) ** 2
                 if self.centre == (0.0, 0.0):  # r² = z² (1/cos²θ - 1)
                     scale = (np.square(self.distance)[own, None, None] * per_level).astype(dtype)
                     level = scale / cosine2[own]
@@ -171,7 +173,6 @@ class SineStack(SineGeometry):
                 else:
                     x, y = self.points
                     level = (np.square(x[own]) + np.square(y[own])) * per_level
-                profile = _profile(edge, float(self.curvature[place])).astype(size.dtype)
                 size[own] *= profile.take(level.astype(np.int32), mode="clip")
             else:
                 x, y = self.points
@@ -284,10 +285,10 @@ def even_weights(samples: int, count: int) -> np.ndarray:
 
 @lru_cache(maxsize=256)
 def _profile(edge: SoftAperture, curvature: float) -> np.ndarray:
-    """Return the transmittance in the middle of LEVELS equal steps of r², up to the rim, and 0 beyond."""
+    """Return the transmittance in the middle of equal steps of r², up to the outermost radius, and 0 beyond."""
     if curvature and isinstance(edge, SoftAnnulus):
-        return np.append(curved_ring(edge.edge, edge.inner, curvature, LEVELS), 0)
-    types = precision("float64")
-    r = np.sqrt((np.arange(LEVELS) + 0.5) / LEVELS) * (1 + edge.reach)
-    found = edge.transmittance(types.Float64(r), types.Float64(np.zeros(LEVELS)), types).numpy()
+        return np.append(curved_ring(edge.edge, edge.inner, curvature, SMOOTHED_LEVELS), 0)
+    types, levels = precision("float64"), 2 ** math.ceil(math.log2(PER_CYCLE * edge.stopband))
+    r = np.sqrt((np.arange(levels) + 0.5) / levels) * (1 + edge.reach)
+    found = edge.transmittance(types.Float64(r), types.Float64(np.zeros(levels)), types).numpy()
     return np.append(found, 0.0)

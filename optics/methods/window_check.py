@@ -128,7 +128,7 @@ def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     found, roots, squares = [], np.sqrt(images), np.square(images)
     for along in (2, 1):
-        root, bright = (part.sum(axis=along, dtype=np.float64) for part in (roots, squares))
+        root, bright = (part.sum(axis=along).astype(np.float64) for part in (roots, squares))
         bright[:, 1:-1] = bright[:, :-2] + bright[:, 1:-1] + bright[:, 2:]
         size = root.shape[1]
         sides = np.zeros(size)

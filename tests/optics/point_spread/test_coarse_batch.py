@@ -10,7 +10,7 @@ import optics
 from optics import Grid, PointSource
 from optics.elements.beam import Beam
 from optics.elements.light_stack import LightStack
-from optics.methods import window_plan
+from optics.methods import window_edges, window_plan
 from optics.point_spread.coarse_batch import coarse_psfs
 from tests.optics.device_types import Float64
 from validation.reference import relative_l2
@@ -144,9 +144,9 @@ def test_masks_that_are_bright_where_the_aperture_is_shut(inner, waist, toleranc
 
 def test_a_failing_check_leads_to_a_second_attempt(monkeypatch):
     """The first samples blur the rim, from which light diffracts into the window. The second samples resolve it."""
-    monkeypatch.setattr(window_plan, "RIM_CYCLES", 0.8)
-    monkeypatch.setattr(window_plan, "EDGE_CYCLES", 0.2)
-    monkeypatch.setattr(window_plan, "EXPONENT", -3.0)
+    monkeypatch.setattr(window_edges, "RIM_CYCLES", 0.8)
+    monkeypatch.setattr(window_edges, "EDGE_CYCLES", 0.2)
+    monkeypatch.setattr(window_edges, "EXPONENT", -3.0)
     beams, window = [beam(pupil) for pupil in eyes(4, (20e-6, 40e-6), power=0.0)], Grid.square(33, 0.5e-6)
     first = window_plan.WindowPlan(LightStack(tuple(beams)), window, np.full(4, 1e-2))
     found = {index: plan.samples[0] for index, _, plan in coarse_psfs(beams, window, 1e-2, "float32")}
