@@ -164,7 +164,7 @@ class SineStack(SineGeometry):
             own = slice(None) if len(first) == 1 else np.flatnonzero(same == place)
             edge, radius = self.edges[place], self.radius[own, None, None]
             if edge.rotationally_symmetric:
-                profile = _profile(edge, float(self.curvature[place])).astype(size.dtype)
+                profile = _profile(edge, float(self.curvature[place]), dtype)
                 per_level = (len(profile) - 1) / ((1 + edge.reach) * radius) ** 2
                 if self.centre == (0.0, 0.0):  # r² = z² (1/cos²θ - 1)
                     scale = (np.square(self.distance)[own, None, None] * per_level).astype(dtype)
@@ -284,11 +284,14 @@ def even_weights(samples: int, count: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=256)
-def _profile(edge: SoftAperture, curvature: float) -> np.ndarray:
-    """Return the transmittance in the middle of equal steps of r², up to the outermost radius, and 0 beyond."""
+def _profile(edge: SoftAperture, curvature: float, dtype: str) -> np.ndarray:
+    """Return the transmittance in the middle of equal steps of r², up to the outermost radius, and 0 beyond.
+
+    dtype: type of real transmittances. The table of a smoothed wave has single precision.
+    """
     if curvature and isinstance(edge, SoftAnnulus):
         return np.append(curved_ring(edge.edge, edge.inner, curvature, SMOOTHED_LEVELS), 0)
     types, levels = precision("float64"), 2 ** math.ceil(math.log2(PER_CYCLE * edge.stopband))
     r = np.sqrt((np.arange(levels) + 0.5) / levels) * (1 + edge.reach)
     found = edge.transmittance(types.Float64(r), types.Float64(np.zeros(levels)), types).numpy()
-    return np.append(found, 0.0)
+    return np.append(found, 0.0).astype(dtype)

@@ -117,10 +117,10 @@ def psf_batch(
     source_distances: distances [m] of sources on the axis.
     dx, shape, tolerance, method, dtype: see `optics.psf`.
 
-    Pupils without a relief, or with a smooth relief of 4 x 4 points, can share one plan and one stack of matrix
-    products. They may have Zernike wavefronts, masks, and different media in front and behind. The shared plan computes
-    thousands of PSFs per second. It is used if the tolerance is 1e-3 or more and the plan is accurate enough. All other
-    PSFs are planned first. Each of them is then computed while the next one is prepared.
+    At tolerances of 3e-4 or more, all PSFs are planned together, and PSFs with equal numbers of samples are computed as
+    stacks of matrix products. The error of each PSF is checked. Pupils with derivatives or pixels are excluded, as are
+    PSFs that remain inaccurate or take long. They are planned one by one, and each is computed while the next one is
+    prepared.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.
@@ -176,7 +176,7 @@ def _joined(
 ) -> tuple[Array, list[Plan]]:
     """Return all PSFs in one array, and their plans.
 
-    known, rest: PSFs of the shared plan, and all other PSFs, by index.
+    known, rest: PSFs of stacks, and all other PSFs, by index.
     """
     import drjit as dr
 
