@@ -113,7 +113,7 @@ class WindowEdges:
 
     @cached_property
     def _round(self) -> np.ndarray:
-        """Whether the apertures are disks or rings, (beam,)."""
+        """True for apertures that are disks or rings, (beam,)."""
         return np.array([isinstance(beam.pupil.aperture, Circle | Annulus) for beam in self.stack.beams])
 
     @cached_property

@@ -80,7 +80,7 @@ class WindowPlan:
 
     @property
     def crossed(self) -> np.ndarray:
-        """Whether the sums include `cross_term`, (beam,)."""
+        """True for sums that include `cross_term`, (beam,)."""
         return self._ranks[1]
 
     @cached_property

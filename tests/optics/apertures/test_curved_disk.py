@@ -38,7 +38,7 @@ def test_a_smoothed_wave_is_the_convolution_with_the_kernel(inner, curvature):
 
 
 def test_light_beyond_the_stopband_is_removed():
-    """At a distance r from the axis, the wave has 22 r cycles per radius."""
+    """The wave has 22 r cycles per radius at the distance r from the axis."""
     found, r = np.abs(curved_ring(EDGE, 0.0, 22.0, LEVELS)), radii()
     assert np.abs(found[r < 0.25] - 1).max() < 0.02
     assert found[(r > 0.8) & (r < 0.9)].max() < 0.06
