@@ -88,7 +88,7 @@ def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: floa
     lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
 
     def rest(at: np.ndarray) -> np.ndarray:
-        """Return the slow factor, (line, point of the rim, position on the line)."""
+        """Return the slow factor at positions `at` [m] on all lines, (line, point of the rim, position)."""
         u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
         return slow_factor(path, rim, directions, (u, v))
 
@@ -127,11 +127,11 @@ def slow_factor(
 ) -> np.ndarray:
     """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
 
-    u is relative to the window's centre. D is the distance from ξ to u, and ρ the distance from the pupil's centre to
-    u.
+    D is the distance from ξ to u, and ρ the distance from the pupil's centre to u. All arrays are broadcast.
 
-    s is the direction of ξ in the Fourier kernel e^{-ik s·u}.
-
+    pupil: points ξ (x, y) [m].
+    directions: directions s of these points in the Fourier kernel e^{-ik s·u}.
+    window: points u (x, y) [m], relative to the window's centre.
     dtype: type in which the phase is rounded, "float32" or "float64".
     """
     return np.asarray(turned(*_slow(path, pupil, directions, window), dtype))
@@ -276,12 +276,13 @@ def _whole(
 def fourier_kernel(
     at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float | np.ndarray, dtype: str
 ) -> np.ndarray:
-    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u = `at` [m] relative to the window's centre.
+    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} along one axis, complex (position, node · sample).
 
     L_a are the Lagrange polynomials of the interpolation points.
 
-    directions: s of each sample.
-    nodes: interpolation points a [m].
+    at: positions u [m] relative to the window's centre.
+    directions: directions s of the samples.
+    nodes: interpolation points [m].
     dtype: "float32" or "float64".
     """
     waves = np.outer(at, directions) / -wavelength

@@ -1,9 +1,9 @@
 """The error of a PSF from few samples of the pupil, by a sum over other samples in a few rows and columns.
 
-The other samples are finer, their grid is shifted by a fraction of the pitch that is not a simple ratio, and their edge
-is sharper. The comparison therefore shows light that the samples alias, detail that they miss, and the softness of the
-edge. It also shows the error of the rank, because the check interpolates the slow factor over the pupil instead of the
-window. The sum has an error of its own, which is at most half of the error that it finds.
+The other samples are finer, and their edge is sharper. Their grid is shifted by a fraction of the pitch that is not a
+simple ratio. The comparison therefore shows the errors due to aliased light, to detail between the samples, and to the
+soft edge. It also shows the error due to the rank, because the check interpolates the slow factor over the pupil
+instead of the window. The error of the sum itself is at most half of the error that it finds.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def window_errors(
     exact = _at_points(samples, path, field, (u, v), tolerance)
     drawn = images[np.arange(len(images))[:, None, None], rows[:, :, None], columns[:, None, :]]
     squared = np.mean(np.square(drawn - exact) / chance, (1, 2))
-    # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the exact PSF
+    # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the darker of the two
     bright = np.minimum(total, np.mean(np.square(exact) / chance, (1, 2)))
     total = np.where(total > 0, np.where(squared > 0.01 * total, bright, total), np.nan)
     rounding = float(np.finfo(field.real.dtype).eps)
@@ -118,11 +118,12 @@ def _ratios(
 
 
 def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the rows and columns of a grid of samples of each PSF, and the probability of each sample.
+    """Return rows and columns of each PSF, and the probability with which each of their crossings is drawn.
 
-    Rows and columns are drawn at even steps of their cumulative probabilities. If the amplitude has the same error
-    everywhere, the error of the intensity is proportional to the square root of the intensity. Other errors are next to
-    the brightest samples, or at the sides of the window, where phases change fastest.
+    Rows and columns are drawn at even steps of their cumulative probabilities. These are a mixture of four
+    distributions. The first is uniform. The second is proportional to the square root of the intensity, like the error
+    of the intensity if the error of the amplitude is the same everywhere. The third favours the brightest samples and
+    their neighbours, and the last the sides of the window, where phases change fastest.
 
     The shapes are (stack, row), (stack, column) and (stack, row, column).
     """

@@ -90,8 +90,8 @@ def window_ranks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the necessary ranks, (beam,), and whether `cross_term` is necessary. A rank that is too large is 0.
 
-    The rank suffices at the end points of rays, around which the light arrives. If derivatives are requested, light may
-    move anywhere. The rank then also suffices on average over the whole window.
+    The rank is sufficient at the end points of rays, around which the light arrives. If derivatives are requested,
+    light may move anywhere. The rank is then also sufficient on average over the whole window.
 
     tolerance: tolerances, (beam,).
     """

@@ -87,7 +87,7 @@ class WindowSampling:
         )
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
         return problem.wavelength / self.pupil.grid.dx
 
     @property
@@ -97,7 +97,7 @@ class WindowSampling:
     def error(self, beam: Beam, problem: Problem, image: np.ndarray) -> float | None:
         """Return the relative L2 error of the intensity over the window, see `window_errors`; None without light.
 
-        image: |U|² over the window, divided by the area of the pupil, flat.
+        image: |U|² over the window, divided by the area of the pupil [1/m²], flat.
         """
         seen = image.reshape(1, *problem.window.shape) * image.dtype.type(beam.pupil.area)
         [error] = window_image_errors(problem.stack, single_stack(self.finer), seen, problem.window, problem.tolerance)
