@@ -87,10 +87,11 @@ class LightStack:
         for beam in self.beams:
             pupil, wavelength = beam.pupil, beam.wavelength
             media = pupil.n, pupil.medium_n, pupil.object_n, wavelength
-            if media not in known:
+            values = known.get(media)
+            if values is None:
                 step = number(pupil.index_step(wavelength))
-                known[media] = beam.index, pupil.index_before(wavelength), step
-            found.append(known[media])
+                values = known[media] = beam.index, pupil.index_before(wavelength), step
+            found.append(values)
         return np.array(found).reshape(-1, 3).T
 
     @cached_property
