@@ -11,13 +11,13 @@ labels: test_renderer_parts.py, test_labels.py
 world_scene: test_batched_renderer.py
 reference_renderer: test_renderer_parts.py, test_reference_renderer.py, test_vertical_field.py
 fidelity: test_fidelity_levels.py, test_fidelity.py, eyes/test_depth_layers.py
-fidelity_choice: test_fidelity_choice.py, test_fidelity.py, test_model_fidelity.py
+fidelity_choice: test_sample_rules.py, test_fidelity_choice.py, test_fidelity.py, test_model_fidelity.py
 world_fidelity: test_world_fidelity.py, test_fidelity.py, eyes/test_depth_layers.py
-fidelity_stages: test_fidelity_levels.py, test_fidelity_choice.py, test_fidelity.py, eyes/test_depth_layers.py
-sample_choice: test_fidelity_levels.py, test_sample_choice.py, test_fidelity.py
-random_views: test_fidelity_trials.py, test_fidelity.py
-populations: test_sample_choice.py, test_fidelity.py
-fidelity_trials: test_fidelity_trials.py, test_fidelity.py, eyes/test_depth_layers.py
+fidelity_stages: test_model_rules.py, test_fidelity_levels.py, test_fidelity_choice.py, test_fidelity.py, eyes/test_depth_layers.py
+sample_choice: test_sample_rules.py, test_fidelity_levels.py, test_sample_choice.py, test_fidelity.py
+random_views: test_model_rules.py, test_fidelity_trials.py, test_fidelity.py
+populations: test_model_rules.py, test_sample_choice.py, test_fidelity.py
+fidelity_trials: test_model_rules.py, test_fidelity_trials.py, test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_renderer_parts.py, test_batched_renderer.py, test_fidelity.py
 memory_budget: test_fidelity_levels.py, test_memory_budget.py, test_sample_choice.py
 receptors_in_time: test_renderer_parts.py, test_receptors_in_time.py
@@ -25,7 +25,7 @@ receptor_noise: test_renderer_parts.py, test_receptor_noise.py
 pending_frame: test_renderer_parts.py, test_pending_frame.py, envs/test_eyes_of_kind.py
 model_renderer: test_model_renderer.py, test_pupil_axes.py
 renderable: test_fidelity_levels.py, test_model_renderer.py, test_edge_rays.py
-model_fidelity: test_model_fidelity.py, test_needed_light.py, test_model_light.py
-edge_rays: test_edge_rays.py
+model_fidelity: test_model_rules.py, test_model_fidelity.py, test_needed_light.py, test_model_light.py
+edge_rays: test_model_rules.py, test_edge_rays.py
 optic_flow: test_labels.py
 """
