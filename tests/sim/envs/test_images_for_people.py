@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sim.envs import world_pictures
+from sim.envs import follow_camera, world_pictures
 from sim.envs.follow_camera import WAVELENGTHS, FollowCamera, _behind, _follow, _sampler, check_render_mode
 from sim.envs.hexagon_images import _margin
 from sim.envs.retina_images import hues_of, one_above_another, shares_of, side_by_side
@@ -166,3 +166,38 @@ def test_cameras_are_shared_by_equal_worlds(monkeypatch, varied):
         setattr(models[0], name, getattr(models[0], name) + 1)
         assert cameras._camera_of(0, physics) == len(built)
     assert len(built) == (6 if varied else 4)
+
+
+@pytest.mark.parametrize("slow", [False, True])
+def test_images_of_a_following_camera(monkeypatch, slow):
+    """A size is height and width. Fields of view are prepared once for each size."""
+    calls, prepared = [], []
+    monkeypatch.setattr(follow_camera, "pose", lambda *arguments: calls.append(arguments))
+    state = SimpleNamespace(position=np.zeros((3, 2)), heading=np.array([0.0, 0.0, 0.5]))
+    picture, nearness = np.zeros((4, 6, 3), np.uint8), object()
+
+    def quick(data, view, width, height):
+        calls.append((data, view.fovy_deg, width, height))
+        return SimpleNamespace(picture=picture, inverse_distance=nearness)
+
+    class Fields:
+        def __init__(self, eyes, view, size):
+            prepared.append((eyes, size))
+            np.testing.assert_allclose(view.position, [-4, 0, 5])
+
+        def draw(self, *arguments):
+            return arguments
+
+    monkeypatch.setattr(follow_camera, "FieldsOfView", Fields)
+    camera = FollowCamera.__new__(FollowCamera)
+    camera.world, camera._data = SimpleNamespace(model="model"), "data"
+    camera.eyes, camera._fields, camera._mirror = None, {}, "mirror" if slow else None
+    camera._quick = SimpleNamespace(render=quick)
+    camera._slow_image = lambda scene, view, size: calls.append((scene, size)) or (picture, nearness)
+    assert camera.picture(state, 2, (4, 6)) is picture
+    looked = ("mirror", (4, 6)) if slow else ("data", 50, 6, 4)
+    assert calls == [("data", camera.world, state, 2), looked]
+    camera.eyes = "eyes"
+    for size in ((4, 6), (4, 6), (2, 3)):
+        assert camera.picture(state, 2, size) == (picture, nearness, "model", "data")
+    assert prepared == [("eyes", (4, 6)), ("eyes", (2, 3))]
