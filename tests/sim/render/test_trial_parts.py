@@ -226,7 +226,8 @@ def test_eyes_on_the_surface_are_not_inside(monkeypatch, depth, refused):
     """The second eye is compared with the second geom."""
     scene = SimpleNamespace()
     scene.model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><body name="a"><geom name="g" size="1"/><geom name="h" size="1"/></body></worldbody></mujoco>'
+        '<mujoco><worldbody><body name="a"><geom name="g" size="1"/><geom name="h" size="1"/></body></worldbody>'
+        "</mujoco>"
     )
     scene.places = SimpleNamespace(frames=lambda poses: (np.array([[[1, 2, 3], [4.0, 5.0, 6.0]]]), None))
     scene.mounts, scene.scene = [SimpleNamespace(on="x"), SimpleNamespace(on="y")], SimpleNamespace(geoms=[0, 1])
