@@ -193,3 +193,21 @@ def test_jumps_that_take_long_are_refused(monkeypatch):
                 asked.planned()
     own.height = None
     assert asked.planned() == found
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (1e-6, 0.0), (0.0, 1e-6)])
+@pytest.mark.parametrize("samples", [9, 10**5])
+def test_points_along_a_radius_are_enough_on_the_axis(monkeypatch, symmetric, centre, samples):
+    """The time allows for all points that are wanted, at most one for each sample."""
+    monkeypatch.setattr(spot_check, "_finer_detail", lambda beam, problem: 0.0)
+    monkeypatch.setattr(spot_check, "turns", lambda problem, digits: 3.0)
+    monkeypatch.setattr(spot_check, "node_count", lambda aperture, cycles, digits: 1.0)
+    problem = SimpleNamespace(
+        window=SimpleNamespace(shape=(1, samples), centre=centre), symmetric=symmetric, tolerance=1e-2, aperture=None
+    )
+    found = spot_check._affordable(None, problem, 0.0, 1e9)
+    effort = spot_check.EFFORT
+    wanted = effort.points_along_radius if symmetric and centre == (0.0, 0.0) else effort.points
+    assert effort.points_along_radius != effort.points
+    assert found.points == min(wanted, samples)

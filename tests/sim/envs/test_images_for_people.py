@@ -8,7 +8,7 @@ import pytest
 
 from sim.envs import follow_camera, world_pictures
 from sim.envs.follow_camera import WAVELENGTHS, FollowCamera, _behind, _follow, _sampler, check_render_mode
-from sim.envs.hexagon_images import _margin
+from sim.envs.hexagon_images import _margin, _numbers
 from sim.envs.retina_images import hues_of, one_above_another, shares_of, side_by_side
 from sim.envs.world_pictures import WorldPictures, _ModelCameras, _overview
 from sim.scene.color import encode_srgb
@@ -201,3 +201,31 @@ def test_images_of_a_following_camera(monkeypatch, slow):
     for size in ((4, 6), (4, 6), (2, 3)):
         assert camera.picture(state, 2, size) == (picture, nearness, "model", "data")
     assert prepared == [("eyes", (4, 6)), ("eyes", (2, 3))]
+
+
+class Ommatidia:
+    """Seven ommatidia: one ahead, and six around it, above and below the horizon alike."""
+
+    directions = np.array(
+        [
+            [1.0, 0, 0],
+            *([math.cos(0.2), 0.2 * math.cos(k * math.pi / 3), 0.2 * math.sin(k * math.pi / 3)] for k in range(6)),
+        ]
+    )
+
+    def __len__(self):
+        return 7
+
+
+def test_hexagons_are_in_the_middle_of_their_image():
+    """The image of a symmetric pattern is symmetric: each ommatidium and its mirror image have the same pixels."""
+    eye = Ommatidia()
+    eye.directions = eye.directions / np.linalg.norm(eye.directions, axis=1)[:, None]
+    numbers = _numbers.__wrapped__(eye)
+    assert set(numbers.ravel()) == set(range(8))
+    upside_down, mirrored = np.array([0, 1, 6, 5, 4, 3, 2, 7]), np.array([0, 4, 3, 2, 1, 6, 5, 7])
+    np.testing.assert_array_equal(upside_down[numbers[::-1]], numbers)
+    assert (mirrored[numbers[:, ::-1]] != numbers).mean() < 5e-3, "its width is rounded to whole pixels"
+    left, up = (numbers == 1).nonzero()[1].mean(), (numbers == 2).nonzero()[0].mean()
+    assert left < numbers.shape[1] / 2
+    assert up < numbers.shape[0] / 2

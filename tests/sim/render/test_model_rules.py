@@ -14,6 +14,7 @@ from sim.render.fidelity import Level
 from sim.render.fidelity_trials import FidelityTrials
 from sim.render.model_fidelity import ModelStages, Trials, _light, _with, tried
 from sim.render.populations import Population
+from sim.scene.variant import default_variant, variant
 
 EYE = sim.Eyes(n_eyes=1, resolution=(5, 5)).eye()
 BEHIND_A_PUPIL = sim.Eyes(n_eyes=1, resolution=(5, 5), optics=optics.Pupil(1e-4)).eye()
@@ -269,3 +270,22 @@ def test_objects_share_places_only_where_there_are_too_few():
         assert (found[:, 0, :2] != found[:, 1, :2]).any(axis=1).all() == apart
     world.objects = []
     assert random_views._objects(world, 5, None).shape == (5, 0, 3)
+
+
+def test_receptors_whose_first_rays_differ_by_the_noticed_amount_are_kept():
+    """Rays are traced again in the receptor whose spread is larger; its sums are scaled to four rays."""
+    beyond = np.ones((3, 5), bool)
+    beyond[1:-1, 1:-1] = False
+    rays = edge_rays.EdgeRays.__new__(edge_rays.EdgeRays)
+    rays._signals, rays._beyond, rays._noticed, rays._rays = [[0.0]], beyond, 0.25, 8
+    rays._fine, rays._along = "fine", edge_rays.KernelInputs(None, None, None, None)
+    found, asked = np.zeros((2, beyond.size)), []
+    found[0, :3], found[1, :3] = (1.0, 2.0, 3.0), (0.25, 0.2501, 0.0)
+
+    def launch(kernel, inputs):
+        asked.append((kernel, inputs.lanes.numpy().tolist()))
+        return lambda: np.array([[10.0]])
+
+    with variant(default_variant()):
+        assert rays._refined(found, launch).tolist() == [1, 5, 3]
+    assert asked == [("fine", list(range(8, 16)))]
