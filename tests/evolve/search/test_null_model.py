@@ -115,3 +115,13 @@ def test_spreads_are_pooled_over_runs_and_over_all_generations_where_there_are_t
     expected = [math.sqrt(0.5), math.sqrt(8.5 / 2), math.sqrt(overall)]
     assert fitness_spread(runs, 3) == pytest.approx(expected)
     assert fitness_spread([run([1.0])], 1) == [0]
+
+
+def test_ties_count_on_both_sides():
+    """A value that all searches reach is not extreme, even if it is 0 and leaves no room for rounding."""
+    for value in (0.0, 0.1, -3.0):
+        assert p_value([value], np.full(9, value)) == 1
+    ends = np.array([0.0, 0.0, 1.0, 2.0])
+    assert p_value([0.0], ends) == 1.0
+    assert p_value([2.0], ends) == pytest.approx(2 * (1 + 1) / 5)
+    assert p_value([3.0], ends) == pytest.approx(2 / 5)
