@@ -8,7 +8,7 @@ eye_spec: test_eye.py, test_patches.py, test_axes.py, test_receptor_density.py, 
 geometry: test_patches.py, test_vertical_field.py
 immersion: elements/test_turbid_medium.py
 depth_range: test_depth_range.py, test_occlusion.py, test_kernel_bank.py
-kernel_bank: test_eye_parts.py, test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py, test_eye_robustness.py
+kernel_bank: test_eye_parts.py, test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py
 kernel_interpolation: test_eye_parts.py, test_kernel_interpolation.py, test_kernel_bank.py, test_sight_tolerance.py
 layered_image: test_occlusion.py
 occlusion: test_eye_parts.py, test_occlusion.py
