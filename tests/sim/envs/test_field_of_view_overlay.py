@@ -177,8 +177,8 @@ def test_an_eye_is_a_disc_of_the_right_size_with_a_soft_edge_one_pixel_wide():
 
 
 def test_visible_pixels_are_mixed_with_the_colour_of_their_eye(monkeypatch):
-    """Of four pixels of the field, the second is hidden from the eye and the third from the camera, whose surface is as
-    near as the plane. Eyes are drawn after the fields.
+    """The field has four pixels. The second is hidden from the eye, and the third from the camera, because a surface is
+    as near as the plane. Eyes are drawn after the fields.
     """
     eyes = SimpleNamespace(azimuths=lambda: np.array([0.25]), fov_deg=90)
     fields = overlay.FieldsOfView.__new__(overlay.FieldsOfView)

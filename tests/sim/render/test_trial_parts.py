@@ -37,7 +37,7 @@ class Trial:
 
 
 def test_fewer_layers_use_the_weights_of_their_nodes():
-    """Of nine nodes, one layer uses the middle one, and three use the ends and the middle."""
+    """One layer uses the middle one of nine nodes, and three use the ends and the middle."""
     weights = RNG.random((9 * 2, 3, 7))
     finest = DepthLayers(20.0, 1.0, 9)
     asked = []
