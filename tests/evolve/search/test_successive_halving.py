@@ -16,7 +16,14 @@ from evolve.learning.training_rung import TrainingRung
 from evolve.runs import progress
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
-from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps, trained_steps
+from evolve.search.successive_halving import (
+    budgets,
+    evaluations,
+    finished,
+    promoted,
+    sizes,
+    steps,
+)
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
 from tests.evolve.closed_form import tiny
@@ -261,21 +268,3 @@ def test_the_first_stage_is_a_short_training_and_the_next_goes_on_from_it(tmp_pa
     )
     assert told == [(512, 512)]
     assert goes_on.curve[0] == plain.curve[0]
-
-
-@pytest.mark.parametrize(
-    ("interval", "begin", "end", "trained"),
-    [
-        (30, 0, 30, 32),
-        (30, 0, 33, 40),
-        (30, 0, 60, 64),
-        (32, 0, 64, 64),
-        (8, 16, 17, 24),
-        (8, 16, 16, 16),
-        (1, 0, 9, 16),
-    ],
-)
-def test_training_consists_of_whole_rollouts(interval, begin, end, trained):
-    """A rollout has 8 steps, so that 30 steps between evaluations become 32."""
-    learning = SimpleNamespace(n_envs=2, n_steps=4, eval_interval=interval)
-    assert trained_steps(learning, begin, end) == trained
