@@ -12,6 +12,7 @@ import sim
 from sim.envs import animals
 from sim.envs.animals import Advanced, Animals
 from sim.envs.assembly import _check, _fidelity_of, _require_eyes, in_bands, refuse
+from sim.envs.calls import CallOrder
 from sim.envs.senses import Senses, _part
 from sim.envs.vec_env import EyesVecEnv, _require_alike, _rows
 
@@ -200,8 +201,7 @@ def test_actions_of_all_animals(early):
     assert found.log[1:5] == ([*launched, "failed"] if early else ["failed", *launched])
     assert found.log[5:] == [(0, "poses", 0), (1, "poses", 0), (3, "poses", 0)]
     assert (advanced.step, advanced.pending) == ("step", ["frame 0", "frame 1", "frame 3"])
-    actions = [senses.action[0].tolist() for senses in found.seeing]
-    assert actions == [[0], [1, 2], [6, 7, 8, 9]]
+    assert [senses.action[0].tolist() for senses in found.seeing] == [[0], [1, 2], [6, 7, 8, 9]]
 
 
 def test_worlds_that_a_task_changed_are_rendered_again():
@@ -290,3 +290,11 @@ def test_arguments_of_all_environments():
     refuse({"other": 1}, {"x": "because"})
     with pytest.raises(ValueError, match=r"^x = None: must be left out, because$"):
         refuse({"x": None}, {"x": "because"})
+
+
+def test_closed_worlds_are_not_seeded():
+    found = environment()
+    found._calls = CallOrder()
+    found._calls.close()
+    with pytest.raises(RuntimeError, match="close"):
+        found.seed_worlds([1, 2, 3])
