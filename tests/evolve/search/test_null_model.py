@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import kstest
 
 from evolve.analysis.statistics import gene_values
+from evolve.search import null_model as null_model_module
 from evolve.search.loop import evolve
 from evolve.search.null_model import FIRST_SEED, NullModel, fitness_spread, last_generations, null_model, p_value
 from evolve.store.directory import Run
@@ -125,3 +126,15 @@ def test_ties_count_on_both_sides():
     assert p_value([0.0], ends) == 1.0
     assert p_value([2.0], ends) == pytest.approx(2 * (1 + 1) / 5)
     assert p_value([3.0], ends) == pytest.approx(2 / 5)
+
+
+def test_means_leave_out_values_that_are_not_finite(monkeypatch):
+    """The first generation has two finite values of three, and the second none."""
+    values = iter([1.0, math.inf, 4.0, math.nan, math.nan])
+    vectors = [[SimpleNamespace(vector=None)] * count for count in (3, 2)]
+    monkeypatch.setattr(null_model_module, "_proposals", lambda config, generations, spread: vectors)
+    monkeypatch.setattr(null_model_module, "develop", lambda vector, config: None)
+    means, counts = null_model_module._search(None, lambda animal: {"acuity": next(values)}, 2, [])["acuity"]
+    assert counts == [2, 0]
+    assert means[0] == 2.5
+    assert math.isnan(means[1])

@@ -28,7 +28,7 @@ def test_training_consists_of_whole_rollouts(interval, begin, end, trained):
 
 
 def test_a_generation_is_complete_when_all_rungs_are_on_record():
-    """Of four candidates, the two fittest reach the second rung, unless one of them failed in the first."""
+    """The two fittest of four candidates reach the second rung, unless one of them failed in the first."""
     record = {}
     search = SearchConfig(generations=2, population=4, rungs=2, promoted=0.5)
     run = SimpleNamespace(

@@ -229,3 +229,14 @@ def test_hexagons_are_in_the_middle_of_their_image():
     left, up = (numbers == 1).nonzero()[1].mean(), (numbers == 2).nonzero()[0].mean()
     assert left < numbers.shape[1] / 2
     assert up < numbers.shape[0] / 2
+
+
+@pytest.mark.parametrize("samples", [None, 1, 2.0])
+def test_good_numbers_of_samples(monkeypatch, samples):
+    """Without samples, images are fast; with them, Mitsuba renders a mirror of the model."""
+    monkeypatch.setattr(follow_camera.mujoco, "MjData", lambda model: f"data of {model}")
+    monkeypatch.setattr(follow_camera, "QuickCamera", lambda model, spectra: ("quick", model, spectra))
+    monkeypatch.setattr(follow_camera, "mirror", lambda model, spectra: ("mirror", model, spectra))
+    camera = FollowCamera(SimpleNamespace(model="model", spectra="spectra"), samples=samples)
+    assert camera._quick == (("quick", "model", "spectra") if samples is None else None)
+    assert camera._mirror == (None if samples is None else ("mirror", "model", "spectra"))
