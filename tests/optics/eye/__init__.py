@@ -15,7 +15,7 @@ occlusion: test_eye_parts.py, test_occlusion.py
 photoreceptor: test_photoreceptor.py
 polarization: test_eye_parts.py, test_polarization.py
 signals: test_eye.py, test_polarization.py
-receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py, test_eye_robustness.py
+receptive_field: test_eye_parts.py, test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py
 guided_field: test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retina: test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py

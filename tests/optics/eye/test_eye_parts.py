@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import optics
-from optics.eye import occlusion, polarization, summary
+from optics.eye import occlusion, polarization, receptive_field, summary
 from optics.eye.kernel_bank import KernelBank, _choices, _grid, _rest
 from optics.eye.kernel_interpolation import Choice, NodeChoice, NodeError, checks, nodes
 from optics.numerics.accuracy import AccuracyError
@@ -212,3 +212,12 @@ def test_measures_that_are_not_accurate_enough_are_listed():
     assert math.isnan(summary._known("two", lambda: fails("too coarse"), unknown))
     assert math.isnan(summary._known("three", lambda: fails("too coarse", "set dx=1"), unknown))
     assert unknown == ["two: too coarse", "three: too coarse; of optics.psf(eye.pupil), set dx=1"]
+
+
+def test_light_that_edges_diffract():
+    """A disk diffracts the fraction 1/(π²Rδ) of its light beyond δ. A ring has more edge, and less area."""
+    for radius, fraction in ((1e-4, 1e-2), (3e-4, 1e-3)):
+        found = receptive_field._beyond_edge(optics.Pupil(radius), fraction)
+        assert found == pytest.approx(1 / (math.pi**2 * radius * fraction))
+    ring = receptive_field._beyond_edge(optics.Pupil(3e-4, aperture=optics.Annulus(0.5)), 1e-3)
+    assert ring == pytest.approx(found * 1.5 / 0.75, rel=1e-3)
