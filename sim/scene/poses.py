@@ -110,11 +110,14 @@ class Poses:
         return len(self.geom_xpos)
 
     def geom_places(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
-        """Return the centres of these geoms [m], (world, geom, 3)."""
+        """Return the centres of these geoms [m], (world, geom, 3). The result may share memory with the poses."""
         return self.geom_xpos[:, geoms]
 
     def geom_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
-        """Return the rotations of these geoms, (world, geom, 3, 3)."""
+        """Return the rotations of these geoms, (world, geom, 3, 3).
+
+        The result may be shared. If no geom turns, it may be (1, geom, 3, 3), and the same object at every call.
+        """
         return self.geom_xmat[:, geoms]
 
     def take(self, worlds: np.ndarray) -> Poses:
