@@ -66,11 +66,7 @@ class EyesOfKind:
         if self._in_time is not None:
             return self._launch_in_time(self._in_time, poses, worlds, fresh)
         light = self._simulation.light(self._wavelengths)
-        if worlds is None:
-            seen = self.renderer.launch(poses, light)
-            worlds = self._everyone
-        else:
-            seen = self.renderer.launch_some(poses, worlds, light)
+        seen = self.renderer.launch(poses, light) if worlds is None else self.renderer.launch_some(poses, worlds, light)
         noise = self._noise
         if noise is not None:
             normals, noiseless = self._normals.launch(worlds), seen
