@@ -79,7 +79,8 @@ def all_finite(array: np.ndarray) -> bool:
     NaN and infinity propagate through a sum of squares, which takes a fifth of the time of a test of each number. The
     numbers are only tested if the sum is not finite, because it may overflow.
     """
-    return math.isfinite(np.vdot(array, array)) or bool(np.isfinite(array).all())
+    flat = array.ravel()  # copied once, if at all; np.vdot would copy both arguments
+    return math.isfinite(np.vdot(flat, flat)) or bool(np.isfinite(flat).all())
 
 
 def _half(value: Any) -> str:

@@ -46,8 +46,9 @@ class FindWay(AgentTask):
         start = worlds.before.start
         progress = _distance(worlds.state.position, start) - _distance(worlds.before.position, start)
         inside = path[..., 0] >= region[0]
-        for side in (path[..., 0] <= region[2], path[..., 1] >= region[1], path[..., 1] <= region[3]):
-            inside &= side
+        if inside.any():  # most agents are far from the goal
+            for side in (path[..., 0] <= region[2], path[..., 1] >= region[1], path[..., 1] <= region[3]):
+                inside &= side
         goal, nothing = inside.any(axis=1), np.zeros(worlds.n, bool)
         nowhere = np.zeros((worlds.n, 0), bool)
         return self.weighted(worlds, AgentEvents(progress, goal, nothing, nothing, nowhere, goal), failed)

@@ -90,7 +90,7 @@ def cases() -> dict[str, Callable[[], Any]]:
 
 
 def serve() -> None:
-    """Measure on request of the parent process, which sends the name of a case to open, if any, and a number of steps."""
+    """Measure on request of the parent process, which names a case to open, if any, and a number of steps."""
     import drjit
     import numpy as np
 

@@ -6,7 +6,7 @@ auxiliary: test_auxiliary.py
 one_environment: test_shared_environment.py, test_vec_env.py, test_pictures.py
 calls: test_calls.py
 env: test_env.py
-vec_env: test_vec_env.py, test_episode_infos.py, test_env.py, test_light_levels.py, test_handed_out.py
+vec_env: test_vec_env.py, test_calls_per_step.py, test_episode_infos.py, test_env.py, test_light_levels.py, test_handed_out.py
 vector_env: test_vector_env.py
 registered_env: test_vector_env.py
 registration: test_env.py, test_vector_env.py, worlds/test_catalog.py
