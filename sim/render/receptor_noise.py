@@ -75,8 +75,9 @@ class Normals:
 
     def _frame(self, parts: list[Array], n: int) -> np.ndarray:
         """Return the numbers of the first n worlds from the kernel's parts, each flat (world, draw)."""
-        drawn = np.concatenate([part.numpy().reshape(-1, self._draws) for part in parts], axis=1)
-        return drawn[:n, : self._size].reshape(n, *self._shape)
+        ends = (max(self._size - k * self._draws, 0) for k in range(len(parts)))  # columns of each part in use
+        used = [part.numpy().reshape(-1, self._draws)[:n, :end] for part, end in zip(parts, ends, strict=True)]
+        return np.concatenate(used, axis=1).reshape(n, *self._shape)
 
 
 class _Kernel:
