@@ -95,7 +95,7 @@ class AgentPhysics:
             return self._simulate(agents, velocity)
         path, speed = self.free_motion(agents.velocity, velocity)
         met, n = self.free_motion.obstacles_in_reach(agents.position, path), len(velocity)
-        simulated: np.ndarray = met.any(axis=1)
+        simulated = np.asarray(met.any(axis=1))
         # Comparisons are also false for NaN, so that MuJoCo simulates these agents.
         if not (np.abs(velocity).max() <= self.free_motion.strongest and _slow(agents.velocity).all()):
             simulated |= ~(self.free_motion.obeys(velocity) & _slow(agents.velocity).all(axis=-1))
