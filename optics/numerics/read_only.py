@@ -29,14 +29,15 @@ class ReadOnlyArrays:
     """Mixin for frozen dataclasses: the NumPy arrays in their fields are read-only; `array.copy()` is writable."""
 
     def __post_init__(self: Any) -> None:
+        fields_of_self = vars(self)
         for name in _names(self.__class__):
-            value = getattr(self, name, None)
+            value = fields_of_self.get(name)
             if isinstance(value, np.ndarray):
                 # A simulation makes such a dataclass in every step, so common types take a short path.
                 if type(value) is not np.ndarray or value.dtype.char not in FULL_PRECISION:
                     value = full_precision(name, value)
                 if value.flags.writeable:
-                    object.__setattr__(self, name, read_only(value))
+                    fields_of_self[name] = read_only(value)
 
 
 @cache

@@ -44,7 +44,9 @@ class Animals:
             (other, None if of is None else Senses(simulation, k, of, other.memory))
             for k, (other, of) in enumerate(zip(frozen, renderers[number:], strict=True), start=number)
         ]
-        self.seeing = [*self.learners, *(senses for _, senses in self._frozen if senses is not None)]
+        self._of_agents: list[Senses | None] = [*self.learners, *(senses for _, senses in self._frozen)]
+        self.seeing = [senses for senses in self._of_agents if senses is not None]
+        self._with_auxiliary = [senses for senses in self.seeing if senses.has_auxiliary]
         for other, senses in self._frozen:
             if senses is not None:
                 _require_fit(other, senses)
@@ -77,9 +79,9 @@ class Animals:
         pending = self.launch() if simulation.task.renders_early else None
         step = simulation.judge(failed)
         pending = pending or self.launch()
-        if any(senses.has_auxiliary for senses in self.seeing):
+        if self._with_auxiliary:
             poses = simulation.poses()
-            for senses in self.seeing:
+            for senses in self._with_auxiliary:
                 senses.update_auxiliary(poses, NOWHERE)
         return Advanced(step, pending)
 
@@ -100,7 +102,7 @@ class Animals:
             senses.action = senses.action.copy()
             senses.action[worlds] = senses.agent.first_action
         poses = self.simulation.poses()
-        for senses in self.seeing:
+        for senses in self._with_auxiliary:
             senses.update_auxiliary(poses, worlds)
         everyone = len(worlds) == self.simulation.n
         return [senses.launch(poses, None if everyone else worlds, fresh=True) for senses in self.seeing]
@@ -139,10 +141,6 @@ class Animals:
             for name, array in now.items():
                 array[chosen] = state[self._key(number, name)][chosen]
             senses.set_state(now)
-
-    @property
-    def _of_agents(self) -> list[Senses | None]:
-        return [*self.learners, *(senses for _, senses in self._frozen)]
 
     def launch(self, worlds: np.ndarray | None = None) -> Pending:
         """Launch the rendering of these worlds (None: all) for the eyes of all agents, without waiting for results."""

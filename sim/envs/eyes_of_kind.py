@@ -37,7 +37,10 @@ class EyesOfKind:
         self._normals: Normals = Normals(keys, receptors)
         self._in_time: ReceptorsInTime | None = None
         self._shot: NoiseModel | None = None
-        frame = self._as_frames(np.empty(receptors)).shape
+        eye = renderer.eye
+        # A compound eye without rows is observed as a list of ommatidia, and every other eye as an image.
+        self._ommatidia = eye if isinstance(eye, CompoundEye) and eye.rows is None else None
+        frame = receptors if self._ommatidia is None else self._ommatidia.as_frames(np.empty(receptors)).shape
         if (dynamics := dynamics_of(renderer.eye)) is not None:
             frames = renderer.fidelity.frames or 1
             require_frames(simulation, frames)
@@ -63,21 +66,12 @@ class EyesOfKind:
         if self._in_time is not None:
             return self._launch_in_time(self._in_time, poses, worlds, fresh)
         light = self._simulation.light(self._wavelengths)
-        if worlds is None:
-            seen = self.renderer.launch(poses, light)
-            worlds = self._everyone
-        else:
-            seen = self.renderer.launch_some(poses, worlds, light)
+        seen = self.renderer.launch(poses, light) if worlds is None else self.renderer.launch_some(poses, worlds, light)
         noise = self._noise
         if noise is not None:
             normals, noiseless = self._normals.launch(worlds), seen
             seen = noiseless.then(lambda signals: noise(signals, normals.wait()))
-        return seen.then(self._as_frames)
-
-    def _as_frames(self, signals: np.ndarray) -> np.ndarray:
-        """Return signals (..., eye, channel, h, w) in the form of an observation."""
-        eye = self.renderer.eye
-        return eye.as_frames(signals) if isinstance(eye, CompoundEye) and eye.rows is None else signals
+        return seen if self._ommatidia is None else seen.then(self._ommatidia.as_frames)
 
     def _launch_in_time(
         self, receptors: ReceptorsInTime, poses: Poses, worlds: np.ndarray | None, fresh: bool
@@ -136,9 +130,9 @@ class EyesOfKind:
         margin = SIGMAS * spread + ROUNDING * brightest
         # The light from a point light has no upper bound, because it increases as the distance to the light decreases.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
-        low, eye = -margin if np.isfinite(high) else -np.inf, self.renderer.eye
-        if isinstance(eye, CompoundEye) and eye.rows is None:
-            return OmmatidiaBox(low, high, frames, eye.directions_on(self.renderer.mounts))
+        low = -margin if np.isfinite(high) else -np.inf
+        if self._ommatidia is not None:
+            return OmmatidiaBox(low, high, frames, self._ommatidia.directions_on(self.renderer.mounts))
         return spaces.Box(low, high, frames, np.float32)
 
     def _brightest(self) -> float:

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from optics.numerics.number_types import all_finite
 from sim.physics.free_motion import free_motion_of
 from sim.physics.local_contacts import local_contacts_of
 from sim.physics.mujoco_batch import BatchedStep
+from sim.scene.moved_bodies import as_slice
 from sim.worlds.catalog import SUBSTEPS
 from sim.worlds.state import WorldState
 from sim.worlds.world import MAX_SPEED, World
@@ -76,12 +78,13 @@ class AgentPhysics:
         self._model = model
         self._step_batch = BatchedStep(model, threads)
         self._columns = _Columns.from_model(model)
-        self._actuators = [_actuator(model, joint) for joint in ("agent_x", "agent_y")]
+        self._actuators = as_slice([_actuator(model, joint) for joint in ("agent_x", "agent_y")])
         self._touch = _touch_columns(model)
         _check_objects(model, world.objects)
         self._start = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
         mujoco.mj_getState(model, mujoco.MjData(model), self._start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
         self.seconds = SUBSTEPS * model.opt.timestep
+        self._due = self._start[0] + self.seconds  # time after an action
         agent = int(model.jnt_bodyid[_joint(model, "agent_x")])
         self.free_motion = free_motion_of(model, agent, self._untouched, MAX_SPEED) if closed_form else None
         self.local_contacts = local_contacts_of(world, model, self.free_motion, threads)
@@ -91,13 +94,15 @@ class AgentPhysics:
         if self.free_motion is None:
             return self._simulate(agents, velocity)
         path, speed = self.free_motion(agents.velocity, velocity)
-        met = self.free_motion.obstacles_in_reach(agents.position, path)
-        free = ~met.any(axis=1) & self.free_motion.obeys(velocity)
-        # The comparison is also false for NaN, so that MuJoCo simulates these agents.
-        free &= (np.abs(agents.velocity) < UNSTABLE_SPEED).all(axis=-1)
-        n = len(velocity)
+        met, n = self.free_motion.obstacles_in_reach(agents.position, path), len(velocity)
+        simulated = np.asarray(met.any(axis=1))
+        # Comparisons are also false for NaN, so that MuJoCo simulates these agents.
+        if not (np.abs(velocity).max() <= self.free_motion.strongest and _slow(agents.velocity).all()):
+            simulated |= ~(self.free_motion.obeys(velocity) & _slow(agents.velocity).all(axis=-1))
+        (near,) = simulated.nonzero()
+        if len(near) == n:
+            return self._near(agents, velocity, met)
         motion = Motion(agents.position[:, None] + path, speed, np.zeros(n, bool), np.zeros(n, bool))
-        (near,) = (~free).nonzero()
         if len(near):
             motion.put(near, self._near(agents.take(near), velocity[near], met[near]))
         return motion
@@ -137,7 +142,9 @@ class AgentPhysics:
         return initial, self._control(velocity)
 
     def _initial(self, n: int) -> np.ndarray:
-        return np.repeat(self._start[None], n, axis=0)
+        initial = np.empty((n, len(self._start)))
+        initial[:] = self._start
+        return initial
 
     def _control(self, velocity: np.ndarray) -> np.ndarray:
         control = np.zeros((len(velocity), SUBSTEPS, self._model.nu))
@@ -168,18 +175,18 @@ class AgentPhysics:
 
     def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
         path = states[:, :, self._columns.position] + self._columns.origin
-        velocity = states[:, -1, self._columns.velocity].copy()
-        # Expected time after the action. MuJoCo resets a world that broke down, so that its clock shows another time.
-        due = self._start[0] + self.seconds
-        unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not finite resets the clock
-        unstable |= np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2
-        unstable |= ~(np.abs(velocity) < UNSTABLE_SPEED).all(axis=-1)
+        last = states[:, -1]
+        velocity = last[:, self._columns.velocity].copy()
         contact = np.asarray((sensors[:, :, self._touch] > 0).reshape(len(states), -1).any(axis=1))
-        if unstable.any():
-            path[unstable] = np.nan_to_num(position)[unstable, None]
-            velocity = np.where(unstable[:, None], 0.0, velocity)
-            contact = contact & ~unstable
-        return Motion(path, velocity, contact, unstable)
+        # MuJoCo resets a world that broke down, so that its clock shows another time. This also happens after an
+        # earlier state that is not finite.
+        timely = np.abs(last[:, 0] - self._due) <= self._model.opt.timestep / 2
+        if all_finite(last) and timely.all() and _slow(velocity).all():
+            return Motion(path, velocity, contact, np.zeros(len(states), bool))
+        unstable = ~(np.isfinite(last).all(axis=-1) & timely & _slow(velocity).all(axis=-1))
+        path[unstable] = np.nan_to_num(position)[unstable, None]
+        velocity = np.where(unstable[:, None], 0.0, velocity)
+        return Motion(path, velocity, contact & ~unstable, unstable)
 
 
 @dataclass(frozen=True)
@@ -201,11 +208,17 @@ class _Columns:
         joints = [_joint(model, name) for name in ("agent_x", "agent_y", "agent_heading")]
         body = model.jnt_bodyid[joints[0]]
         return cls(
-            position=_columns([qpos + int(model.jnt_qposadr[j]) for j in joints[:2]]),
+            position=as_slice([qpos + int(model.jnt_qposadr[j]) for j in joints[:2]]),
             heading=qpos + int(model.jnt_qposadr[joints[2]]),
-            velocity=_columns([qvel + int(model.jnt_dofadr[j]) for j in joints[:2]]),
+            velocity=as_slice([qvel + int(model.jnt_dofadr[j]) for j in joints[:2]]),
             origin=model.body_pos[body, :2] - model.qpos0[[int(model.jnt_qposadr[j]) for j in joints[:2]]],
         )
+
+
+def _slow(velocity: np.ndarray) -> np.ndarray:
+    """Return a mask of the components of velocities [m/s] that are possible; False for NaN."""
+    slow: np.ndarray = np.abs(velocity) < UNSTABLE_SPEED
+    return slow
 
 
 def _without_detours(model: mujoco.MjModel) -> mujoco.MjModel:
@@ -239,17 +252,11 @@ def _actuator(model: mujoco.MjModel, joint_name: str) -> int:
     return int(driving[0])
 
 
-def _columns(wanted: list[int]) -> slice | list[int]:
-    """Return these columns of an array, as a slice if they are adjacent. Indexing with a slice avoids a copy."""
-    side_by_side = wanted == list(range(wanted[0], wanted[0] + len(wanted)))
-    return slice(wanted[0], wanted[-1] + 1) if side_by_side else wanted
-
-
 def _touch_columns(model: mujoco.MjModel) -> slice | list[int]:
     touch = np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_TOUCH)
     if not len(touch):
         raise ValueError("the model has no touch sensor on the agent")
-    return _columns([int(model.sensor_adr[i]) for i in touch])
+    return as_slice([int(model.sensor_adr[i]) for i in touch])
 
 
 def _check_objects(model: mujoco.MjModel, names: tuple[str, ...]) -> None:

@@ -66,8 +66,8 @@ class FreeMotion:
         position: positions at the beginning (n, 2) [m]
         path: positions after each substep, relative to `position` (n, substep, 2) [m]
         """
-        low = position + np.minimum(np.minimum.reduce(path, axis=1), 0.0)
-        high = position + np.maximum(np.maximum.reduce(path, axis=1), 0.0)
+        low = position + np.minimum.reduce(path, axis=1, initial=0.0)
+        high = position + np.maximum.reduce(path, axis=1, initial=0.0)
         x_from, y_from, x_to, y_to = self._within
         # The axes are compared one at a time, so that NumPy's inner loop is over the boxes.
         met: np.ndarray = low[:, :1] < x_to

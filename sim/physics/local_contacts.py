@@ -60,8 +60,10 @@ class LocalContacts:
         """Step each agent in the small model of the obstacles in `few`, (n, obstacle) bool; see `BatchedStep`."""
         if len(self._models) > MOST:
             self._models.clear()
-        keys = [row.tobytes() for row in np.packbits(few, axis=1)]
-        models = [self._models.get(key) or self._make(key, one) for key, one in zip(keys, few, strict=True)]
+        packed = np.packbits(few, axis=1)
+        bits, width = packed.tobytes(), packed.shape[1]
+        keys = [bits[start : start + width] for start in range(0, len(bits), width)]
+        models = [self._models.get(key) or self._make(key, few[agent]) for agent, key in enumerate(keys)]
         return self._step(models, initial, control)
 
     def strayed(self, position: np.ndarray, path: np.ndarray, few: np.ndarray) -> np.ndarray:

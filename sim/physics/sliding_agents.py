@@ -40,10 +40,10 @@ class SlidingAgents:
         self.varied: Mapping[str, tuple[str, ...]] = {} if self._appearances is None else self._appearances.varied
         self._heights = np.array([world.model.body(name).pos[2] for name in world.objects])
         bodies = [int(world.model.body(name).id) for name in ("agent", *world.objects)]
-        self._reference = ReferencePose(world.model, bodies)
+        self._reference = ReferencePose(world.model, bodies, turning=1)
         rest = self._reference.poses
         self._height = float(rest.xpos[0, bodies[0], 2])
-        self._turns = np.repeat(rest.xmat[:, bodies], n, axis=0)
+        self._turns = np.repeat(rest.xmat[:, bodies[:1]], n, axis=0)
         self._state: WorldState | None = None
         self._command = np.zeros((n, 2))
         self.before: WorldState | None = None

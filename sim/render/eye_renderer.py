@@ -77,6 +77,7 @@ class EyeRenderer:
         else:
             self.sensor = sampling.sensor(FIRST if fidelity.samples == EDGES else asked)
         self._check_memory(n_envs, self._samples_per_receptor)
+        self._mosaic = self.eye.mosaic
         self._mixing = self.eye.aperture_throughput * self.eye.spectral_bands.weights
         self._receptor_sums = self.sensor.receptor_sums(self._mixing, self.tracer.basis)
         suns = [light.level for light in scene.scene.lights.found if light.kind == "directional"]
@@ -265,9 +266,8 @@ class EyeRenderer:
         views = self.n_envs * len(self.mounts)
         signals = sums(layers.reshape(layers.shape[0] * layers.shape[1], views, -1))
         signals = signals.reshape(self.n_envs, len(self.mounts), len(self._mixing), *self.eye.resolution)
-        mosaic = self.eye.mosaic
-        if mosaic is not None:
-            signals = np.take_along_axis(signals, mosaic.reshape(1, 1, -1, *self.eye.resolution), axis=2)
+        if self._mosaic is not None:
+            signals = np.take_along_axis(signals, self._mosaic.reshape(1, 1, -1, *self.eye.resolution), axis=2)
         if factors is not None and factors.is_level and self._has_components:
             return np.asarray(signals * factors.level)
         return signals

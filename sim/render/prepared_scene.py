@@ -11,6 +11,7 @@ import numpy as np
 
 import optics
 from optics.numerics.arguments import of_kind
+from optics.numerics.number_types import all_finite
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.compound_eye import CompoundEye, WorldEye
 from sim.eyes.depth_layers import DepthLayers
@@ -190,7 +191,7 @@ class PreparedScene:
 
     @staticmethod
     def _check_finite(places: np.ndarray) -> None:
-        if not np.isfinite(places).all():
+        if not all_finite(places):
             world = int(np.flatnonzero(~np.isfinite(places).all(axis=(1, 2)))[0])
             raise ValueError(f"poses of world {world} are not finite")
 

@@ -20,7 +20,7 @@ from sim.render.eye_rays import Directions, EyeRays, Lane
 from sim.scene.device_arrays import counted, floats, whole_numbers
 from sim.scene.frozen_kernels import GarbageKept
 from sim.scene.poses import Poses
-from sim.scene.variant import variant
+from sim.scene.variant import on_gpu, variant
 from sim.tracing import lighting
 from sim.tracing.eye_ray import EyeRay
 from sim.tracing.tracer import Buffers, Tracer
@@ -61,6 +61,7 @@ class Moving:
 
     def __init__(self, eyes: EyeRays, things: Buffers) -> None:
         self._eyes, self._things = eyes, things
+        self._frame: Frame | None = None
 
     def fill(self, poses: Poses) -> None:
         """Write the eyes and the tracer's rows of these worlds to the buffers."""
@@ -68,8 +69,13 @@ class Moving:
         self._things.fill(poses)
 
     def frame(self) -> Frame:
-        """Return the buffers as arrays on the device."""
-        return Frame(self._eyes.array(), self._things.arrays())
+        """Return the buffers as arrays on the device.
+
+        On the processor, they share the buffers' memory, so that the result is always the same.
+        """
+        if self._frame is None or on_gpu():
+            self._frame = Frame(self._eyes.array(), self._things.arrays())
+        return self._frame
 
 
 class RayKernel:

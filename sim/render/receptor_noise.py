@@ -38,9 +38,9 @@ class Normals:
     """
 
     def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:
-        self._shape = shape
+        self._shape, self._size = shape, math.prod(shape)
         self.restart(keys)
-        self._draws = -(-math.prod(shape) // PER_DRAW)
+        self._draws = -(-self._size // PER_DRAW)
         self._kernels: dict[int, _Kernel] = {}
 
     def restart(self, keys: np.ndarray) -> None:
@@ -56,26 +56,28 @@ class Normals:
         """Restore the state from `place`."""
         self._keys, self._frames = place[:, 0].astype(np.uint64), place[:, 1].astype(np.uint32)
 
-    def launch(self, worlds: np.ndarray) -> PendingFrame:
-        """Start drawing the next frame of these worlds, (len(worlds), *shape) float32. It runs asynchronously."""
-        n = len(self._keys)
-        width = FEW if len(worlds) <= FEW < n else n
+    def launch(self, worlds: np.ndarray | None = None) -> PendingFrame:
+        """Start drawing the next frame of these worlds (None: all), (len(worlds), *shape) float32.
+
+        It runs asynchronously.
+        """
+        n, chosen = len(self._keys), slice(None) if worlds is None else worlds
+        count = n if worlds is None else len(worlds)
+        width = FEW if count <= FEW < n else n
         if width not in self._kernels:
             self._kernels[width] = _Kernel(width, self._draws)
-        padded = worlds if len(worlds) == width else np.resize(worlds, width)
+        padded = chosen if worlds is None or count == width else np.resize(worlds, width)
         drawn = self._kernels[width].launch(
-            self._keys[padded], self._frames[padded], lambda parts: self._frame(parts, len(worlds))
+            self._keys[padded], self._frames[padded], lambda parts: self._frame(parts, count)
         )
-        self._frames[worlds] += 1
+        self._frames[chosen] += 1
         return drawn
 
     def _frame(self, parts: list[Array], n: int) -> np.ndarray:
         """Return the numbers of the first n worlds from the kernel's parts, each flat (world, draw)."""
-        drawn = np.empty((n, math.prod(self._shape)), np.float32)
-        for k, part in enumerate(parts):
-            mine = drawn[:, k * self._draws : (k + 1) * self._draws]
-            mine[:] = part.numpy().reshape(-1, self._draws)[:n, : mine.shape[1]]
-        return drawn.reshape(n, *self._shape)
+        ends = (max(self._size - k * self._draws, 0) for k in range(len(parts)))  # columns of each part in use
+        used = [part.numpy().reshape(-1, self._draws)[:n, :end] for part, end in zip(parts, ends, strict=True)]
+        return np.concatenate(used, axis=1).reshape(n, *self._shape)
 
 
 class _Kernel:

@@ -41,8 +41,8 @@ class WorldScene(PreparedScene):
         )
         self.warn_once(lighting.DIRECT)
         bodies = [body, *(int(world.model.body(name).id) for name in world.objects)]
-        self._reference = ReferencePose(world.model, bodies)
-        self._turns = self._reference.poses.xmat[0, bodies]
+        self._reference = ReferencePose(world.model, bodies, turning=1)
+        self._turns = self._reference.poses.xmat[:, bodies[:1]]
 
     def camera_sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
         """Return `sampling` for eyes that are no compound eyes."""
@@ -66,7 +66,7 @@ class WorldScene(PreparedScene):
         """
         positions = np.empty((len(position), 1 + len(self.world.objects), 3))
         positions[:, 0, :2], positions[:, 0, 2], positions[:, 1:] = position, EYE_HEIGHT, objects
-        rotations = np.repeat(self._turns[None].reshape(1, -1, 3, 3), len(position), axis=0)
+        rotations = np.repeat(self._turns, len(position), axis=0)
         cos, sin = np.cos(heading), np.sin(heading)
         rotations[:, 0, 0, 0] = rotations[:, 0, 1, 1] = cos
         rotations[:, 0, 1, 0], rotations[:, 0, 0, 1] = sin, -sin

@@ -35,10 +35,10 @@ class FrozenKernel:
 
     def __call__(self, scenes: Any, moving: Any, fixed: Any) -> Any:
         """Launch the kernel."""
-        if fixed is not self._fixed:
-            self._fixed, self._arrays = fixed, _arrays_of(fixed)
-        self._moving = moving
-        return self._frozen(scenes, _arrays_of(moving) + self._arrays)
+        if moving is not self._moving or fixed is not self._fixed:
+            self._moving, self._fixed = moving, fixed
+            self._arrays = _arrays_of(moving) + _arrays_of(fixed)
+        return self._frozen(scenes, self._arrays)
 
     @property
     def n_recordings(self) -> int:

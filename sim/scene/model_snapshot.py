@@ -115,7 +115,7 @@ class ModelSnapshot:
         if here.shape[1:] != own.shape:
             raise ValueError("poses of another model")
         alike = here[:1] if here.strides[0] == 0 else here  # all worlds share one model
-        if np.array_equal(np.broadcast_to(own, alike.shape), alike):
+        if (alike == own).all():
             return []
         differs = (alike != own).reshape(len(alike), len(own), -1).any(axis=(0, 2))
         return [int(thing) for thing in np.flatnonzero(differs)]
@@ -151,8 +151,11 @@ class ModelSnapshot:
     def _refuse_what_is_elsewhere(self, poses: Poses) -> None:
         if not len(self._still):
             return
-        moved = np.abs(poses.geom_xpos[:, self._still] - self._place) > ROUNDING * np.maximum(1, np.abs(self._place))
-        turned = np.abs(poses.geom_xmat[:, self._still] - self._turn) > ROUNDING
+        places, turns = poses.geom_xpos[:, self._still], poses.geom_xmat[:, self._still]
+        if (places == self._place).all() and (turns == self._turn).all():
+            return
+        moved = np.abs(places - self._place) > ROUNDING * np.maximum(1, np.abs(self._place))
+        turned = np.abs(turns - self._turn) > ROUNDING
         elsewhere = self._still[moved.any(axis=(0, 2)) | turned.any(axis=(0, 2, 3))]
         if len(elsewhere):
             raise ValueError(

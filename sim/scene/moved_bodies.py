@@ -17,15 +17,18 @@ class ReferencePose:
 
     bodies: ids of the moving bodies. Geoms, sites and cameras move rigidly with them; no other body may be attached to
         them
+    turning: number of the first bodies that may also turn. The others keep their rotation
     """
 
-    def __init__(self, model: mujoco.MjModel, bodies: Sequence[int]) -> None:
+    def __init__(self, model: mujoco.MjModel, bodies: Sequence[int], turning: int) -> None:
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         self.poses, self.bodies, self.n_bodies = Poses.from_data(data), list(bodies), model.nbody
+        self.turning = turning
         self.body_of = {"geom": model.geom_bodyid.copy(), "site": model.site_bodyid, "camera": model.cam_bodyid}
         self._local = {(kind, i): self._in_body(kind, i) for kind in _PREFIX for i in self.moved(kind)}
-        self._slots: dict[tuple[int, ...], np.ndarray | None] = {}
+        self._slots: dict[tuple[int, ...], slice | list[int] | None] = {}
+        self._kept: dict[tuple[int, ...], np.ndarray | None] = {}
 
     def moved(self, kind: str) -> list[int]:
         """Return the ids of the elements of a kind that are fixed to the bodies."""
@@ -35,18 +38,27 @@ class ReferencePose:
         """Return the origin (3,) [m] and rotation (3, 3) of an element in the frame of its body."""
         return self._local[kind, index]
 
-    def slots(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray | None:
+    def slots(self, geoms: Sequence[int] | np.ndarray) -> slice | list[int] | None:
         """Return the indices in `bodies` of the bodies whose frames these geoms share.
 
-        Return None if a geom has another frame. Most geoms share their body's frame.
+        The result is a slice if the indices are adjacent, because a slice copies nothing. Return None if a geom has
+        another frame. Most geoms share their body's frame.
         """
         key = tuple(geoms)
         if key not in self._slots:
             bodies = [int(self.body_of["geom"][geom]) for geom in key]
             local = [self._local.get(("geom", geom)) for geom in key]
             alike = all(at is not None and not at[0].any() and np.array_equal(at[1], np.eye(3)) for at in local)
-            self._slots[key] = np.array([self.bodies.index(body) for body in bodies]) if alike else None
+            self._slots[key] = as_slice([self.bodies.index(body) for body in bodies]) if alike else None
         return self._slots[key]
+
+    def kept_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray | None:
+        """Return the rotations of these geoms, (1, geom, 3, 3), if none of their bodies turns, else None."""
+        key = tuple(geoms)
+        if key not in self._kept:
+            turning = np.isin(self.body_of["geom"][list(key)], self.bodies[: self.turning]).any()
+            self._kept[key] = None if turning else self.poses.geom_xmat[:, list(key)]
+        return self._kept[key]
 
     def _in_body(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
         prefix = _PREFIX[kind]
@@ -61,7 +73,7 @@ class MovedBodies(Poses):
     """Poses of worlds in which all bodies are in the reference pose, except the moved ones.
 
     positions: positions of the moved bodies [m], (world, body, 3)
-    rotations: (world, body, 3, 3)
+    rotations: rotations of the bodies that may turn, which are the first ones, (world, turning body, 3, 3)
     models: models of all worlds, if their sizes, colours or materials differ; None: as in the renderer's model
     """
 
@@ -96,8 +108,10 @@ class MovedBodies(Poses):
         return np.stack([self._frame("geom", int(geom))[0] for geom in geoms], axis=1)
 
     def geom_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
+        if (kept := self.reference.kept_turns(geoms)) is not None:
+            return kept
         if (slots := self.reference.slots(geoms)) is not None:
-            return self.rotations[:, slots]
+            return self._turns()[:, slots]
         return np.stack([self._frame("geom", int(geom))[1] for geom in geoms], axis=1)
 
     def take(self, worlds: np.ndarray) -> MovedBodies:
@@ -112,7 +126,9 @@ class MovedBodies(Poses):
         if index not in self.reference.bodies:
             return super().frames(kind, index)
         place = self.reference.bodies.index(index)
-        return self.positions[:, place], self.rotations[:, place]
+        if place < self.reference.turning:
+            return self.positions[:, place], self.rotations[:, place]
+        return self.positions[:, place], np.broadcast_to(self.reference.poses.xmat[0, index], (self.n, 3, 3))
 
     def _frame(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
         body = int(self.reference.body_of[kind][index])
@@ -127,12 +143,26 @@ class MovedBodies(Poses):
             rotation if np.array_equal(turn, np.eye(3)) else rotation @ turn,
         )
 
+    def _turns(self) -> np.ndarray:
+        """Return the rotations of all moving bodies, (world, body, 3, 3)."""
+        found: np.ndarray = np.repeat(self.reference.poses.xmat[:, self.reference.bodies], self.n, axis=0)
+        found[:, : self.reference.turning] = self.rotations
+        return found
+
     def _built(self, name: str) -> np.ndarray:
         found: np.ndarray = np.repeat(getattr(self.reference.poses, name), self.n, axis=0)
-        if name in ("xpos", "xmat"):
-            found[:, self.reference.bodies] = self.positions if name == "xpos" else self.rotations
+        if name == "xpos":
+            found[:, self.reference.bodies] = self.positions
+        if name == "xmat":
+            found[:, self.reference.bodies] = self._turns()
         for kind, prefix in _PREFIX.items():
             if name.startswith(prefix):
                 for index in self.reference.moved(kind):
                     found[:, index] = self._frame(kind, index)[name.endswith("mat")]
         return found
+
+
+def as_slice(indices: list[int]) -> slice | list[int]:
+    """Return indices into an array, as a slice if they are adjacent. Indexing with a slice avoids a copy."""
+    adjacent = bool(indices) and indices == list(range(indices[0], indices[0] + len(indices)))
+    return slice(indices[0], indices[-1] + 1) if adjacent else indices

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.number_types import readable
+from optics.numerics.number_types import all_finite, readable
 from sim.tasks.outcome import Outcome
 
 __all__ = ["columns", "mapping", "not_finite", "require_outcome", "rows"]
@@ -39,7 +39,7 @@ def columns(where: str, returned: Any, n: int) -> np.ndarray:
     array = _array(where, returned, np.float32)
     if array.ndim != 2 or len(array) != n:
         raise ValueError(f"{where} has shape {array.shape}: must be ({n}, k), one row for each world")
-    if not np.isfinite(array).all():
+    if not all_finite(array):
         world = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise ValueError(f"{where} is {array[world].tolist()} in world {world}: must be finite")
     return array
@@ -71,18 +71,20 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
     Raises:
         ValueError: an array has another shape, a reward is not finite, or the outcome names worlds that do not exist.
     """
-    for name in ("terms", "terminated", "success", "over"):
-        readable(f"judge: {name}", outcome.terms.terms if name == "terms" else getattr(outcome, name))
-    size = n * learners
-    shapes = outcome.terms.terms.shape[1:], outcome.terminated.shape, outcome.success.shape
-    for name, shape in zip(("terms", "terminated", "success"), shapes, strict=True):
-        if shape != (size,):
-            raise ValueError(f"judge: {name} has shape {shape}: must be {(size,)}, one entry for each row")
-    if outcome.over is not None and outcome.over.shape != (n,):
-        raise ValueError(f"judge: over has shape {outcome.over.shape}: must be {(n,)}, one entry for each row")
-    if not np.isfinite(outcome.terms.terms).all():
-        place, row = (int(i) for i in np.argwhere(~np.isfinite(outcome.terms.terms))[0])
-        value = outcome.terms.terms[place, row]
+    terms, size = outcome.terms.terms, n * learners
+    for name, array, shape in (
+        ("terms", terms, (len(outcome.terms.names), size)),
+        ("terminated", outcome.terminated, (size,)),
+        ("success", outcome.success, (size,)),
+        ("over", outcome.over, (n,)),
+    ):
+        if type(array) is not np.ndarray:  # the usual type is readable
+            readable(f"judge: {name}", array)
+        if array is not None and array.shape != shape:
+            raise ValueError(f"judge: {name} has shape {array.shape}: must be {shape}, one entry for each row")
+    if not all_finite(terms):
+        place, row = (int(i) for i in np.argwhere(~np.isfinite(terms))[0])
+        value = terms[place, row]
         raise ValueError(
             f"judge: the term {outcome.terms.names[place]!r} is {value} in world {row % n}: must be finite"
         )

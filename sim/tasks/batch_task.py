@@ -216,7 +216,10 @@ class BatchTask(TaskSettings):
         """Return the proprioception of every agent in the chosen worlds, as arrays by name for each agent."""
         felt, name = self.proprioception(worlds), f"{type(self).__name__}: proprioception"
         known = felt if isinstance(felt, Mapping) else {"feels": felt}
-        return [{key: columns(f"{name}: {key!r}", array, worlds.n)[chosen] for key, array in known.items()}]
+        found = {key: columns(f"{name}: {key!r}", array, worlds.n) for key, array in known.items()}
+        if len(chosen) < worlds.n:
+            found = {key: array[chosen] for key, array in found.items()}
+        return [found]
 
     def _compiled(self) -> mujoco.MjModel:
         return compiled(self)

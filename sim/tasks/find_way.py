@@ -44,10 +44,18 @@ class FindWay(AgentTask):
         if region is None:
             raise ValueError(f"world {self.world.task!r} has no goal_region")
         start = worlds.before.start
-        was, is_now = (np.linalg.norm(s.position - start, axis=-1) for s in (worlds.before, worlds.state))
+        progress = _distance(worlds.state.position, start) - _distance(worlds.before.position, start)
         inside = path[..., 0] >= region[0]
-        for side in (path[..., 0] <= region[2], path[..., 1] >= region[1], path[..., 1] <= region[3]):
-            inside &= side
+        if inside.any():  # most agents are far from the goal
+            for side in (path[..., 0] <= region[2], path[..., 1] >= region[1], path[..., 1] <= region[3]):
+                inside &= side
         goal, nothing = inside.any(axis=1), np.zeros(worlds.n, bool)
         nowhere = np.zeros((worlds.n, 0), bool)
-        return self.weighted(worlds, AgentEvents(is_now - was, goal, nothing, nothing, nowhere, goal), failed)
+        return self.weighted(worlds, AgentEvents(progress, goal, nothing, nothing, nowhere, goal), failed)
+
+
+def _distance(places: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Return the distances of positions (n, 2) from starting positions (n, 2) [m], (n,)."""
+    apart = places - start
+    distance: np.ndarray = np.sqrt(np.add.reduce(apart * apart, axis=-1))
+    return distance

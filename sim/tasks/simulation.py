@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import shown
+from optics.numerics.number_types import all_finite
+from optics.numerics.read_only import read_only
 from sim.physics.physics import Physics
 from sim.scene.poses import Poses
 from sim.scene.variation import Variation
@@ -67,7 +69,7 @@ class Simulation:
         self.learners = sum(agent.learns for agent in self.agents)
         self.rows = self.learners * n
         self.steps, self._returns = np.zeros(n, int), np.zeros(self.rows)
-        self._everyone = np.arange(n)
+        self._everyone, self._nobody = np.arange(n), read_only(np.zeros(self.rows, bool))
         self.physics: Physics = task.physics(n, threads, self.variation)
         self.seed(seed)
         self._rehearse()
@@ -150,8 +152,7 @@ class Simulation:
         self.physics.check(self.task_name)
         reward = outcome.terms.total
         self._returns += reward
-        terminated = outcome.terminated
-        given_up = np.zeros(self.rows, bool)
+        terminated, given_up = outcome.terminated, self._nobody
         if self.least_return > -math.inf:
             given_up = (self._returns <= self.least_return) & ~terminated
         ends = (self.steps >= self.episode_steps) | self._any_learner(terminated | given_up)
@@ -232,7 +233,7 @@ class Simulation:
         The agent's `first_action` replaces such an action.
         """
         failed: dict[int, str] = {}
-        if not np.isfinite(actions).all():
+        if not all_finite(actions):
             actions, first = actions.copy(), 0
             for agent in self.agents:
                 own = actions[:, first : first + agent.n_actions]
@@ -246,12 +247,11 @@ class Simulation:
     def _feel(self, felt: Sequence[Mapping[str, np.ndarray]], worlds: np.ndarray | slice) -> None:
         for known, now in zip(self.felt, felt, strict=True):
             for name, array in now.items():
-                unknown = np.isnan(array)
-                if unknown.any():
-                    fresh = ~unknown.any(axis=1)
-                    known[name][self._everyone[worlds][fresh]] = array[fresh]
-                else:
+                if all_finite(array):
                     known[name][worlds] = array
+                else:
+                    fresh = ~np.isnan(array).any(axis=1)
+                    known[name][self._everyone[worlds][fresh]] = array[fresh]
 
     def _felt_keys(self) -> list[tuple[str, int, str]]:
         """Return three values for each entry of the agents' proprioception.

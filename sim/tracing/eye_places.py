@@ -92,12 +92,12 @@ class EyePlaces:
 
     def frames(self, poses: Poses) -> EyeFrames:
         """Return the eyes' frames in the world."""
-        origins, rotations = [], []
-        for (kind, index), (offset, turn) in zip(self._things, self._locals, strict=True):
+        origins, rotations = np.empty((poses.n, len(self), 3)), np.empty((poses.n, len(self), 3, 3))
+        for k, ((kind, index), (offset, turn)) in enumerate(zip(self._things, self._locals, strict=True)):
             origin, rotation = poses.frames(kind, index)
-            origins.append(origin + rotation @ offset)
-            rotations.append(rotation @ turn)
-        return EyeFrames(np.stack(origins, axis=1), np.stack(rotations, axis=1))
+            origins[:, k] = origin + rotation @ offset
+            rotations[:, k] = rotation @ turn
+        return EyeFrames(origins, rotations)
 
     def stand(self) -> LevelStand:
         """Return the body that the eyes are fixed to, with the eyes' positions on it.

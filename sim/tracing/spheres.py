@@ -53,8 +53,9 @@ class SphereRows:
         self._shared = SharedBuffer(n_envs * max(len(spheres), 1) * 4)
         self._rows = self._shared.values.reshape(n_envs, -1, 4)
         textured = np.flatnonzero(spheres.textured)
-        self._textured = [spheres.geoms[k] for k in textured]
+        self._textured = tuple(spheres.geoms[k] for k in textured)
         self._frames, self._names = spheres.frames[textured], [spheres.names[k] for k in textured]
+        self._checked: np.ndarray | None = None  # the last rotations without an error
 
     def fill(self, poses: Poses) -> None:
         """Write the centres of the spheres in these worlds.
@@ -64,7 +65,13 @@ class SphereRows:
         """
         if len(self._spheres):
             self._rows[..., :3] = poses.geom_places(self._spheres.geoms)
-        if self._textured and (off := np.abs(poses.geom_turns(self._textured) - self._frames)).max() > TURNED:
+        if self._textured and (turns := poses.geom_turns(self._textured)) is not self._checked:
+            self._refuse_turned(turns)
+            self._checked = turns
+
+    def _refuse_turned(self, turns: np.ndarray) -> None:
+        off = np.abs(turns - self._frames)
+        if off.max() > TURNED:
             name = self._names[int(off.max(axis=(0, 2, 3)).argmax())]
             raise ValueError(
                 f"geom {name!r} has a texture and has turned; closed forms do not turn textures: must be rendered with "

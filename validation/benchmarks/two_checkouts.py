@@ -1,10 +1,11 @@
 """CPU time of whole steps of environments in this checkout and in another one, such as the commit before a change.
 
-Each checkout steps the same tasks with the same actions in a separate process with one Dr.Jit thread. The two take
-turns of a third of a second of CPU time, so variations of the machine's speed affect both. The ratio is the other
-checkout's CPU time per step over that of this one, so more than 1 means that this one is faster: the median over the
-turns, with the quartiles in brackets. Both checkouts must have the task names and the arguments of `sim.make_vec_env`
-that are used here.
+Each checkout steps the same worlds with the same actions in a separate process with one Dr.Jit thread. The two take
+turns of about a third of a second of CPU time, so variations of the machine's speed affect both. In each turn, both
+take the same steps. Agents at walls take longer, so other steps could not be compared. The ratio is the other
+checkout's CPU time over that of this one, so more than 1 means that this one is faster: the median over the turns, with
+the quartiles in brackets. Both checkouts must have the task names and the arguments of `sim.make_vec_env` that are used
+here.
 
     python -m validation.benchmarks.two_checkouts OTHER [--turns 21] [--only detection]
 """
@@ -25,7 +26,8 @@ from typing import Any
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 LINE = "steps per CPU second: "
-SECONDS, WARM_UP = 0.33, 1.5  # seconds of CPU time of each turn, and before the first one
+SECONDS = 0.33  # CPU time of a turn
+WARM_UP = 60  # steps before the first turn, taken twice
 
 
 def _example(name: str, task: str) -> Any:
@@ -88,7 +90,7 @@ def cases() -> dict[str, Callable[[], Any]]:
 
 
 def serve() -> None:
-    """Measure on request of the parent process: a line with a case's name opens it, an empty line requests a turn."""
+    """Measure on request of the parent process, which names a case to open, if any, and a number of steps."""
     import drjit
     import numpy as np
 
@@ -99,22 +101,23 @@ def serve() -> None:
     venv: Any = None
     actions = np.empty(0)
     for line in map(str.strip, sys.stdin):
-        if line:
+        name, _, count = line.rpartition("|")
+        steps = int(count)
+        if name:
             if venv is not None:
                 venv.close()
-            venv = cases()[line]()
+            venv = cases()[name]()
             shape = 20, venv.num_envs, *venv.action_space.shape
             actions = np.random.default_rng(0).uniform(-1, 1, shape).astype(np.float32)
             venv.reset()
-        print(f"{LINE}{rate(venv, actions, WARM_UP if line else SECONDS)}", flush=True)
+        print(f"{LINE}{rate(venv, actions, steps)}", flush=True)
 
 
-def rate(venv: Any, actions: Any, seconds: float) -> float:
-    """Return the steps of all worlds per second of CPU time."""
-    start, steps = process_time(), 0
-    while process_time() - start < seconds:
-        venv.step(actions[steps % len(actions)])
-        steps += 1
+def rate(venv: Any, actions: Any, steps: int) -> float:
+    """Take this number of steps; return the steps of all worlds per second of CPU time."""
+    start = process_time()
+    for step in range(steps):
+        venv.step(actions[step % len(actions)])
     return float(steps * venv.num_envs / (process_time() - start))
 
 
@@ -127,11 +130,11 @@ class Checkout:
         pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
         self.folder, self._child = folder, subprocess.Popen(command, cwd=folder, env=environment, **pipes)
 
-    def asked(self, line: str = "") -> float:
-        """Let the process open the case `line` or, if it is empty, measure one turn; return steps per CPU second."""
+    def asked(self, steps: int, opened: str = "") -> float:
+        """Let the process open a case, if one is named, and take steps; return steps of all worlds per CPU second."""
         assert self._child.stdin
         assert self._child.stdout
-        print(line, file=self._child.stdin, flush=True)
+        print(f"{opened}|{steps}", file=self._child.stdin, flush=True)
         for said in self._child.stdout:
             if said.startswith(LINE):
                 return float(said.removeprefix(LINE))
@@ -160,9 +163,12 @@ def main() -> None:
     places = [Checkout(folder.resolve()) for folder in (asked.other, CHECKOUT)]
     print("| case | other, steps per CPU s | this, steps per CPU s | ratio |\n|---|---|---|---|")
     for name in (name for name in cases() if asked.only in name):
+        worlds = int(name.split()[-2])
         for place in places:
-            place.asked(name)
-        turns = [tuple(place.asked() for place in places) for _ in range(asked.turns)]
+            place.asked(WARM_UP, name)
+        steps = max(1, round(SECONDS * places[0].asked(WARM_UP) / worlds))
+        places[1].asked(WARM_UP)
+        turns = [tuple(place.asked(steps) for place in places) for _ in range(asked.turns)]
         low, middle, high = quantiles((this / other for other, this in turns), n=4)
         rates = " | ".join(f"{median(column):,.0f}" for column in zip(*turns, strict=True))
         print(f"| {name} | {rates} | {middle:.2f} [{low:.2f}, {high:.2f}] |", flush=True)
