@@ -14,11 +14,15 @@ __all__ = [
     "FACTORS",
     "LEARNER",
     "OTHERS",
+    "RUNS",
     "TASKS",
     "Control",
+    "animals",
     "controls",
     "designs",
     "factorial",
+    "has",
+    "in_task",
     "runs_of",
 ]
 
@@ -34,7 +38,7 @@ LEARNER = (
     "learning.least_return=0",
 )
 LAYOUTS = "world.layouts=family world.family_seed={seed}"  # layouts of navigators; each training run has its own family
-RUNS = 8  # training runs of each animal in each task
+RUNS = 12  # training runs of each animal in each task, at most
 # Factors and their two levels: number of eyes, receptors across, angle over which eyes are spread, height of eyes.
 FACTORS = {
     "n_eyes": (2, 10),
@@ -117,7 +121,10 @@ def animals() -> tuple[Design, ...]:
 
 
 def designs() -> list[Design]:
-    """Return all training runs. The first run of every animal comes before the second run of any animal."""
+    """Return all training runs that the experiment may need.
+
+    The first run of every animal comes before the second run of any animal.
+    """
     trained = itertools.product(range(RUNS), TASKS, animals())
     return [in_task(animal, task, seed) for seed, task, animal in trained if has(task, animal)]
 
@@ -136,4 +143,5 @@ def in_task(animal: Design, task: str, seed: int) -> Design:
 def runs_of(rows: Sequence[Trained], task: str, animal: Design) -> list[Trained]:
     """Return the training runs of an animal in a task, without failed ones."""
     wanted = {in_task(animal, task, seed) for seed in range(RUNS)}
-    return [row for row in rows if not row.failed and row.design in wanted]
+    similar = [row for row in rows if (row.task, row.n_eyes, row.width) == (task, animal.n_eyes, animal.width)]  # quick
+    return [row for row in similar if not row.failed and row.design in wanted]
