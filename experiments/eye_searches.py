@@ -37,7 +37,8 @@ SETTINGS = (
 class Search:
     """A search of the plan.
 
-    kind: "free" (no costs), "priced" (receptors and eyes have prices) or "random" (random search without costs)
+    kind: "free" (no costs), "priced" (receptors and eyes have prices) or "random" (random search without costs:
+        genomes from a Latin hypercube, uniform over the range of each gene)
     """
 
     task: str
@@ -52,7 +53,7 @@ class Search:
     def assignments(self) -> tuple[str, ...]:
         """Settings that differ from the preset's. Each seed of navigators has its own family of mazes."""
         layouts = (f"world.layouts=family world.family_seed={self.seed}",) if self.task == "maze" else ()
-        own = {"free": (), "priced": PRICES, "random": ("search.optimizer=RandomSearch",)}[self.kind]
+        own = {"free": (), "priced": PRICES, "random": ("search.optimizer=LHSSearch",)}[self.kind]
         return (*SETTINGS, *" ".join(layouts).split(), *own, f"seed={self.seed}")
 
     @property
