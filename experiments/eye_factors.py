@@ -14,7 +14,7 @@ import numpy as np
 
 from experiments import designed, eye_factors_figure
 from experiments.designed import Design, Trained
-from experiments.eye_factors_design import LEARNER, OTHERS, TASKS, Control, controls, designs, factorial, has, runs_of
+from experiments.eye_factors_design import LEARNER, OTHERS, TASKS, Control, controls, designs, factorial, runs_of
 from experiments.eye_factors_estimates import advantage, differences, effects_in, in_units, spread_of_layouts
 from experiments.eye_factors_power import BETWEEN, LOOKS, Claim, claims, needed, runs_for, verdict
 from experiments.eye_prices import PRICES, fittest, probability_of_finer
@@ -110,7 +110,7 @@ def _controls_table(rows: Sequence[Trained]) -> str:
     lines = []
     for control in controls():
         found = [(task, advantage(rows, task, control)) for task in TASKS]
-        cells = ["-" if one is None else f"{one}{decided.get((task, control), '')}" for task, one in found]
+        cells = ["-" if one is None else f"{one}{decided[task, control]}" for task, one in found]
         lines.append([control.name, *cells])
     return markdown_table(["comparison", *TASKS], lines)
 
@@ -123,8 +123,8 @@ def _power_table(rows: Sequence[Trained]) -> str:
         effects = effects_in(first, task)
         if effects is None:
             return "Too few training runs."
-        pairs = [differences(first, task, one) for one in controls() if has(task, one.many)]
-        of_pairs = math.sqrt(float(np.mean([one.var(ddof=1) for one in pairs])))
+        pairs = [differences(first, task, one) for one in controls()]
+        of_pairs = math.sqrt(float(np.mean([one.var(ddof=1) for one in pairs if one.size > 1])))
         needs = {kind: max(runs_for(one) for one in claims() if type(one.of) is kind) for kind in (tuple, Control)}
         lines.append(
             [

@@ -37,6 +37,9 @@ LEARNER = (
     *("learning.first_speed=0.25", "learning.contact_ramp=75000", "learning.decay_after=75000"),
     "learning.least_return=0",
 )
+LONGER = (
+    "learning.total_steps=450000 learning.eval_interval=150000 learning.contact_ramp=225000 learning.decay_after=225000"
+)
 LAYOUTS = "world.layouts=family world.family_seed={seed}"  # layouts of navigators; each training run has its own family
 RUNS = 12  # training runs of each animal in each task, at most
 # Factors and their two levels: number of eyes, receptors across, angle over which eyes are spread, height of eyes.
@@ -99,6 +102,9 @@ def controls() -> tuple[Control, ...]:
         Control("450 receptors, both over 90°", _eyes(18, 5, 90.0), _eyes(2, 15, 90.0)),
         Control("16 rays per receptor throughout", *_both(rays)),
         Control("walls of 0.5 m", *_both("world.wall_height=0.5")),
+        Control("three times as many training steps", *_both(LONGER)),
+        Control("256 neurons per layer", *(replace(one, neurons=256, features=16) for one in (COMPOUND, CAMERA))),
+        Control("32 training mazes", *_both("world.training_layouts=32")),
     )
 
 
@@ -130,8 +136,8 @@ def designs() -> list[Design]:
 
 
 def has(task: str, animal: Design) -> bool:
-    """Return whether an animal is trained in a task. The world of detection has no walls to change."""
-    return task != "detection" or "wall_height" not in animal.own
+    """Return whether an animal is trained in a task. Detection has neither walls of another height nor layouts."""
+    return task != "detection" or not animal.own.startswith("world.")
 
 
 def in_task(animal: Design, task: str, seed: int) -> Design:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.designed import Trained
-from experiments.eye_factors_design import FACTORS, Control, animals, factorial, has, runs_of
+from experiments.eye_factors_design import FACTORS, Control, factorial, runs_of
 from experiments.factorial import Effects, effects
 from experiments.means import Interval, mean_of
 
@@ -44,11 +44,11 @@ def differences(rows: Sequence[Trained], task: str, control: Control) -> NDArray
 def spread_of_layouts(rows: Sequence[Trained], task: str) -> float:
     """Return the standard deviation of the return between seeds, and thus between sets of layouts.
 
-    The variance of the seeds' means is corrected for the part that training runs contribute. All animals must have the
-    same seeds.
+    The variance of the seeds' means over the factorial design is corrected for the part that training runs contribute.
     """
-    of_animals = [runs_of(rows, task, animal) for animal in animals() if has(task, animal)]
-    table = np.array([[row.held_out for row in sorted(one, key=lambda row: row.seed)] for one in of_animals])
+    of_cells = [{row.seed: row.held_out for row in runs_of(rows, task, cell)} for cell in factorial()]
+    seeds = set.intersection(*(set(one) for one in of_cells))
+    table = np.array([[one[seed] for seed in sorted(seeds)] for one in of_cells])
     means = table.mean(axis=0)
     rest = table - table.mean(axis=1, keepdims=True) - means + table.mean()
     of_training = (rest**2).sum() / (rest.size - sum(rest.shape) + 1)

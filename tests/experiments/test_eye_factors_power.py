@@ -8,7 +8,8 @@ from scipy.stats import t
 
 from experiments import eye_factors_power
 from experiments.designed import Trained
-from experiments.eye_factors_design import CAMERA, COMPOUND, RUNS, animals, controls, has, in_task
+from experiments.eye_factors_design import CAMERA, COMPOUND, RUNS, animals, controls, factorial, has, in_task
+from experiments.eye_factors_estimates import spread_of_layouts
 from experiments.eye_factors_power import BETWEEN, COMPARISON, CONFIDENCE, LOOKS, Claim, claims, needed, power, verdict
 
 FIRST = Claim("maze", controls()[0], COMPARISON)
@@ -86,3 +87,17 @@ def test_a_difference_that_does_not_matter_is_negligible():
     compared = {in_task(animal, task, n) for animal, task in kinds for n in range(LOOKS[0])}
     some = [replace(row, held_out=row.held_out / 100) if row.design in compared else row for row in rows(LOOKS[0])]
     assert verdict(FIRST, some).state == "negligible"
+
+
+def test_the_spread_of_layouts_does_not_contain_that_of_training_runs():
+    chance = np.random.default_rng(5)
+    of_seed = chance.normal(0, 10, RUNS)
+    few = [
+        Trained(**vars(in_task(cell, "maze", seed)), held_out=10 * chance.normal() + shift)
+        for seed, shift in enumerate(of_seed)
+        for cell in factorial()
+    ]
+    expected = np.std(of_seed, ddof=1)
+    assert spread_of_layouts(few, "maze") == pytest.approx(expected, rel=0.25)
+    calm = [replace(row, held_out=row.held_out - of_seed[row.seed]) for row in few]
+    assert spread_of_layouts(calm, "maze") < 2.5
