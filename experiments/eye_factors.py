@@ -61,7 +61,8 @@ def _draw(rows: Sequence[Trained], path: Path) -> None:
     compared = []
     for control in controls():
         by_task = {task: advantage(rows, task, control) for task in found}
-        compared.append((control, {task: in_units(one, found[task].spread) for task, one in by_task.items() if one}))
+        known = {task: in_units(one, found[task].spread) for task, one in by_task.items() if one}
+        compared += [(control, known)] if known else []
     eye_factors_figure.draw(found, names, compared, path)
 
 
