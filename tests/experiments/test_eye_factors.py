@@ -90,7 +90,7 @@ def test_stored_runs_are_recognised(tmp_path):
 
 def test_the_page_states_the_effect_that_is_there(tmp_path):
     origin = Origin(1.0, "a computer, 2 cores", {"rhabdom": "0", "commit": "abc", "python": "3.11"}, "worker")
-    some = rows()
+    some = rows(runs=4)
     for task in TASKS:
         found = effects_in(some, task)
         sign = 1 if task == "detection" else -1
