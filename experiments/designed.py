@@ -167,9 +167,14 @@ def evaluate_and_test(
 
 
 def train_all(
-    designs: Iterable[Design], settings: Sequence[str], path: Path, workers: int = 0, tested: bool = False
+    designs: Iterable[Design],
+    settings: Sequence[str],
+    path: Path,
+    workers: int = 0,
+    tested: bool = False,
+    needed: Iterable[Design] | None = None,
 ) -> list[Trained]:
-    """Return the rows of all designs in their order, after training the missing ones.
+    """Return the stored rows of the designs in their order, after training the missing ones.
 
     Each row is written as soon as it is complete. After an interruption, a repeated call trains only the designs that
     are still missing. The total hours are stored in a JSON file of the same name.
@@ -177,11 +182,13 @@ def train_all(
     settings: "section.name=value" for all designs, in addition to the tasks' settings
     workers: number of processes; 0: one per core
     tested: True if each trained animal also plays in the test set of layouts
+    needed: designs to train, in this order; None: all
     """
     designs = list(designs)
+    wanted = designs if needed is None else list(needed)
     known = {row.design: row for row in read_rows(Trained, path)}
     goes_on = bool(known)
-    waiting = dict(enumerate(design for design in designs if design not in known))
+    waiting = dict(enumerate(design for design in wanted if design not in known))
     team = LocalExecutor(evaluate_and_test if tested else evaluate_candidate, workers, prepare_device)
     with tempfile.TemporaryDirectory() as folder, team as executor:
         jobs = [
@@ -197,7 +204,7 @@ def train_all(
             write_rows([known[design] for design in designs if design in known], path)
             print(f"{len(known)} of {len(designs)}: {row}", flush=True)
     written = {row.design: row for row in read_rows(Trained, path)}
-    return [written[design] for design in designs]
+    return [written[design] for design in designs if design in written]
 
 
 def crossed(
@@ -220,6 +227,7 @@ class Experiment:
     settings: settings of all training runs, "section.name=value"
     page: function that returns the page, from the stored rows, their origin and the written answer
     tested: True if each trained animal also plays in the test set of layouts
+    needed: function that returns the training runs that the stored rows still lack, in order; None: all designs
     """
 
     name: str
@@ -228,6 +236,7 @@ class Experiment:
     settings: Sequence[str]
     page: Callable[[Sequence[Trained], Origin, str], Page]
     tested: bool = False
+    needed: Callable[[Sequence[Trained]], Sequence[Design]] | None = None
 
 
 def main(experiment: Experiment, arguments: Sequence[str] | None = None) -> int:
@@ -245,7 +254,7 @@ def _made(experiment: Experiment, chosen: Namespace) -> None:
     data.parent.mkdir(parents=True, exist_ok=True)
     said = data.with_suffix(".txt")
     if chosen.compute:
-        train_all(experiment.designs(), experiment.settings, data, chosen.workers, experiment.tested)
+        _train(experiment, data, chosen.workers)
     rows = read_rows(Trained, data)
     if not rows:
         raise ValueError(f"{data} holds no animals; train some with --compute")
@@ -253,3 +262,13 @@ def _made(experiment: Experiment, chosen: Namespace) -> None:
         write_whole(said, f"{chosen.answer}\n".encode())
     answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
     experiment.page(rows, Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
+
+
+def _train(experiment: Experiment, data: Path, workers: int) -> None:
+    """Train the missing animals; new results may make further training runs unnecessary, or request some."""
+    every = experiment.designs()
+    while True:
+        needed = every if experiment.needed is None else experiment.needed(read_rows(Trained, data))
+        train_all(every, experiment.settings, data, workers, experiment.tested, needed)
+        if experiment.needed is None or not needed:
+            return

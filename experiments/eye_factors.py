@@ -5,6 +5,7 @@ python -m experiments.eye_factors [--compute] [--workers N] [--docs DIR]
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,24 +14,16 @@ import numpy as np
 
 from experiments import designed, eye_factors_figure
 from experiments.designed import Design, Trained
-from experiments.eye_factors_design import (
-    FACTORS,
-    LEARNER,
-    OTHERS,
-    TASKS,
-    Control,
-    controls,
-    designs,
-    factorial,
-    runs_of,
-)
+from experiments.eye_factors_design import LEARNER, OTHERS, TASKS, Control, controls, designs, factorial, runs_of
+from experiments.eye_factors_estimates import advantage, differences, effects_in, in_units, spread_of_layouts
+from experiments.eye_factors_power import BETWEEN, LOOKS, Claim, claims, needed, runs_for, verdict
 from experiments.eye_prices import PRICES, fittest, probability_of_finer
-from experiments.factorial import Effects, effects
-from experiments.means import Interval, mean_of
+from experiments.factorial import interaction_with_task
+from experiments.means import mean_of
 from experiments.page import Figure, Page, markdown_table
 from experiments.store import Origin
 
-__all__ = ["advantage", "effects_in", "page"]
+__all__ = ["page"]
 
 NAME = "eye_factors"
 NAMES = {
@@ -54,6 +47,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
             "fitness": _fitness_table(rows),
             "effects": _effects_table(rows),
             "controls": _controls_table(rows),
+            "power": _power_table(rows),
             "prices": _prices_table(rows),
         },
         figures=[Figure(NAME, lambda path: _draw(rows, path))],
@@ -67,32 +61,9 @@ def _draw(rows: Sequence[Trained], path: Path) -> None:
     compared = []
     for control in controls():
         by_task = {task: advantage(rows, task, control) for task in found}
-        compared.append((control, {task: _in_units(one, found[task].spread) for task, one in by_task.items() if one}))
+        known = {task: in_units(one, found[task].spread) for task, one in by_task.items() if one}
+        compared += [(control, known)] if known else []
     eye_factors_figure.draw(found, names, compared, path)
-
-
-def _in_units(interval: Interval, unit: float) -> Interval:
-    return Interval(interval.mean / unit, interval.low / unit, interval.high / unit)
-
-
-def effects_in(rows: Sequence[Trained], task: str) -> Effects | None:
-    """Return the effects of the factors on the return in a task's test set; None if there are too few training runs."""
-    mine = [row for cell in factorial() for row in runs_of(rows, task, cell)]
-    levels = {name: [2 * high.index(getattr(row, name)) - 1 for row in mine] for name, high in FACTORS.items()}
-    try:
-        return effects(levels, [row.seed for row in mine], np.array([row.held_out for row in mine]))
-    except ValueError:
-        return None
-
-
-def advantage(rows: Sequence[Trained], task: str, control: Control) -> Interval | None:
-    """Return the mean return of many coarse eyes minus that of few fine ones; None with fewer than two pairs of runs.
-
-    Runs with the same seed have the same layouts. They form pairs, so that differences between layouts cancel.
-    """
-    many, few = ({row.seed: row.held_out for row in runs_of(rows, task, one)} for one in (control.many, control.few))
-    pairs = np.array([many[seed] - few[seed] for seed in sorted(many.keys() & few.keys())])
-    return mean_of(pairs) if pairs.size > 1 else None
 
 
 def factor_name(names: Sequence[str]) -> str:
@@ -112,22 +83,65 @@ def _fitness_table(rows: Sequence[Trained]) -> str:
 
 
 def _effects_table(rows: Sequence[Trained]) -> str:
-    found = {task: effects_in(rows, task) for task in TASKS}
-    known = {task: one for task, one in found.items() if one is not None}
-    if not known:
+    """Return a table of effects in each task and between the tasks, with the state of each claim."""
+    found = [effects_in(rows, task) for task in TASKS]
+    if None in found:
         return "Too few training runs."
-    names = next(iter(known.values())).of
-    lines = [[factor_name(one), *(str(known[task].of[one]) for task in known)] for one in names]
-    lines.append(["standard deviation of training runs [return]", *(f"{known[task].spread:.3g}" for task in known)])
-    return markdown_table(["effect [standard deviations]", *known], lines)
+    first, second = (one for one in found if one is not None)
+    between = interaction_with_task(first, second)
+    decided = {(claim.task, claim.of): _decided(claim, rows) for claim in claims()}
+    lines = []
+    for names, effect in first.of.items():
+        columns = zip((*TASKS, BETWEEN), (effect, second.of[names], between[names]), strict=True)
+        lines.append([factor_name(names), *(f"{one}{decided.get((task, names), '')}" for task, one in columns)])
+    spreads = (f"{one.spread:.3g}" for one in (first, second))
+    lines.append(["standard deviation of training runs [return]", *spreads, ""])
+    return markdown_table(["effect [standard deviations]", *TASKS, BETWEEN], lines)
+
+
+def _decided(claim: Claim, rows: Sequence[Trained]) -> str:
+    """Return the state of a claim, as the end of a table's cell."""
+    found = verdict(claim, rows)
+    states = {"negligible": "decided: small", "open": f"open, needs {runs_for(claim)}"}
+    return f" ({states.get(found.state, 'decided')})"
 
 
 def _controls_table(rows: Sequence[Trained]) -> str:
+    decided = {(claim.task, claim.of): _decided(claim, rows) for claim in claims()}
     lines = []
     for control in controls():
-        found = [advantage(rows, task, control) for task in TASKS]
-        lines.append([control.name, *("-" if one is None else str(one) for one in found)])
+        found = [(task, advantage(rows, task, control)) for task in TASKS]
+        cells = ["-" if one is None else f"{one}{decided[task, control]}" for task, one in found]
+        lines.append([control.name, *cells])
     return markdown_table(["comparison", *TASKS], lines)
+
+
+def _power_table(rows: Sequence[Trained]) -> str:
+    """Return a table of standard deviations in each task after the first look, and of the training runs needed."""
+    first = [row for row in rows if row.seed < LOOKS[0]]
+    lines = []
+    for task in TASKS:
+        effects = effects_in(first, task)
+        if effects is None:
+            return "Too few training runs."
+        pairs = [differences(first, task, one) for one in controls()]
+        of_pairs = math.sqrt(float(np.mean([one.var(ddof=1) for one in pairs if one.size > 1])))
+        needs = {kind: max(runs_for(one) for one in claims() if type(one.of) is kind) for kind in (tuple, Control)}
+        lines.append(
+            [
+                task,
+                *(f"{one:.3g}" for one in (effects.spread, spread_of_layouts(first, task), of_pairs)),
+                *(str(runs) for runs in needs.values()),
+            ]
+        )
+    header = [
+        "training runs",
+        "sets of layouts",
+        "differences of pairs",
+        "needed for effects",
+        "needed for comparisons",
+    ]
+    return markdown_table(["task", *header], lines)
 
 
 def _prices_table(rows: Sequence[Trained]) -> str:
@@ -157,7 +171,7 @@ def _eyes_of(animal: Design) -> str:
     return f"{size} over {animal.placement_range_deg:g}°, {animal.vertical_fov_deg:g}° high"
 
 
-EXPERIMENT = designed.Experiment(NAME, __doc__ or "", designs, LEARNER, page, tested=True)
+EXPERIMENT = designed.Experiment(NAME, __doc__ or "", designs, LEARNER, page, tested=True, needed=needed)
 
 if __name__ == "__main__":
     sys.exit(designed.main(EXPERIMENT))

@@ -14,11 +14,15 @@ __all__ = [
     "FACTORS",
     "LEARNER",
     "OTHERS",
+    "RUNS",
     "TASKS",
     "Control",
+    "animals",
     "controls",
     "designs",
     "factorial",
+    "has",
+    "in_task",
     "runs_of",
 ]
 
@@ -33,8 +37,11 @@ LEARNER = (
     *("learning.first_speed=0.25", "learning.contact_ramp=75000", "learning.decay_after=75000"),
     "learning.least_return=0",
 )
+LONGER = (
+    "learning.total_steps=450000 learning.eval_interval=150000 learning.contact_ramp=225000 learning.decay_after=225000"
+)
 LAYOUTS = "world.layouts=family world.family_seed={seed}"  # layouts of navigators; each training run has its own family
-RUNS = 8  # training runs of each animal in each task
+RUNS = 12  # training runs of each animal in each task, at most
 # Factors and their two levels: number of eyes, receptors across, angle over which eyes are spread, height of eyes.
 FACTORS = {
     "n_eyes": (2, 10),
@@ -95,6 +102,9 @@ def controls() -> tuple[Control, ...]:
         Control("450 receptors, both over 90°", _eyes(18, 5, 90.0), _eyes(2, 15, 90.0)),
         Control("16 rays per receptor throughout", *_both(rays)),
         Control("walls of 0.5 m", *_both("world.wall_height=0.5")),
+        Control("three times as many training steps", *_both(LONGER)),
+        Control("256 neurons per layer", *(replace(one, neurons=256, features=16) for one in (COMPOUND, CAMERA))),
+        Control("32 training mazes", *_both("world.training_layouts=32")),
     )
 
 
@@ -117,14 +127,17 @@ def animals() -> tuple[Design, ...]:
 
 
 def designs() -> list[Design]:
-    """Return all training runs. The first run of every animal comes before the second run of any animal."""
+    """Return all training runs that the experiment may need.
+
+    The first run of every animal comes before the second run of any animal.
+    """
     trained = itertools.product(range(RUNS), TASKS, animals())
     return [in_task(animal, task, seed) for seed, task, animal in trained if has(task, animal)]
 
 
 def has(task: str, animal: Design) -> bool:
-    """Return whether an animal is trained in a task. The world of detection has no walls to change."""
-    return task != "detection" or "wall_height" not in animal.own
+    """Return whether an animal is trained in a task. Detection has neither walls of another height nor layouts."""
+    return task != "detection" or not animal.own.startswith("world.")
 
 
 def in_task(animal: Design, task: str, seed: int) -> Design:
@@ -136,4 +149,5 @@ def in_task(animal: Design, task: str, seed: int) -> Design:
 def runs_of(rows: Sequence[Trained], task: str, animal: Design) -> list[Trained]:
     """Return the training runs of an animal in a task, without failed ones."""
     wanted = {in_task(animal, task, seed) for seed in range(RUNS)}
-    return [row for row in rows if not row.failed and row.design in wanted]
+    similar = [row for row in rows if (row.task, row.n_eyes, row.width) == (task, animal.n_eyes, animal.width)]  # quick
+    return [row for row in similar if not row.failed and row.design in wanted]

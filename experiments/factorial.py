@@ -37,12 +37,15 @@ class Effects:
     freedom: int
 
 
-def effects(levels: Mapping[str, Sequence[int]], blocks: Sequence[int], response: Floats) -> Effects:
+def effects(
+    levels: Mapping[str, Sequence[int]], blocks: Sequence[int], response: Floats, confidence: float = 0.95
+) -> Effects:
     """Return the effects of the factors on the response.
 
     levels: -1 or +1 for each run, by the name of the factor
     blocks: block of each run, whose mean is removed
     response: result of each run
+    confidence: coverage of the intervals
 
     Interactions of three and more factors are fitted, so that they do not enter the residual, but are not returned.
 
@@ -59,7 +62,7 @@ def effects(levels: Mapping[str, Sequence[int]], blocks: Sequence[int], response
     inverse = np.linalg.inv(design.T @ design)
     coefficients = inverse @ design.T @ response
     spread = math.sqrt(float(((response - design @ coefficients) ** 2).sum()) / freedom)
-    reach = float(t.ppf(0.975, freedom))
+    reach = float(t.ppf((1 + confidence) / 2, freedom))
     found = {}
     for n, names in enumerate(terms):
         if len(names) <= 2:
@@ -69,7 +72,7 @@ def effects(levels: Mapping[str, Sequence[int]], blocks: Sequence[int], response
 
 
 def interaction_with_task(one: Effects, other: Effects) -> dict[tuple[str, ...], Interval]:
-    """Return each effect in the one task minus that in the other task, with 95 % intervals.
+    """Return each effect in the one task minus that in the other task, with intervals of the same coverage.
 
     The tasks' runs are independent, so the variances add. Each effect has its own unit, the residual standard deviation
     in its task, because the tasks' rewards have different units.

@@ -20,7 +20,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean and its 95 % interval; `low` and `high` are NaN for a mean without an interval."""
+    """A mean and its interval, of 95 % unless stated otherwise.
+
+    `low` and `high` are NaN for a mean without an interval.
+    """
 
     mean: float
     low: float
@@ -30,10 +33,10 @@ class Interval:
         return f"{self.mean:.3g}" + (f" [{self.low:.3g}, {self.high:.3g}]" if math.isfinite(self.low) else "")
 
 
-def mean_of(values: Floats) -> Interval:
-    """Return the mean of independent values with Student's 95 % interval; a single value has no interval."""
+def mean_of(values: Floats, confidence: float = 0.95) -> Interval:
+    """Return the mean of independent values with Student's interval; a single value has no interval."""
     n = values.size
-    half = t.ppf(0.975, n - 1) * values.std(ddof=1) / math.sqrt(n) if n > 1 else math.nan
+    half = t.ppf((1 + confidence) / 2, n - 1) * values.std(ddof=1) / math.sqrt(n) if n > 1 else math.nan
     return Interval(float(values.mean()), float(values.mean() - half), float(values.mean() + half))
 
 

@@ -21,6 +21,7 @@ from experiments.eye_factors_design import (
     has,
     in_task,
 )
+from experiments.eye_factors_estimates import advantage, effects_in
 from experiments.store import Origin, read_rows, write_rows
 
 NAVIGATION = TASKS[0]
@@ -89,13 +90,13 @@ def test_stored_runs_are_recognised(tmp_path):
 
 def test_the_page_states_the_effect_that_is_there(tmp_path):
     origin = Origin(1.0, "a computer, 2 cores", {"rhabdom": "0", "commit": "abc", "python": "3.11"}, "worker")
-    some = rows()
+    some = rows(runs=4)
     for task in TASKS:
-        found = eye_factors.effects_in(some, task)
+        found = effects_in(some, task)
         sign = 1 if task == "detection" else -1
         assert found.of[("width",)].mean * found.spread == pytest.approx(10 * sign, abs=1)
         assert all(one.low < 0.6 and one.high > -0.6 for names, one in found.of.items() if names != ("width",))
-        assert eye_factors.advantage(some, task, controls()[0]).mean == pytest.approx(-10 * sign, abs=2)
+        assert advantage(some, task, controls()[0]).mean == pytest.approx(-10 * sign, abs=2)
     made = eye_factors.page(some, origin, "Coarse eyes.")
     assert "Coarse eyes." in made.markdown
     for figure in made.figures:
@@ -105,7 +106,7 @@ def test_the_page_states_the_effect_that_is_there(tmp_path):
 
 def test_a_page_can_be_made_of_the_first_runs(tmp_path):
     some = rows(runs=1)
-    assert eye_factors.effects_in(some, NAVIGATION) is None
+    assert effects_in(some, NAVIGATION) is None
     assert (
         "Too few training runs" in eye_factors.page(some, Origin(1.0, "m", {"commit": "a", "python": "3"}), "").markdown
     )
@@ -114,5 +115,5 @@ def test_a_page_can_be_made_of_the_first_runs(tmp_path):
 def test_difficult_layouts_do_not_blur_comparisons():
     """Returns differ by up to 140 between layouts, and by 10 ± 1 between animals in the same layouts."""
     some = [replace(row, held_out=row.held_out + 20 * row.seed) for row in rows()]
-    found = eye_factors.advantage(some, NAVIGATION, controls()[0])
+    found = advantage(some, NAVIGATION, controls()[0])
     assert 7 < found.low < found.high < 13, "an interval of unpaired runs is a hundred wide"

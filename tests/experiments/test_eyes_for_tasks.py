@@ -10,6 +10,7 @@ from evolve.learning.final_figures import final_episodes
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.search.worker import evaluated
+from evolve.store.evaluation import Evaluation
 from experiments import crossing as crossing_module
 from experiments import designed
 from experiments.crossing import _interaction, crossing
@@ -213,6 +214,23 @@ def test_rows_that_are_kept_keep_the_version_that_made_them(trained, in_this_pro
         path.unlink()
     train_all(ASKED if kept else ASKED[:1], TINY, path, workers=1)
     assert Origin.read(made).earlier == earlier
+
+
+def test_only_needed_animals_are_trained_and_results_may_request_more(tmp_path, in_this_process, monkeypatch):
+    """The first call requests the second design. Its result requests the first one. The file keeps the designs' order,
+    and a row that is no longer requested stays.
+    """
+    monkeypatch.setattr(designed, "evaluate_candidate", lambda *_, **__: Evaluation(1.0, (1.0,)))
+    seen = []
+
+    def needed(rows):
+        seen.append([row.design for row in rows])
+        return [ASKED[1:], ASKED[:1], []][len(rows)]
+
+    experiment = designed.Experiment("few", "", lambda: ASKED, TINY, lambda *_: None, needed=needed)
+    designed._train(experiment, tmp_path / "few.csv", 1)
+    assert seen == [[], ASKED[1:], ASKED]
+    assert [row.design for row in read_rows(Trained, tmp_path / "few.csv")] == ASKED
 
 
 def test_the_page_is_made_from_the_stored_rows(tmp_path):
