@@ -26,10 +26,10 @@ from rhabdom.optics.torch import psf
 RADIUS, FOCAL_LENGTH, INDEX = 1e-3, 10e-3, 1.5
 WAVELENGTHS = (610e-9, 540e-9, 460e-9)
 PIXEL, SIDE = 5e-6, 33  # pitch of the sensor's pixels [m], pixels of a PSF along an axis
-NEAREST = 4.0  # vergence of the nearest objects [dioptres]; the most distant ones are at infinity
+NEAREST = 2.0  # vergence of the nearest objects [dioptres]; the most distant ones are at infinity
 SENSOR = 1 / (1 / FOCAL_LENGTH - NEAREST / 2)  # distance of the sensor [m]: half of this vergence is in focus
 HEIGHTS, SIGMA = 24, 0.01  # samples of the mask along an axis; noise of the sensor, where white is 1
-BATCH, WIDTH, TESTED = 4, 96, 16  # distances per step, pixels of an image along an axis, distances of the test
+DISTANCES, WIDTH, TESTED, SMALLEST, FLATNESS = 8, 96, 16, 3, 0.5  # distances per step, pixels of an image along an axis, distances of the test
 
 
 def camera(heights: torch.Tensor, vergences: torch.Tensor) -> torch.Tensor:
@@ -58,61 +58,76 @@ def plain_camera(heights: torch.Tensor, vergences: torch.Tensor) -> torch.Tensor
 
 
 def leaves(count: int, rng: np.random.Generator) -> torch.Tensor:
-    """Return images of discs that cover each other, (image, colour, y, x). Radii r have the density 1/r³."""
+    """Return periodic images of discs that cover each other, (image, colour, y, x). Radii r have the density 1/r³."""
     y, x = np.mgrid[:WIDTH, :WIDTH]
     images = np.empty((count, 3, WIDTH, WIDTH), dtype=np.float32)
     for image in images:
-        for _ in range(400):
-            radius = 2 / np.sqrt(rng.uniform(2 / WIDTH, 1))
-            row, column = rng.uniform(-radius, WIDTH + radius, 2)
-            image[:, np.hypot(y - row, x - column) < radius] = rng.beta(0.8, 0.8, 3)[:, None]
+        for _ in range(500):
+            radius = SMALLEST / np.sqrt(rng.uniform((2 * SMALLEST / WIDTH) ** 2, 1))
+            row, column = ((at - place + WIDTH / 2) % WIDTH - WIDTH / 2 for at, place in zip((y, x), rng.uniform(0, WIDTH, 2)))
+            colour = np.clip(rng.beta(2, 2) + 0.1 * rng.normal(size=3), 0, 1)
+            image[:, np.hypot(row, column) < radius] = colour[:, None]
     return torch.from_numpy(images)
 
 
-def photographed(scenes: torch.Tensor, blur: torch.Tensor) -> torch.Tensor:
-    """Return images of scenes (image, colour, y, x) through one PSF each, with the noise of the sensor."""
-    edge = SIDE // 2
-    around = nn.functional.pad(scenes, (edge,) * 4, mode="reflect").flatten(0, 1)[None]
-    blurred = nn.functional.conv2d(around, blur.flatten(0, 1)[:, None].flip(2, 3), groups=blur.shape[0] * 3)
-    return blurred[0].unflatten(0, (-1, 3)) + SIGMA * torch.randn_like(scenes)
+def transfer(blur: torch.Tensor) -> torch.Tensor:
+    """Return the optical transfer functions of PSFs for images of WIDTH pixels, (distance, colour, v, u)."""
+    whole = nn.functional.pad(blur, (0, WIDTH - SIDE, 0, WIDTH - SIDE))
+    return torch.fft.rfft2(whole.roll((-(SIDE // 2),) * 2, (2, 3)))
+
+
+def photographed(scene: torch.Tensor, blur: torch.Tensor) -> torch.Tensor:
+    """Return images (distance, colour, y, x) of a scene at each of the distances, with the noise of the sensor."""
+    sharp = torch.fft.rfft2(scene)
+    blurred = torch.fft.irfft2(transfer(blur) * sharp, s=(WIDTH, WIDTH))
+    return blurred + SIGMA * torch.randn_like(blurred)
 
 
 class Deblur(nn.Module):
-    """A Wiener filter for the mean of PSFs over distances, followed by a small convolutional network."""
+    """A Wiener filter for all distances together, followed by a small convolutional network.
 
-    def __init__(self) -> None:
+    Of all linear filters, the Wiener filter has the smallest mean square error over the distances of its PSFs.
+
+    scenes: images with the statistics of those that are restored, (image, colour, y, x).
+    """
+
+    def __init__(self, scenes: torch.Tensor) -> None:
         super().__init__()
-        self.noise = nn.Parameter(torch.tensor(-2.0))  # logarithm of the filter's noise-to-signal ratio
-        layers = [nn.Conv2d(6, 24, 5, padding=2), nn.ReLU(), nn.Conv2d(24, 24, 3, padding=1), nn.ReLU()]
-        self.correction = nn.Sequential(*layers, nn.Conv2d(24, 3, 5, padding=2))
+        spectrum = torch.fft.rfft2(scenes - scenes.mean((2, 3), keepdim=True)).abs().square()
+        self.power = spectrum.mean((0, 1)) / WIDTH**2
+        self.power[0, 0] = 1e3  # the mean of a scene is unknown
+        layers = [convolution(6, 24), nn.ReLU(), convolution(24, 24), nn.ReLU(), convolution(24, 3)]
+        self.correction = nn.Sequential(*layers)
 
     def forward(self, images: torch.Tensor, blur: torch.Tensor) -> torch.Tensor:
-        edge = SIDE // 2
-        around = nn.functional.pad(images, (edge,) * 4, mode="reflect")
-        side = around.shape[-1]
-        centred = nn.functional.pad(blur.mean(0), (0, side - SIDE, 0, side - SIDE)).roll((-edge, -edge), (1, 2))
-        transfer = torch.fft.rfft2(centred)
-        frequency = torch.fft.fftfreq(side)[:, None] ** 2 + torch.fft.rfftfreq(side) ** 2
-        wiener = transfer.conj() / (transfer.abs().square() + 10**self.noise * frequency)
-        sharp = torch.fft.irfft2(torch.fft.rfft2(around) * wiener, s=(side, side))[..., edge:-edge, edge:-edge]
+        """Return restored images. The filter depends on all PSFs, not on the distance of an image."""
+        through = transfer(blur)
+        received = self.power * through.abs().square().mean(0) + SIGMA**2
+        wiener = self.power * through.mean(0).conj() / received
+        sharp = torch.fft.irfft2(wiener * torch.fft.rfft2(images), s=(WIDTH, WIDTH))
         return sharp + self.correction(torch.cat((sharp, images), 1))
+
+
+def convolution(inputs: int, outputs: int) -> nn.Conv2d:
+    return nn.Conv2d(inputs, outputs, 3, padding=1, padding_mode="circular")
 
 
 def trained(compute, heights: torch.Tensor, scenes: torch.Tensor, steps: int) -> tuple[torch.Tensor, Deblur]:
     """Return a mask and a network. Both are trained if `heights` requires gradients, otherwise only the network."""
-    network = Deblur()
-    groups = [{"params": list(network.parameters()), "lr": 3e-3}]
+    network = Deblur(scenes)
+    groups = [{"params": list(network.parameters()), "lr": 2e-3}]
     if heights.requires_grad:
-        groups.append({"params": [heights], "lr": 0.02})
+        groups.append({"params": [heights], "lr": 0.03})
     optimiser = torch.optim.Adam(groups)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, [group["lr"] for group in groups], total_steps=steps)
+    schedule = torch.optim.lr_scheduler.LambdaLR(optimiser, lambda step: 1 - step / steps)
     for _ in range(steps):
-        vergences = NEAREST * (torch.arange(BATCH) + torch.rand(BATCH)) / BATCH
+        inside = (torch.arange(1, DISTANCES - 1) + torch.rand(DISTANCES - 2) - 0.5) / (DISTANCES - 1)
+        vergences = NEAREST * torch.cat((torch.zeros(1), inside, torch.ones(1)))
         blur = compute(heights, vergences.clamp(min=1e-3))
-        batch = scenes[torch.randint(len(scenes), (BATCH,))]
-        error = (network(photographed(batch, blur), blur) - batch).square().mean((1, 2, 3))
+        scene = scenes[torch.randint(len(scenes), ())]
+        error = (network(photographed(scene, blur), blur) - scene).square().mean((1, 2, 3))
         optimiser.zero_grad()
-        error.log().mean().backward()  # the mean PSNR over distances
+        (10 * error.log10() / FLATNESS).logsumexp(0).backward()  # emphasises the distances with the largest errors
         optimiser.step()
         schedule.step()
     return heights.detach(), network
@@ -121,14 +136,10 @@ def trained(compute, heights: torch.Tensor, scenes: torch.Tensor, steps: int) ->
 @torch.no_grad()
 def judged(heights: torch.Tensor, network: Deblur, scenes: torch.Tensor) -> tuple[np.ndarray, torch.Tensor]:
     """Return the PSNR [dB] and the first restored image at each of the tested distances."""
-    vergences = NEAREST * (torch.arange(TESTED) + 0.5) / TESTED
-    blur = camera(heights, vergences)
-    ratios, images = [], []
-    for one in blur:
-        restored = network(photographed(scenes, one.expand(len(scenes), -1, -1, -1)), blur)
-        ratios.append(float(-10 * (restored.clamp(0, 1) - scenes).square().mean().log10()))
-        images.append(restored[0].clamp(0, 1))
-    return np.array(ratios), torch.stack(images)
+    blur = camera(heights, NEAREST * torch.linspace(1e-3, 1, TESTED))
+    restored = torch.stack([network(photographed(scene, blur), blur).clamp(0, 1) for scene in scenes])
+    error = (restored - scenes[:, None]).square().mean((0, 2, 3, 4))
+    return (-10 * error.log10()).numpy(), restored[0]
 
 
 def draw(ratios: dict[str, np.ndarray], images: dict[str, torch.Tensor], path: str) -> None:
