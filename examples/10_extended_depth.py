@@ -78,10 +78,9 @@ def leaves(count: int, rng: np.random.Generator) -> torch.Tensor:
     for image in images:
         for _ in range(300):
             radius = SMALLEST / np.sqrt(rng.uniform((2 * SMALLEST / WIDTH) ** 2, 1))
-            row, column = rng.uniform(0, WIDTH, 2)
-            away = ((y - row + WIDTH / 2) % WIDTH - WIDTH / 2) ** 2 + ((x - column + WIDTH / 2) % WIDTH - WIDTH / 2) ** 2
+            row, column = ((at - rng.uniform(0, WIDTH)) % WIDTH - WIDTH / 2 for at in (y, x))
             colour = np.clip(rng.beta(2, 2) + 0.1 * rng.normal(size=3), 0, 1)
-            image[:, away < radius**2] = colour[:, None]
+            image[:, np.hypot(row, column) < radius] = colour[:, None]
     return torch.from_numpy(images)
 
 
