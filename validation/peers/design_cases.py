@@ -15,12 +15,13 @@ from scipy.interpolate import CubicSpline
 
 import optics
 
-__all__ = ["DX", "FOCUS", "N", "Design", "designs", "matrix_transform"]
+__all__ = ["DX", "EVERY", "FOCUS", "Design", "N", "designs", "direct_sum", "matrix_transform"]
 
 RADIUS, FOCUS, N, DX = 1e-3, 10e-3, 65, 1.4e-6
 GREEN, COLOURS = (550e-9,), (460e-9, 550e-9, 610e-9)
 FAR, DEPTHS = (np.inf,), tuple(1 / np.linspace(1e-3, 1, 16))  # distances of sources [m]
 SUBSAMPLES = 4  # subsamples of a cell along an axis, for the grey edge
+EVERY, FINE = 4, 384  # samples of the window per compared sample along an axis; samples of the direct sum
 
 Path = Callable[[torch.Tensor], torch.Tensor]
 
@@ -60,11 +61,7 @@ def matrix_transform(design: Design, count: int) -> Callable[[torch.Tensor], tor
 
     count: samples across the pupil.
     """
-    pitch = 2 * RADIUS / count
-    at = (np.arange(count) - (count - 1) / 2) * pitch
-    finer = (np.arange(SUBSAMPLES) - (SUBSAMPLES - 1) / 2) / SUBSAMPLES * pitch
-    parts = np.add.outer(at, finer).ravel()
-    inside = (parts[:, None] ** 2 + parts**2 <= RADIUS**2).reshape(count, SUBSAMPLES, count, SUBSAMPLES).mean((1, 3))
+    at, pitch, inside = _cells(count)
     x, y = at[None, :], at[:, None]
     distance, lens = np.sqrt(x * x + y * y + FOCUS**2), optics.Pupil(RADIUS, thin_lens_focal_length=FOCUS)
     window = (np.arange(N) - N // 2) * DX
@@ -86,6 +83,33 @@ def matrix_transform(design: Design, count: int) -> Callable[[torch.Tensor], tor
         return torch.stack(images, 1)
 
     return picture
+
+
+def direct_sum(design: Design, numbers: np.ndarray, distance: float) -> np.ndarray:
+    """Return every fourth sample of the PSFs by the first Rayleigh-Sommerfeld integral, (wavelength, y, x)."""
+    at, pitch, inside = _cells(FINE)
+    y, x = (at[place] for place in np.nonzero(inside))
+    pupil, size = design.pupil(numbers), inside[inside > 0] * pitch**2
+    window = ((np.arange(N) - N // 2) * DX)[::EVERY]
+    found = np.empty((len(design.wavelengths), len(window), len(window)))
+    for image, wave in zip(found, design.wavelengths, strict=True):
+        k = 2 * np.pi / wave
+        field = size * np.exp(1j * k * pupil.path(x, y, wave, optics.PointSource(distance)))
+        for row, v in zip(image, window, strict=True):
+            for column, u in enumerate(window):
+                r = np.sqrt((x - u) ** 2 + (y - v) ** 2 + FOCUS**2)
+                row[column] = abs(np.sum(field * np.exp(1j * k * r) * FOCUS / r**2 * (1 / r - 1j * k))) ** 2
+    return found / (4 * np.pi**2 * pupil.area)
+
+
+def _cells(count: int) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return samples along an axis of the pupil [m], their pitch, and the share of each cell within the pupil."""
+    pitch = 2 * RADIUS / count
+    at = (np.arange(count) - (count - 1) / 2) * pitch
+    finer = (np.arange(SUBSAMPLES) - (SUBSAMPLES - 1) / 2) / SUBSAMPLES * pitch
+    parts = np.add.outer(at, finer).ravel() ** 2
+    inside = (parts[:, None] + parts <= RADIUS**2).reshape(count, SUBSAMPLES, count, SUBSAMPLES)
+    return at, pitch, inside.mean((1, 3))
 
 
 def _map(name: str, count: int, rough: float, *light: tuple[float, ...]) -> Design:
