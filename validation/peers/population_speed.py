@@ -254,9 +254,7 @@ def main() -> int:
             better = max((r.rate for r in rows if r.code == "psf_batch" and r.median <= row.median), default=0.0)
             if better < row.rate:
                 broken.append(f"{row.code}, {row.asked}: {row.rate:.0f} PSFs per CPU second, psf_batch {better:.0f}")
-    return Page("population_speed", __doc__, table(rows), broken).publish(
-        chosen, lambda path: draw(path, rows)
-    )
+    return Page("population_speed", __doc__, table(rows), broken).publish(chosen, lambda path: draw(path, rows))
 
 
 if __name__ == "__main__":
