@@ -1,7 +1,7 @@
 """Costs of optimisation: roughness, modes, pixels and distances
 
 How long does a step of a lens design take, and which error does its PSF have? One step is a PSF with its gradient with
-respect to all heights, pixels or Zernike coefficients. At a tolerance of 0.01, RESULT
+respect to all heights, pixels or Zernike coefficients.
 
 **Method.** The pupils have a radius of 1 mm, a focal length of 10 mm (f/5), and one of three kinds of design
 parameters: a map of heights, pixels of constant height, or Zernike coefficients. A map of heights is a smooth map plus
