@@ -173,12 +173,19 @@ def test_code_imports_the_packages_from_rhabdom():
     assert {page: direct.findall(code) for page, code in pages.items() if direct.search(code)} == {}
 
 
+# Other tests of optics judge the results of these examples.
+SHORT = {
+    "08_tolerancing": ("--trials", "1"),
+    "09_hologram": ("--steps", "8"),
+    "10_extended_depth": ("--steps", "2"),
+    "11_lens_through_an_eye": ("--steps", "4"),
+}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
 def test_example_runs(example, tmp_path):
-    # Tests of optics judge the results of these examples.
-    short = {"08_tolerancing": "--trials 1", "09_hologram": "--steps 8", "10_extended_depth": "--steps 2"}
-    child = run(example, *short.get(example.stem, "").split(), cwd=tmp_path)
+    child = run(example, *SHORT.get(example.stem, ()), cwd=tmp_path)
     assert child.returncode == 0, child.stderr
     assert child.stdout.strip()
 

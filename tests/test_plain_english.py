@@ -69,15 +69,18 @@ def test_markers_are_found(text, markers, tmp_path):
 
 
 def test_every_kind_of_text_is_read(tmp_path):
-    source = '''"""Told."""
+    source = r'''"""Told."""
 # anew
 raise ValueError(f"told {1} anew")
 parser.add_argument("--x", help="nobody")
+strings = "# beside", "\"# beside", '# beside', """
+"# beside""", "\\"  # told
 '''
     ast.parse(source)
     (tmp_path / "module.py").write_text(source)
     kinds = [(text.kind, [name for name, _ in text.markers]) for text in texts_in(tmp_path / "module.py")]
-    assert ("comment", ["anew"]) in kinds
+    comments = [markers for kind, markers in kinds if kind == "comment"]
+    assert comments == [["anew"], ["told"]], "strings are not comments"
     assert ("message", ["nobody"]) in kinds
     assert ("message", ["anew", "told"]) in kinds
     assert ("docstring", []) in kinds  # a capital: the markers are those of running text

@@ -160,9 +160,9 @@ def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
 
 
 def _near_segment(by_axis: list[np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) that lie within a segment's range along one axis, the one along which it is shorter.
+    """Return the points (n, 2) near a segment: those within the smaller of its two ranges, of x or of y.
 
-    by_axis: all points sorted by x, and sorted by y.
+    by_axis: all points sorted by x, and all points sorted by y.
     """
     axis = int(abs(end[1] - start[1]) < abs(end[0] - start[0]))
     low, high = sorted((start[axis], end[axis]))
@@ -202,18 +202,20 @@ def _meeting_points(pieces: Outline) -> np.ndarray:
 
 
 def _of_lines(start: np.ndarray, along: np.ndarray, starts: np.ndarray, alongs: np.ndarray) -> np.ndarray:
+    """Return the points (n, 2) at which a segment intersects others; each has a start and the vector to its end."""
     gap = starts - start
     determinant = along[0] * alongs[:, 1] - along[1] * alongs[:, 0]
     crossing = np.abs(determinant) > PARALLEL * np.hypot(*along) * np.hypot(*alongs.T)
-    share, other = (
+    own, other = (
         (gap[:, 0] * by[:, 1] - gap[:, 1] * by[:, 0])[crossing] / determinant[crossing]
         for by in (alongs, np.broadcast_to(along, alongs.shape))
     )
-    within = (np.abs(share - 0.5) < 0.5 + SHORTEST) & (np.abs(other - 0.5) < 0.5 + SHORTEST)
-    return np.asarray(start + share[within, None] * along)
+    within = (np.abs(own - 0.5) < 0.5 + SHORTEST) & (np.abs(other - 0.5) < 0.5 + SHORTEST)
+    return np.asarray(start + own[within, None] * along)
 
 
 def _of_line_and_circle(start: np.ndarray, along: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    """Return the points (n, 2) at which the line of a segment intersects the circle of an arc."""
     offset, size = start - arc[:2], float(along @ along)
     middle = -(offset @ along) / size
     rest = (arc[2] ** 2 - np.sum((offset + middle * along) ** 2)) / size
@@ -223,6 +225,7 @@ def _of_line_and_circle(start: np.ndarray, along: np.ndarray, arc: np.ndarray) -
 
 
 def _of_circles(arc: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the points (n, 2) at which the circles of two arcs intersect."""
     towards = other[:2] - arc[:2]
     apart = float(np.hypot(*towards))
     if apart <= PARALLEL:

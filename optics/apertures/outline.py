@@ -93,7 +93,7 @@ class Outline(ReadOnlyArrays):
         return np.concatenate(found)
 
     def crossings(self, y: np.ndarray) -> np.ndarray:
-        """Return the x at which the edge crosses the horizontal lines at `y`, in ascending order, (line, crossing).
+        """Return the positions x at which the edge crosses horizontal lines at `y`, ascending, (line, crossing).
 
         All lines must have the same number of crossings, so no `turning` height may lie between them.
         """
@@ -114,7 +114,7 @@ class Outline(ReadOnlyArrays):
         return np.sort(np.array(found).reshape(-1, len(y)).T, axis=1)
 
     def heights(self, x: float) -> np.ndarray:
-        """Return the y at which the edge crosses the vertical line at x."""
+        """Return the heights y at which the edge crosses the vertical line at x, in no order."""
         found = []
         for cx, cy, radius, begin, end in self.arcs:
             if abs(x - cx) < radius:

@@ -1,7 +1,7 @@
 """Quadrature over an opening that is tiled by pixels, for integrands that jump or bend at the borders between pixels.
 
-The phase of a relief of pixels jumps at their borders. The derivative of a spline by one of its samples bends at the
-knots: it is a different polynomial in every cell between knots, and these cells are then the pixels.
+The phase of a relief of pixels jumps at their borders. The derivative of a spline with respect to one of its samples
+bends at the knots: it is a different polynomial in every cell between knots. These cells are then the pixels.
 
 Pixels that lie wholly inside have Gauss-Legendre nodes. Pixels that the opening's edge cuts can be treated in two ways.
 `PixelatedAperture.nodes` divides them into panels at the points where the edge enters and leaves them (see `strips`).
@@ -72,7 +72,7 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Return the number of nodes along a pixel that makes rows and columns of nodes as accurate as `nodes`.
+        """Return the number of nodes along a pixel with which rows and columns of nodes are as accurate as `nodes`.
 
         None: the number would be too large.
         """

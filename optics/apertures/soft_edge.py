@@ -82,6 +82,7 @@ class SoftEdge:
         return series / (whole(self.reach) - whole(0.0))
 
     def _bare(self, r: np.ndarray) -> np.ndarray:
+        """Return the result of `ring` without normalisation."""
         cutoff = (self.passband + self.stopband) / 2
         window = np.i0(self.beta * np.sqrt(np.maximum(1 - (r / self.reach) ** 2, 0)))
         return bessel_j(1, 2 * pi * cutoff * r) * window

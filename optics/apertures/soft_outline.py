@@ -70,6 +70,7 @@ def _short(arcs: np.ndarray) -> np.ndarray:
 
 
 def _arcs_share(edge: SoftEdge, arcs: np.ndarray, x: Array, y: Array, types: Precision) -> Array:
+    """Return the contribution of arcs to the transmittance at points (x, y); arcs as in `SoftOutline`."""
     import drjit as dr
 
     columns = [types.Float64(padded_for_packets(column)) for column in arcs.T]
@@ -88,7 +89,7 @@ def _arcs_share(edge: SoftEdge, arcs: np.ndarray, x: Array, y: Array, types: Pre
 class _Arc:
     """Contribution of arcs to the transmittance.
 
-    Arcs run counterclockwise around their centre. Points (x, y) are relative to it.
+    Arcs run counterclockwise around their centre. Points (x, y) are relative to the centre.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -105,7 +106,7 @@ class _Arc:
     def share(self, x: Array, y: Array, radius: Array, begin: Array, end: Array) -> Array:
         """Return the contribution of the arc from `begin` to `end` [rad] to the transmittance at points (x, y).
 
-        The part of the arc within the kernel's reach is centred on the point's direction φ and has the half angle τ.
+        The part of the circle within the kernel's reach is centred on the point's direction φ and has the half angle τ.
 
         φ is shifted by whole turns until it lies less than one turn before the arc's middle. The arc may then overlap
         the part around φ, the part around φ + 2π, or both.

@@ -81,9 +81,9 @@ class _Line:
     The piece extends from the foot of the perpendicular from the point to a distance s along the line. d is the signed
     length of the perpendicular.
 
-    Parts of the line beyond the kernel's reach contribute the angle that they subtend. If the line passes through the
-    reach, the whole chord contributes a value tabulated for a half-plane. A piece that ends within the reach
-    contributes ∫ d H(r) dt.
+    The kernel covers a disc around the point, whose radius is the kernel's reach. Parts of the line outside this disc
+    contribute the angle that they subtend. If the piece ends outside, the chord within the disc contributes a value
+    tabulated for a half-plane. A piece that ends within the disc contributes ∫ d H(r) dt.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -113,9 +113,10 @@ class _Line:
     def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
         """Return the contribution W(d, s) of a line from its foot to the distance s.
 
-        near: mask of the points with the line within the kernel's reach.
-        half, chord: half the length of the chord within the reach, and half of its contribution, which is 0 without a
-            chord.
+        near: whether the line's distance from each point is less than the kernel's reach, so that the disc of this
+            radius around the point contains a chord of the line.
+        half: half the length of the chord.
+        chord: contribution of half the chord; 0 if there is no chord.
         """
         import drjit as dr
 

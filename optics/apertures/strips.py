@@ -50,16 +50,16 @@ def strips(
         for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
             if not (end > start).any():
                 continue
-            u, share = gauss_legendre(gauss_legendre_count(cycles * float((end - start).max()), digits + 0.3, degree))
+            u, across = gauss_legendre(gauss_legendre_count(cycles * float((end - start).max()), digits + 0.3, degree))
             x = start[:, None] + (end - start)[:, None] * u
-            size = (weight * (end - start))[:, None] * share
+            size = (weight * (end - start))[:, None] * across
             yield x.ravel(), np.broadcast_to(y[:, None], x.shape).ravel(), size.ravel()
 
 
 def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Return the ends of panels, which become shorter towards the top or bottom of a circle.
+    """Return the ends of panels that become shorter towards the top or bottom of a circle.
 
-    The length of a chord changes there like a square root, which polynomials do not approximate.
+    At the top and the bottom, the length of a chord changes like a square root, which polynomials do not approximate.
     """
     more = []
     for at in tangent:

@@ -127,7 +127,7 @@ class BallLens:
     def focal_length(self, wavelength: float = MIDDLE) -> float:
         """Return the paraxial focal length [m], measured from the centre of the lens.
 
-        It is known in closed form up to one integral.
+        It is a closed-form expression with one integral, which is computed numerically.
 
         Raises:
             ValueError: the lens does not focus.
@@ -155,9 +155,9 @@ class BallLens:
         x, ahead = self._wavefront(np.append(at, 1.0) * widest, focal / self.radius, wavelength)
         edge = float(x[-1])
         orders, rho = range(0, ORDER + 1, 2), x[:-1] / edge
-        share = np.sqrt(weights * rho)  # samples count by the area of their rings
+        root = np.sqrt(weights * rho)  # square roots of weights that are proportional to the areas of the rays' rings
         basis = np.stack([mode(n, 0, rho, np.zeros_like(rho)) for n in orders], axis=1)
-        found = np.linalg.lstsq(basis * share[:, None], ahead[:-1] * share, rcond=None)[0]
+        found = np.linalg.lstsq(basis * root[:, None], ahead[:-1] * root, rcond=None)[0]
         modes = {(n, 0): float(value) / UM for n, value in zip(orders, found, strict=True) if n}
         medium = float(index_of("medium_n", self.medium_n).at(wavelength))
         return Pupil(edge, medium_n=medium, thin_lens_focal_length=focal, wavefront=Zernike(modes, edge))

@@ -1,9 +1,9 @@
 """Inputs of a PSF that carry derivatives, and the cells in which these derivatives are polynomials.
 
-A small change of one sample of a map multiplies the light behind the pupil by a cardinal spline. This spline is a
-different cubic polynomial in every cell between two knots, whatever the values of the map are. The derivative with
-respect to the samples of a flat map therefore has the same detail as that of a rough map. Samples of the pupil that
-resolve only the light therefore give wrong derivatives, and quadrature nodes are placed in each cell instead.
+The derivative of the light behind the pupil with respect to one sample of a map is the light times a cardinal spline.
+This spline is a different cubic polynomial in every cell between two knots, whatever the values of the map are.
+Derivatives with respect to samples of a flat map therefore have as much detail as those of a rough map. Samples of the
+pupil that resolve only the light give wrong derivatives. Quadrature nodes in each cell are used instead.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class DerivativeKnots:
     def without_maps(self, pupil: Pupil) -> Pupil:
         """Return the pupil without the maps.
 
-        The cells between knots resolve them, so their bandwidth does not matter.
+        The cells between knots resolve the maps, so the bandwidth of the other parts determines the nodes in a cell.
         """
         without: dict[str, Any] = dict.fromkeys(self.names)
         return replace(pupil, **without)

@@ -188,8 +188,8 @@ def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
     """
     u = _not_negative(cycles_per_degree)
     d = in_range("pupil_diameter", pupil_diameter, 2e-3, 6e-3) * 1e3
-    share = np.minimum(u / (d * math.pi * 1e6 / (PERFECT_NM * 180)), 1)
-    perfect = 2 / math.pi * (np.arccos(share) - share * np.sqrt(1 - share * share))
+    relative = np.minimum(u / (d * math.pi * 1e6 / (PERFECT_NM * 180)), 1)  # in units of the cut-off frequency
+    perfect = 2 / math.pi * (np.arccos(relative) - relative * np.sqrt(1 - relative * relative))
     slower = 21.95 - 5.512 * d + 0.3922 * d * d
     mean: np.ndarray = np.sqrt(perfect) * (1 + (u / slower) ** 2) ** -0.62
     return mean

@@ -28,7 +28,7 @@ from optics.numerics.precision import precision
 __all__ = ["MIDDLE", "Pupil"]
 
 TALLEST = 100.0  # choice, radii: highest relief to which the thin-element model applies
-ANY_HEIGHT, OTHER_UNIT = 1e-3, 0.05  # choices [m]: always allowed; probably given in another unit
+ANY_HEIGHT, OTHER_UNIT = 1e-3, 0.05  # choices [m]: relief that is always allowed; relief that looks like another unit
 LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: neglected level of a mask's spectrum; digits of its transmission
 MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
 SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a pupil without a lens

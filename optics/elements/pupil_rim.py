@@ -17,7 +17,7 @@ from optics.apertures.polygonal import Polygon
 __all__ = ["Rim", "rim_around"]
 
 BETTER = 0.5  # choice: an oval is chosen if its residual is less than this part of the residual of a circle
-MUCH_BETTER = 0.1  # choice: the same for a Fourier series, which on square grids may reach a third by chance
+MUCH_BETTER = 0.1  # choice: the same for a Fourier series, whose residual may by chance be a third on square grids
 FULL = 0.8  # choice: part of a circle that the hull must fill. A hexagon fills 0.83, a square 0.64.
 LEAST_CORNERS = 8  # choice: corners of the hull that an oval, which has at least 5 parameters, needs
 EXACT = 1e-4  # choice, radii: a residual below this is always accepted
@@ -162,10 +162,10 @@ def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 
 def _oval(corners: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return a polygon around the corners with the area of an oval, and the oval's relative residual.
+    """Return a polygon with the area of an oval around the corners of a hull, and the relative residual of the fit.
 
-    The oval is an ellipse whose radius is multiplied by a Fourier series of the angle: the image of a round stop is an
-    ellipse only to first order. The residual is infinite if the best conic is not an ellipse.
+    The oval is an ellipse whose radius is multiplied by a Fourier series of the angle, because the image of a round
+    stop is an ellipse only to first order. The residual is infinite if the best conic is not an ellipse.
     """
     origin = corners.mean(axis=0)
     x, y = (corners - origin).T

@@ -34,8 +34,8 @@ def turned(field: Vector, before: Vector, after: Vector) -> Vector:
 
     The field is perpendicular to `before`.
     """
-    share = _product(field, after) / (1 + _product(before, after))
-    x, y, z = (f - share * (b + a) for f, b, a in zip(field, before, after, strict=True))
+    factor = _product(field, after) / (1 + _product(before, after))
+    x, y, z = (f - factor * (b + a) for f, b, a in zip(field, before, after, strict=True))
     return x, y, z
 
 

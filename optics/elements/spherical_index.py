@@ -61,7 +61,7 @@ class SphericalIndex:
             ValueError: a ray is totally reflected at the surface.
         """
         y, end, n, least, radial = self._along(h)
-        # The integral of a straight ray is known. The integral of the difference from it has no peak at small
+        # The integrand of a straight ray has a known integral. The remainder of the integrand has no peak at small
         # heights.
         bend = (n * n - least * least) / (least * radial * (least * y + radial))
         return np.asarray(2 * np.arcsin(end) - 2 * h * end * (bend @ gauss_legendre(NODES)[1]))
@@ -90,8 +90,8 @@ class SphericalIndex:
     def _along(self, h: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return values at quadrature nodes along rays of relative height h, (*h.shape, node).
 
-        They are y = √(r² - a²), where a is the radius of the turning point; the upper end of y, in the shape of h; n; n
-        at the turning point; and √(n² r² - h²).
+        The five values are y = √(r² - a²), where a is the radius of the ray's turning point; the largest y, √(1 - a²),
+        with the shape of h; the index n(r); the index n(a); and √(n² r² - h²).
         """
         turn = self._turning_point(h)
         end, least = np.sqrt(1 - turn), self.index(turn)[..., None]

@@ -31,8 +31,8 @@ __all__ = ["AIR", "MEDIA_OF_WORLDS", "BandMedium", "TurbidMedium", "fog", "mediu
 # Contrast at which a black object is just visible in front of the horizon; it defines the visibility (Koschmieder 1924,
 # Beitraege zur Physik der freien Atmosphaere 12:33).
 JUST_VISIBLE = 0.02
-# Mean radiance over all directions, relative to a white surface: half of all directions are bright under water, where
-# light comes from above, and all are in fog.
+# Mean radiance over all directions, relative to a white surface. Under water, light comes from above, so half of all
+# directions are bright. In fog, all directions are bright.
 FROM_ABOVE, FROM_EVERYWHERE = 0.5, 1.0
 STEP_NM = 5.0
 # Shortest and longest distance at which errors are computed: in units of 1/c, with the largest c for the shortest

@@ -195,7 +195,7 @@ class Zernike(Aberration):
         return max((n for (n, _), value in self.modes.items() if value != 0 or self.asks), default=0)
 
     def _coefficients(self, named: list[tuple[int, int]], x: Array) -> Array:
-        """Return the coefficients [m] of modes as a row of the array type of `x`."""
+        """Return the coefficients [m] of these modes, (mode,), in the array type of `x`."""
         if library(x) is np:
             return UM * np.array([self.modes[key] for key in named])
         return library(x).stack([self._coefficient(n, m, x) for n, m in named])

@@ -144,10 +144,10 @@ class Slopes(ReadOnlyArrays):
     def end_points(
         self, distance: float, centre: tuple[float, float], medium_n: float, count: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return points (x, y) [m] of the disk, and where their rays hit the window, relative to its centre c [m].
+        """Return points (x, y) [m] of the disk, and the hit points (u, v) [m] of their rays on the window.
 
-        About `count` rays are returned. To first order, the ray hits the window at D/n times the slope that `to_window`
-        describes.
+        About `count` rays are returned. Hit points are relative to the centre c of the window. To first order, they are
+        D/n times the slopes along x and y of `to_window`.
         """
         some = np.flatnonzero(self._inside)
         some = some[:: max(1, len(some) // count)]

@@ -77,10 +77,10 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
     if tiles.from_cell:
         # Beyond the samples there is no light. The first integral is constant there, and the second one is linear.
         second = _primitive(knots, degree, inside, 2) + primitive * (edges - inside)[:, None]
-        held = np.diff(second, 2, axis=0) / tiles.size
+        integrals = np.diff(second, 2, axis=0) / tiles.size
     else:
-        held = np.diff(primitive, axis=0)
-    found = _over_samples(held, degree)
+        integrals = np.diff(primitive, axis=0)
+    found = _over_samples(integrals, degree)
     return np.concatenate([found, found[: tiles.count - own][::-1, ::-1]])
 
 
@@ -90,16 +90,19 @@ def _knots(x: np.ndarray, degree: int) -> np.ndarray:
     return np.concatenate([np.repeat(x[0], degree + 1), x[skipped:-skipped], np.repeat(x[-1], degree + 1)])
 
 
-def _over_samples(held: np.ndarray, degree: int) -> np.ndarray:
-    """Return Q C⁻¹, see `cell_integrals`, for the integrals Q = held of B-splines over cells, (cell, B-spline)."""
+def _over_samples(integrals: np.ndarray, degree: int) -> np.ndarray:
+    """Return Q C⁻¹ (cell, sample), see `cell_integrals`.
+
+    integrals: Q, the integrals of B-splines over cells, (cell, B-spline).
+    """
     from scipy.linalg import solve_banded
 
-    samples = held.shape[1]
+    samples = integrals.shape[1]
     lower, upper, band = _collocation(min(samples, SHORT), degree)
     if samples > SHORT:  # far from both ends, all rows of C have the same entries
         inside = np.repeat(band[:, SHORT // 2 : SHORT // 2 + 1], samples - SHORT, axis=1)
         band = np.concatenate([band[:, : SHORT // 2], inside, band[:, SHORT // 2 :]], axis=1)
-    found: np.ndarray = solve_banded((lower, upper), band, held.T, check_finite=False).T
+    found: np.ndarray = solve_banded((lower, upper), band, integrals.T, check_finite=False).T
     return found
 
 

@@ -91,7 +91,7 @@ class Eye(EyeSpec):
     def white_signal(self) -> Scalar:
         """Signal of a receptor that sees white everywhere, averaged over receptor types.
 
-        It is the throughput or, with waveguides, the fraction of the light that they absorb.
+        It is the throughput or, with waveguides, the fraction of the light that the waveguides absorb.
         """
         if self.waveguide is None:
             return self.throughput

@@ -97,8 +97,8 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
     """Return the accepted fraction of a source's light, E, over the cells of a window.
 
-    The window is widened until it contains all of E except for a fraction of at most the tolerance. It is never wider
-    than the light of `spot` and the waveguide together.
+    The window is widened until it contains all of E except for a fraction of at most the tolerance, but not beyond the
+    half width of `spot` plus the radius of the waveguide's modes.
     """
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
@@ -110,8 +110,8 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
             _Cells(count, side / guide.focal, pitch / guide.focal, retina.tolerance)
             for count, side in zip(counts, retina.cell, strict=True)
         )
-        found, share = _accepted(beam, spot, guide, rows, columns)
-        if share >= 1 - retina.tolerance or half == most:
+        found, contained = _accepted(beam, spot, guide, rows, columns)
+        if contained >= 1 - retina.tolerance or half == most:
             return found
         half *= WIDER
 
@@ -149,9 +149,9 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return integrals over cells of E, the accepted fraction of a source's light, and the part of E in these cells.
+    """Return integrals over cells of E (row, column), and their sum relative to the integral over all directions.
 
-    Areas of cells are in squared tangents. The part is relative to the integral of E over all directions.
+    E is the accepted fraction of a source's light. Areas of cells are in squared tangents.
     """
     from scipy.ndimage import map_coordinates
 
@@ -167,13 +167,13 @@ def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cell
     taken = np.array([guide.waveguide.absorbed(mode) for mode in modes])
     steepest = float(np.hypot(np.abs(sine_x).max(), np.abs(sine_y).max()))
     digits = MORE_DIGITS - math.log10(rows.tolerance)
-    caught = modes_at_pupil(beam, modes, steepest, spot.centre, digits)
-    seen = caught.power_on(sines, taken, digits)
+    guided = modes_at_pupil(beam, modes, steepest, spot.centre, digits)
+    seen = guided.power_on(sines, taken, digits)
     places = [(sine_y - sines.y[0]) / sines.dx, (sine_x - sines.x[0]) / sines.dx]
     found = map_coordinates(seen, places, order=DEGREE, mode="nearest")
     by_cell = found.reshape(rows.count, len(weight_y), columns.count, len(weight_x))
     inner = seen[MARGIN:-MARGIN, MARGIN:-MARGIN].sum() * sines.dx**2
-    return np.einsum("yaxb,a,b->yx", by_cell, weight_y, weight_x), float(inner / caught.total(taken))
+    return np.einsum("yaxb,a,b->yx", by_cell, weight_y, weight_x), float(inner / guided.total(taken))
 
 
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:

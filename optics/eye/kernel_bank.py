@@ -154,7 +154,7 @@ def _choices(
 
 
 def _rest(tolerance: float, spent: float | None) -> float | None:
-    """Return the remainder of a tolerance, or None if no part of it was used."""
+    """Return the remainder of a tolerance after an error `spent`; None if the error is unknown or 0."""
     return tolerance - spent if spent else None
 
 

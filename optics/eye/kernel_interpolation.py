@@ -2,8 +2,7 @@
 
 Kernels are computed at nodes that are evenly spaced over [-1, 1] along every axis, and interpolated linearly between
 them. The interpolation error falls with the square of the nodes' distance. It is measured by computing kernels between
-the nodes. Most of these kernels are reused, because the next larger set of nodes contains
-these points.
+the nodes. Most of these kernels are reused, because the next larger set of nodes contains these points.
 """
 
 from __future__ import annotations

@@ -65,9 +65,9 @@ class _Scene:
     def passing(self, layer: Layer) -> Array:
         """Return the fraction of the light from behind that passes a layer, (band, *shape).
 
-        Some cells of the layer hide nothing, because their surface continues in a farther layer. The farther layer does
-        not contain these cells again. The fraction is therefore relative to the part of the pupil that these cells do
-        not cover.
+        Some cells of the layer hide nothing, because their surface continues in a farther layer, which does not contain
+        these cells again. The hidden fraction is therefore relative to the part of the pupil that these cells leave
+        open.
         """
         import drjit as dr
 
@@ -95,8 +95,10 @@ class _Scene:
         return [kernel / dr.reshape(one, (-1, 1, 1)) for kernel, one in zip(self.kernels, sums, strict=True)]
 
     def _shares(self, source: np.ndarray, cells: np.ndarray) -> list[np.ndarray]:
+        """Return the interpolation weight (Y, X) of each kernel in the selected cells; 0 in all others."""
         return [share * cells for share in self.bank.shares(self.inverse_distance.ravel()[source])]
 
     def _blurred(self, scenes: list[np.ndarray], kernels: list[Array]) -> Array:
-        lit = [i for i, scene in enumerate(scenes) if scene.any()] or [0]
-        return blur([scenes[i] for i in lit], [kernels[i] for i in lit], self.shape, self.types)
+        """Return the sum over kernels of the scenes, blurred by one kernel each; dark scenes are omitted."""
+        bright = [i for i, scene in enumerate(scenes) if scene.any()] or [0]
+        return blur([scenes[i] for i in bright], [kernels[i] for i in bright], self.shape, self.types)

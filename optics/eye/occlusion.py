@@ -1,7 +1,8 @@
 """Layers of a scene with a depth map: near surfaces hide far ones, and light passes their edges.
 
-Seen from a far point, a near edge hides a part of the pupil. This part is the near surface's coverage, blurred by the
-kernel of the near surface's distance. With T as the light that passes all nearer layers,
+Seen from a far point, a near edge hides a part of the pupil. The hidden fraction is the near surface's coverage,
+blurred by the kernel of the near surface's distance. With T_l the fraction of light that passes all layers nearer than
+the layer l,
 
     image = Σ_l T_l · (kernel_l ⊗ radiance_l),   T_(l-1) = T_l (1 - kernel_l ⊗ coverage_l),
 
@@ -68,7 +69,7 @@ def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[La
             remaining = behind
             continue
         places = distance_transform_edt(~behind, return_distances=False, return_indices=True)
-        nearest = np.ravel_multi_index(tuple(places), level.shape)  # of the cells behind
+        nearest = np.ravel_multi_index(tuple(places), level.shape)  # nearest of the cells behind
         hiding = cells & edge.ravel()[nearest]
         yield Layer(source, cells, hiding)
         source = np.where(hiding, source.ravel()[nearest], source)
@@ -76,7 +77,7 @@ def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[La
 
 
 def _least_jump(inverse_distance: np.ndarray, parallax: float) -> float:
-    """Return the least difference of 1/z [1/m] with which a surface hides another one."""
+    """Return the smallest difference of 1/z [1/m] at which a surface hides another one."""
     if parallax == 0:
         return math.inf
     return max(LEAST_SHIFT / parallax, float(np.ptp(inverse_distance)) / MOST_LAYERS)

@@ -77,5 +77,5 @@ def noise_on(clean: np.ndarray, photons: np.ndarray | None, sigma: float, rng: n
 
     photons: absorbed photons for a signal of 1, see `photon_noise`; None for no Poisson noise.
     """
-    caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
-    return gaussian_noise(caught, sigma, rng) - clean
+    counted = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)
+    return gaussian_noise(counted, sigma, rng) - clean

@@ -224,10 +224,11 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
 def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNeeds:
     """Return the window and samples that the light of one wavelength requires.
 
-    The fraction of the light that the window loses may equal the tolerance. Half of it is for diffraction at the
-    pupil's edge, and half for rays that hit the retina outside the window. If masks, pixels or fine detail scatter
-    light, rays and this light share the second half equally. A spatial frequency is a sine divided by λ. Diffraction
-    thus increases the sine of a ray's angle θ by λ times the added frequency. The ray hits the retina at z tan θ.
+    The window may lose the fraction `tolerance` of the light. Half of this fraction is for diffraction at the pupil's
+    edge, and half for rays that hit the retina outside the window. If masks, pixels or fine detail scatter light, the
+    second half is divided equally between rays and scattered light. A spatial frequency is a sine divided by λ.
+    Diffraction that adds a frequency f thus increases the sine of a ray's angle θ by λf. The ray then hits the retina
+    at z tan θ.
 
     centre: geometric image (x, y) [m].
     """
@@ -237,8 +238,8 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     diffracted = _beyond_edge(pupil, retina.tolerance / 2) + scattered
     half = WIDEST_TANGENT * z + radius
     # In the worst case a mask transmits only the rays that land farthest away.
-    share = retina.tolerance * number(pupil.transmission) / (4 if scattered else 2)
-    shadow = _half_side(pupil.slopes(beam.wavelength, beam.source), (z, beam.index), centre, 1 - share)
+    lost = retina.tolerance * number(pupil.transmission) / (4 if scattered else 2)
+    shadow = _half_side(pupil.slopes(beam.wavelength, beam.source), (z, beam.index), centre, 1 - lost)
     if math.isfinite(shadow):
         off_axis = max(abs(at) for at in centre)
         outermost = off_axis + shadow
@@ -252,7 +253,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 
 
 @lru_cache(maxsize=64)
-def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], share: float) -> float:
+def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], fraction: float) -> float:
     """Return the half side [m] of the square about `centre` that contains this fraction of the rays' hit points.
 
     Results are cached, because all wavelengths have the same slopes if the glass has no dispersion.
@@ -261,13 +262,13 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
     """
     x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
-    return float(np.quantile(farthest, share, method="higher"))
+    return float(np.quantile(farthest, fraction, method="higher"))
 
 
-def _beyond_edge(pupil: Pupil, share: float) -> float:
-    """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts a given fraction of the light.
+def _beyond_edge(pupil: Pupil, fraction: float) -> float:
+    """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts this fraction of the light.
 
-    δ is measured from the geometric direction of the light.
+    δ is measured from the frequency of the undiffracted light.
 
     The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge. An
     aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ) of its light beyond δ. For a disk this is
@@ -275,15 +276,14 @@ def _beyond_edge(pupil: Pupil, share: float) -> float:
     the edge than on average.
     """
     opening = pupil.aperture
-    return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * share)
+    return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * fraction)
 
 
 @lru_cache(maxsize=64)
 def _rim(pupil: Pupil) -> float:
     """Return the mean intensity behind the mask along the aperture's edge, divided by its mean over the aperture.
 
-    The result is 1 without a mask. It is also 1 if the edge is darker than the mean, because the intensity may rise
-    steeply next to the edge.
+    The result is 1 without a mask. It is at least 1, because the intensity next to a dark edge may rise steeply.
     """
     import drjit as dr
 

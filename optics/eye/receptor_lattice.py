@@ -1,4 +1,4 @@
-"""Receptors of different sizes on a retina: rectangles in rows, each of which holds the same share of a density.
+"""Receptors of different sizes on a retina: rectangles in rows, over each of which the density has the same integral.
 
 Coordinates are x to the right and y down in the visual field, from the middle of the retina. Their units are the width
 and the height of an average receptor: the retina of h x w receptors is [-w/2, w/2] x [-h/2, h/2]. Each row extends over

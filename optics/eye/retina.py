@@ -53,7 +53,7 @@ class CellsError(AccuracyError):
 
 @contextmanager
 def more_time() -> Iterator[None]:
-    """Add advice to errors about a predicted time: the value of `most_seconds` that allows it."""
+    """Add advice to errors about a predicted time: the value of `most_seconds` that is sufficient for it."""
     try:
         yield
     except AccuracyError as refused:

@@ -47,14 +47,14 @@ def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], type
         return sum(_flat(centred(scene, shape), types) * kernel.array for scene, kernel in pairs)
     # Parts of the scene beyond the kernel's reach have no effect, and parts of the kernel beyond the scene have none
     # either.
-    lit = [
+    needed = [
         (centred(scene, _within(scene.shape, shape, kernel.shape)), kernel[_middle(kernel.shape, shape, scene.shape)])
         for scene, kernel in pairs
     ]
-    reach = max(sum(sizes) // 2 for a, b in lit for sizes in zip(a.shape, b.shape, shape, strict=True))
+    reach = max(sum(sizes) // 2 for a, b in needed for sizes in zip(a.shape, b.shape, shape, strict=True))
     period = fast_length(reach + 2)
     total: Field | None = None
-    for scene, kernel in lit:
+    for scene, kernel in needed:
         product = _spectrum(_flat(scene, types), scene.shape, period, types)
         product = product * _spectrum(kernel.array, kernel.shape, period, types)
         total = product if total is None else total + product
@@ -128,7 +128,7 @@ def mean_over(lattice: ReceptorLattice, image: Array, types: Precision) -> Array
     rows = matmul(types.Tensor(shares / shares.sum(axis=1, keepdims=True)), image)
     edges = (lattice.columns + width / 2) * across / width
     first = np.clip(np.floor(edges[:, :-1]).astype(int), 0, across - 1)
-    # All receptors have the same number of cells, some of which do not overlap them.
+    # The same number of cells is summed for all receptors. Cells that do not overlap a receptor have the weight 0.
     cells = first[..., None] + np.arange(int(np.ceil(edges[:, 1:] - first).max()))
     left, right = edges[:, :-1, None], edges[:, 1:, None]
     weights = np.clip(right - cells, 0, 1) - np.clip(left - cells, 0, 1)
@@ -159,6 +159,9 @@ def with_centre(kernel: Array) -> Array:
 
 
 def _of_receptors(image: Array, shares: np.ndarray, types: Precision) -> Array:
-    """Return weighted sums over the cells of each receptor. shares: weights of its cells along an axis."""
+    """Return weighted sums over the cells of each receptor, (band, h, w).
+
+    shares: weights of a receptor's cells along either axis.
+    """
     down, across = (types.Tensor(np.kron(np.eye(n // len(shares)), shares)) for n in image.shape[1:])
     return matmul(down, matmul(image, across, transposed=True))

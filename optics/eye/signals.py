@@ -31,10 +31,10 @@ def signals(eye: EyeSpec, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelB
     depth = inverse_distances_in(parts[0][0].shape[1:], z)
     total: Any = None
     for light, taken in parts:
-        caught = _quantum_catch(eye, retinal_image(light, depth, bank, shape, types), s, types)
+        catch = _quantum_catch(eye, retinal_image(light, depth, bank, shape, types), s, types)
         if np.ndim(taken):
-            caught *= types.Tensor(np.broadcast_to(taken, caught.shape).copy())
-        total = caught if total is None else total + caught
+            catch *= types.Tensor(np.broadcast_to(taken, catch.shape).copy())
+        total = catch if total is None else total + catch
     return total if eye.mosaic is None else own_type(total, eye.mosaic, types)
 
 

@@ -193,10 +193,10 @@ def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling
 
 
 def transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
-    """Return the transfer function exp(ikz (cos θ - 1)) for light at the angle θ, times the spectral taper.
+    """Return the transfer function exp(ikz (cos θ - 1)) for light at the angle θ (Goodman, eq. 3-74), times the taper.
 
-    See Goodman, eq. 3-74. With q = 1 - cos θ, the exponent is -ikz q. The split method omits its paraxial part, -ikz
-    sin²θ/2, so the exponent is -ikz q²/2.
+    With q = 1 - cos θ, the exponent is -ikz q. The split method omits the paraxial part of the exponent, -ikz sin²θ/2.
+    Because q - sin²θ/2 = q²/2, the exponent -ikz q²/2 remains.
     """
     import drjit as dr
 
@@ -213,8 +213,8 @@ def transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precisi
 def versine(s2: Array) -> Array:
     """Return q = 1 - cos θ from sin²θ, in float64.
 
-    The difference 1 - cos θ loses digits, and multiplication by kz makes the error large. One correction step towards q
-    (2 - q) = sin²θ restores the digits without a division.
+    The difference 1 - cos θ loses digits, and multiplication by kz would magnify this error. One correction step
+    towards the solution of q (2 - q) = sin²θ restores the digits without a division.
     """
     import drjit as dr
 
@@ -223,7 +223,7 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Propagate the field from the relay plane to the window by Fresnel's integral, which adds the paraxial part."""
+    """Return the field over the window: Fresnel's integral of the field in the relay plane adds the paraxial part."""
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

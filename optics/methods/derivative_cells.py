@@ -1,9 +1,10 @@
 """Quadrature nodes in the cells between the knots of maps, for derivatives with respect to the samples of the maps.
 
-In a cell, the integrand of a derivative is a cubic polynomial times a wave, the light behind the pupil. With t in [-1,
-1] across the cell, and z the largest phase of the wave from the middle to a border, the wave is e^{izt} or slower. Its
-Chebyshev coefficients are 2 J_k(z). n Gauss-Legendre nodes are exact up to degree 2n - 1. Cells that the edge of the
-aperture cuts have the same nodes, with weights that are exact up to degree n - 1 over the open part.
+In a cell, the integrand of a derivative is a cubic polynomial times the light behind the pupil, which is a wave. Let t
+in [-1, 1] be the position across the cell, and z the largest phase difference between its middle and a border. The wave
+then varies at most as fast as e^{izt}, whose Chebyshev coefficients have the modulus 2 |J_k(z)|. A rule of n
+Gauss-Legendre nodes is exact for polynomials up to degree 2n - 1. Cells that the edge of the aperture cuts have the
+same nodes, with weights that are exact up to degree n - 1 over the open part.
 """
 
 from __future__ import annotations
@@ -27,21 +28,22 @@ MOST_CELLS = 4096  # choice, limited by memory: largest number of cells along a 
 # Chebyshev coefficients of a cubic spline through a single sample: root mean square over the cells between its knots,
 # relative to the constant coefficient. test_gradients.py computes them.
 SPLINE = (1.0, 0.970, 0.150, 0.076)
-# Choice: the error of cut cells is T^CUT_POWER, where T is the sum of the coefficients from degree n on. The power lies
-# between 1, for weights that are exact up to degree n - 1, and 2, for cells of which hardly anything is cut off. Both
-# are upper bounds; actual errors are about a tenth of them. test_gradients.py compares with exact derivatives.
+# Choices: the error of cut cells is T^CUT_POWER, where T is the sum of the coefficients from degree n on. The power
+# lies between 1, for weights that are exact up to degree n - 1, and 2, for cells of which hardly anything is cut off.
+# These sums are upper bounds, and actual errors are about REACHED times as large. test_gradients.py compares them with
+# exact derivatives.
 CUT_POWER, REACHED = 1.8, 0.1
-WAVES = np.concatenate([[0.0], np.geomspace(0.01, 40.0, 120)])  # values of z in the table of errors
-DEGREES = 96  # number of degrees in this table, above which all coefficients are negligible
+WAVES = np.concatenate([[0.0], np.geomspace(0.01, 40.0, 120)])  # values of z in the table of `_tails`
+DEGREES = 96  # number of degrees in this table; coefficients of higher degrees are negligible
 
 
 def derivative_cells(
     opening: Aperture, knots: DerivativeKnots, cycles: np.ndarray, tolerance: float
 ) -> PixelatedAperture | None:
-    """Return the opening with the fewest nodes that keep the error of derivatives below a part of the tolerance.
+    """Return the opening, divided into cells with the fewest nodes that are accurate enough; None for too many cells.
 
     The error is the relative L2 error of the derivatives with respect to all samples, for a random functional of the
-    PSF. Cells are divided if they would need many nodes. The result is None if there would be too many cells.
+    PSF. It may be NODES_PART times the tolerance. Cells are halved if they would need more than MOST_NODES nodes.
 
     cycles: local frequencies [cycles per R] of the integrand at points that are evenly spread over the opening.
     """
@@ -58,23 +60,23 @@ def derivative_cells(
 
 @lru_cache(maxsize=64)
 def _divided(opening: Aperture, borders: tuple[float, ...], halvings: int) -> PixelatedAperture:
-    """Return the cells between these borders, after each has been halved a number of times."""
+    """Return the opening with cells between these borders, each divided into 2^halvings equal parts per axis."""
     parts = 2**halvings
     places = np.interp(np.arange((len(borders) - 1) * parts + 1) / parts, np.arange(len(borders)), borders)
     return PixelatedAperture.between(opening, tuple(places.tolist()))
 
 
 def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
-    """Return the error of derivatives for 1 to MOST_NODES nodes along a cell.
+    """Return the errors of derivatives for 1 to MOST_NODES nodes along a cell, (MOST_NODES,).
 
-    z: half the phase [rad] that the wave gains across the cell, at points that are evenly spread.
-    cut_share: share of the area that lies in cut cells.
+    z: half the phase [rad] that the wave gains across a cell, at points that are evenly spread over the opening.
+    cut_share: fraction of the area that lies in cut cells.
     """
     place = np.searchsorted(WAVES, z)
     if place.max() >= len(WAVES):
         return np.full(MOST_NODES, np.inf)
-    share = np.bincount(place, minlength=len(WAVES)) / len(z)
-    squared = share @ np.square(_tails(splines))
+    frequency = np.bincount(place, minlength=len(WAVES)) / len(z)
+    squared = frequency @ np.square(_tails(splines))
     n = np.arange(1, MOST_NODES + 1)
     whole, cut = np.sqrt(squared[2 * n]), np.sqrt(cut_share * squared[n])
     found: np.ndarray = REACHED * (whole + cut**CUT_POWER)
@@ -83,7 +85,10 @@ def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _tails(splines: int) -> np.ndarray:
-    """Return sums of the Chebyshev coefficients of the integrand from each degree on, (z, degree), for z in WAVES."""
+    """Return the sum of the integrand's Chebyshev coefficients from each degree on, for z in WAVES, (z, degree).
+
+    splines: number of splines whose product with the wave is integrated.
+    """
     from scipy.special import jv
 
     wave = 2 * np.abs(jv(np.arange(DEGREES), WAVES[:, None]))

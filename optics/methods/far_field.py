@@ -1,4 +1,4 @@
-"""The Rayleigh-Sommerfeld integral by one Fourier transform onto directions for each of a few nodes of the window."""
+"""The Rayleigh-Sommerfeld integral by Fourier transforms onto directions, one for each of a few nodes of the window."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class FarFieldSampling:
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -134,9 +134,9 @@ def _nodes(problem: Problem, count: int) -> WindowNodes:
 
 
 def _step(error: float) -> float:
-    """Return the radians per sample at which eight-point Lagrange interpolation of a unit wave has this error.
+    """Return the phase step [rad] between samples of a unit wave for this error of eight-point Lagrange interpolation.
 
-    The value is at most 1.5.
+    The step is at most 1.5.
     """
     return min(1.5, (error / LAGRANGE_8) ** 0.125)
 
@@ -170,10 +170,12 @@ def _between(n: int) -> np.ndarray:
 def _slow_part(
     problem: Problem, points: tuple[np.ndarray, np.ndarray], angle: np.ndarray, y: np.ndarray | float
 ) -> np.ndarray:
-    """Return the slow factor (ρ/D)² (1 + i/(kD)) exp(ik(D - ρ + s·ξ)).
+    """Return the slow factor (ρ/D)² (1 + i/(kD)) exp(ik(D - ρ + s·ξ)) of light from ξ to P = (z tan(angle), y, z).
 
-    P is the point (z tan(angle), y, z). D is the distance from the pupil's point ξ to P, ρ is the distance from the
-    pupil's centre to P, and s is the direction from the centre to P.
+    D is the distance from the point ξ of the pupil to P, and ρ the distance from the pupil's centre to P. s contains
+    the x and y components of the unit vector from the centre to P.
+
+    points: points ξ (x, y) [m] of the pupil. All arrays are broadcast.
     """
     x = problem.distance * np.tan(angle)
     rho = np.sqrt(x * x + y * y + problem.distance**2)
@@ -187,13 +189,13 @@ def _slow_part(
 
 
 def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Array:
-    """Return the Rayleigh-Sommerfeld integral with the plane wave of each direction split off:
+    """Return the intensity |U|² over the window, from the Rayleigh-Sommerfeld integral in the form
 
     U(x) = z/(λρ²) ∫ P(ξ) G(ξ; x) e^{-ik s·ξ} dξ,  G = (ρ/D)² (1/(kD) - i) e^{ik(D - ρ + s·ξ)},
 
-    where ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. G varies slowly with x, because it contains only Fresnel's quadratic
-    phase and smaller terms. G is evaluated at nodes x_ab. The integral for each node is one Fourier transform. Between
-    nodes, the integrals are interpolated.
+    where ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. P is the light behind the pupil. The slow factor G varies slowly with
+    x, because its phase contains only Fresnel's quadratic term and smaller terms. G is evaluated at nodes x_ab. For
+    each node, the integral is one Fourier transform. Between nodes, the integrals are interpolated.
     """
     import drjit as dr
 
@@ -214,9 +216,9 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
 
 def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
-    """Return the slow factor G(ξ; x) of `_far_field` on the pupil's grid. Two tangents define the direction of x.
+    """Return the slow factor G(ξ; x) of `_far_field` on the pupil's grid, without a constant phase.
 
-    A constant phase is omitted.
+    tan_x, tan_y: tangents x/z and y/z of the point x of the window.
     """
     import drjit as dr
 
@@ -238,9 +240,11 @@ def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Prec
 def _onto_window(
     parts: tuple[Array, Array], beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision
 ) -> Array:
-    """Return the intensity over the window.
+    """Return the intensity over the window, a flat array.
 
     Eight-point Lagrange polynomials interpolate the field between samples of the direction cosines.
+
+    parts: real and imaginary part of the field at these samples, flat arrays.
     """
     import drjit as dr
 

@@ -1,8 +1,8 @@
-"""Nodes of the window at which the far field's slow factor is evaluated: the fewest from which all others follow.
+"""The nodes of the window at which `far_field` evaluates the slow factor.
 
 The slow factor is interpolated between nodes, which are Chebyshev points in angle. Its values at most of these nodes
-are, within the tolerance, linear combinations of its values at a few of them. This is an interpolative decomposition
-(Cheng et al., SIAM J. Sci. Comput. 26 (2005) 1389).
+are, within the tolerance, linear combinations of its values at a few of them. Only these few nodes are evaluated. Their
+choice is an interpolative decomposition (Cheng et al., SIAM J. Sci. Comput. 26 (2005) 1389).
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class WindowNodes:
         return [(float(at[column]), float(at[row])) for row, column in self.kept]
 
     def weights(self, angle: np.ndarray, dtype: str) -> np.ndarray:
-        """Return the weights of the kept nodes for directions on a square grid of direction cosines, (kept, 2, place).
+        """Return the weights of the kept nodes for all directions of a square grid, (kept, 2, direction).
 
         The second axis contains real and imaginary parts.
 
-        angle: atan(x/z) of the directions, (y, x). The grid is symmetric, so that the transpose is atan(y/z).
+        angle: atan(x/z) of the directions, (y, x). The grid is symmetric, so the transpose of `angle` is atan(y/z).
         """
         across = _chebyshev(angle / self.half_angle, self.count).astype(dtype).reshape(self.count, -1)
         down = _chebyshev(angle.T / self.half_angle, self.count).astype(dtype).reshape(self.count, -1)
@@ -59,34 +59,33 @@ class WindowNodes:
 
 
 def all_nodes(count: int, half_angle: float) -> WindowNodes:
-    """Return nodes that are all kept, so that each represents itself."""
+    """Return `WindowNodes` in which all nodes are kept, so that each node represents itself."""
     kept = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="ij"), axis=-1).reshape(-1, 2)
     return WindowNodes(count, half_angle, kept, np.eye(count**2).reshape(-1, count, count).astype(complex))
 
 
 def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> WindowNodes:
-    """Return a few nodes from which the values at all nodes follow as linear combinations.
+    """Return `WindowNodes` with a few kept nodes, of which the values at all nodes are linear combinations.
 
-    The root mean square error over the pupil is at most `error`.
+    For each node, the root mean square error over the points of the pupil is less than `error`.
 
     slow: slow factor for every node at points of the pupil, (row, column, point), with a modulus of about 1.
     """
     rest = slow.reshape(count**2, -1)
     kept: list[int] = []
-    shares: list[np.ndarray] = []
+    rows: list[np.ndarray] = []
     while True:
         size = np.square(np.abs(rest)).mean(axis=1)
         worst = int(size.argmax())
         if size[worst] < error**2 or len(kept) == len(rest):
             break
         along = rest[worst] / np.linalg.norm(rest[worst])
-        # A sum is used instead of a matrix product: the product is so small that the busy waiting of BLAS threads
-        # dominates.
-        share = (rest * along.conj()).sum(axis=1)
-        rest = rest - share[:, None] * along
+        # The sum is no matrix product, because busy waiting of BLAS threads dominates the time of small products.
+        projection = (rest * along.conj()).sum(axis=1)
+        rest = rest - projection[:, None] * along
         kept.append(worst)
-        shares.append(share)
-    found = np.array(shares)  # values at all nodes = foundᵀ · `along`; this includes the kept nodes themselves
+        rows.append(projection)
+    found = np.array(rows)  # (kept, node): components of the values at all nodes along the unit vectors `along`
     mix = np.linalg.solve(found[:, kept], found)
     return WindowNodes(
         count, half_angle, np.stack(np.divmod(np.array(kept), count), axis=-1), mix.reshape(-1, count, count)

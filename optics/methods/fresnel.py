@@ -35,7 +35,7 @@ MUCH = 0.7  # choice: above this error, the field is unrelated to the exact fiel
 class ParaxialSampling:
     """Samples of a pupil for a paraxial method.
 
-    `model_error` is computed on first access, because it takes longer than the rest of a plan.
+    `model_error` is computed on first access, because it takes longer than all other parts of a plan.
     """
 
     method: str
@@ -57,7 +57,7 @@ class ParaxialSampling:
         return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, curved).intensity
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -84,6 +84,7 @@ def fraunhofer(problem: Problem) -> list[ParaxialSampling]:
 
 
 def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSampling]:
+    """Return a sampling for an integrand of frequencies up to `turning` [1/m]; empty for a pupil of pixels."""
     if problem.pixelated is not None:
         return []
     edge = problem.soft_edge(turning)
@@ -101,13 +102,15 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
 def model_error(problem: Problem, curved: bool) -> float:
     """Return the relative L2 error of the intensity that results from the paraxial kernel.
 
-    It follows from the ratio q of the paraxial kernel to the exact kernel,
+    It follows from the ratio q of the paraxial kernel to the exact kernel for light from ξ to x,
 
-        q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|, D = √(d² + z²)   (d² without ξ² in Fraunhofer's),
+        q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|,   D = √(d² + z²),
 
-    for light that arrives at the hit points of rays. Light that adds up coherently at a hit point comes from a few
-    Fresnel zones around the ray's origin, or from the whole aperture if several rays may hit the same point. A phase
-    that is common to all this light causes no error.
+    at the hit points x of rays. Fraunhofer's integral omits the term ξ² of d². Light that adds up coherently at a hit
+    point comes from a few Fresnel zones around the ray's origin, or from the whole aperture if several rays may hit the
+    same point. A phase that is common to all this light causes no error.
+
+    curved: True for Fresnel's integral, False for Fraunhofer's.
     """
     rays = problem.rays
     if rays is None or len(rays) == 0 or problem.masked:
@@ -137,7 +140,7 @@ def model_error(problem: Problem, curved: bool) -> float:
 def _misplaced(problem: Problem) -> float:
     """Return the error of Fraunhofer's integral for wide shadows, which the integral wrongly shrinks to a spot.
 
-    It follows from the brightness of the spot, relative to that of the exact light.
+    It follows from the brightness of the spot, relative to that of the exact PSF.
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None

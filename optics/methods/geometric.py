@@ -35,7 +35,12 @@ class NoDerivativesError(ValueError):
 
 @dataclass(frozen=True)
 class RaySampling:
-    """Rays from nodes that are fitted to the edge. model_error: error of the intensity, since rays replace waves."""
+    """Rays from quadrature nodes that are fitted to the edge of the aperture.
+
+    rule: aperture, cycles and digits of the nodes, see `cached_nodes`.
+    count: number of nodes.
+    model_error: relative L2 error of the intensity that results because rays replace waves.
+    """
 
     rule: tuple[Aperture, float, float]
     count: int
@@ -50,8 +55,8 @@ class RaySampling:
 
         Raises:
             NoDerivativesError: derivatives are required on a GPU. There, derivatives in Dr.Jit that use the reciprocal
-                of a float64 have errors of 1e-6. The directions of rays are differences of paths, so the errors of
-                their derivatives are 1e-2.
+                of a float64 have errors of 1e-6. The directions of rays are small differences of paths, which magnify
+                these errors to 1e-2.
         """
         import drjit as dr
 
@@ -92,7 +97,7 @@ class PinholeSampling:
         """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
-            ValueError: derivatives are requested, but light jumps from cell to cell.
+            ValueError: derivatives are requested. They do not exist, because the light jumps from cell to cell.
         """
         import drjit as dr
 
@@ -150,7 +155,7 @@ def pinhole(problem: Problem) -> list[PinholeSampling]:
 def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, Array, Array]:
     """Return the points (x, y) where rays from points of the pupil hit the sensor, and a mask of rays that propagate.
 
-    The hit points are x + z p/√(1 - p²), where p is the gradient of the path.
+    The hit points are x + z p/√(1 - p²). p is the gradient of the optical path, divided by the index of the medium.
     """
     import drjit as dr
 
@@ -166,7 +171,7 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
 
 
 def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision) -> Array:
-    """Return the weights that land in each cell of the window, divided by the area of a cell.
+    """Return the sum of the weights that land in each cell of the window, divided by the area of a cell, flat.
 
     A quadratic B-spline spreads each weight over 3 x 3 cells. The nine parts add up to the weight, so power is lost
     only beyond the rim of the window.

@@ -43,7 +43,12 @@ LOOSE = 1e-8
 
 @dataclass(frozen=True)
 class HankelSampling:
-    """Gauss-Legendre nodes in r for each open ring, nodes in θ, and the radii at which the image is computed."""
+    """Gauss-Legendre nodes in r and in θ, and the radii at which the image is computed.
+
+    radii: numbers of nodes in r, for each open ring of the aperture.
+    angles: number of nodes in θ.
+    line: radii at which the image is computed.
+    """
 
     taper: Taper
     radii: tuple[int, ...]
@@ -66,7 +71,7 @@ class HankelSampling:
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
         return 2 * (self.line.radius + problem.radius)
 
     @property
@@ -150,7 +155,7 @@ def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -
 
 
 def _transform(field: Field, at: Array, to: Array, types: Precision, exactly: bool) -> Field:
-    """Return Σ_j u_j J₀(2π at_j to_k) for every k."""
+    """Return Σ_j u_j J₀(2π at_j to_k) for every k, where u is the field. `exactly` selects J₀ with all digits."""
     import drjit as dr
 
     n, m = dr.width(at), dr.width(to)

@@ -58,7 +58,7 @@ class LowRankSampling:
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
         return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
 
     @property
@@ -98,6 +98,7 @@ def low_rank(problem: Problem) -> Sequence[LowRankSampling | WindowSampling]:
 
 
 def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) -> LowRankSampling | None:
+    """Return a sampling with the necessary rank, for these samples of the pupil; None if the matrix is too large."""
     entries = MOST_BYTES // np.dtype(precision(problem.dtype).complex_dtype).itemsize
     rank = uniform_rank(problem, pupil, half, scale, math.isqrt(entries) // len(pupil.at))
     if rank is None:
@@ -121,15 +122,19 @@ def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) 
 
 
 def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> Field:
-    """Return U(x) = Σ_ab L_a(u) L_b(v) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik s·u}.
+    """Return the field over the window, without the spherical phase e^{ik(ρ - z)} and the carrier e^{ikz}:
 
-        G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + s·u)},   D = |(x - ξ, z)|, ρ = |(x, z)|.
+        U(x) = Σ_ab L_a(u) L_b(v) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik s·(u, v)},
+        G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + s·(u, v))},   D = |(x - ξ, z)|, ρ = |(x, z)|.
 
-    A phase that cancels in the intensity is omitted. G varies slowly with x, so L_a interpolates it. u is the position
-    in the window relative to its centre, and s is ξ/c or the sines of the samples. For each axis, the sums over the
-    points of interpolation and over ξ are combined. The field is then A_y W A_xᵀ, two matrix products, where W contains
-    P G and A the remaining factors along an axis. A_x does not change if window and samples are both mirrored, so the
-    matrices are split into even and odd parts along x. This halves the cost of the first product.
+    (u, v) is the position in the window relative to its centre. P is the light behind the pupil times the areas of the
+    samples. s is ξ/c or the sines of the samples. G varies slowly with x, so the Lagrange polynomials L_a and L_b
+    interpolate it between the points (x_a, y_b) of the window.
+
+    For each axis, the sums over the interpolation points and over ξ are combined. The field is then the product of
+    three matrices, A_y W A_xᵀ. W contains P G, and A_x and A_y contain the remaining factors along their axis. A_x does
+    not change if window and samples are both mirrored, so the matrices are split into even and odd parts along x. This
+    halves the cost of the product with W.
     """
     window = problem.window
     nodes = how.half_width * chebyshev_points(how.rank)
@@ -146,7 +151,7 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
 
 
 def _halves(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the even and the odd part of a matrix, (A[x, j] ± A[x, -j]) / 2, with columns j counted from the middle.
+    """Return the even and the odd part of a matrix, (A[x, j] ± A[x, -j]) / 2, for columns j ≥ 0 from the middle.
 
     The middle column is its own mirror image.
     """

@@ -22,7 +22,7 @@ class WithField(Protocol):
 class Sampling(Protocol):
     """Samples with which one method solves a problem.
 
-    The predicted time is for a compiled kernel on two cores.
+    `seconds` is the predicted time of a compiled kernel on two cores.
     """
 
     @property
@@ -37,7 +37,7 @@ class Sampling(Protocol):
 
     @property
     def padding(self) -> float:
-        """Period of the pupil's transform divided by the number of its samples; 1 without a period."""
+        """Period of the pupil's transform, in samples, divided by the number of samples; 1 without a period."""
 
     @property
     def bytes(self) -> float:
@@ -51,8 +51,8 @@ class Sampling(Protocol):
         """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread.
+        """Return the width [m] of the square over which rounding errors are spread.
 
-        An error with the power of the pupil's light, spread evenly over this width, has the intensity 1/width². The
-        wider the plane, the smaller are the rounding errors within the window.
+        Rounding errors have a fraction of the power of all light. Spread evenly over the square, this power has the
+        intensity power / width². Within the window, rounding errors are therefore smaller if the square is wider.
         """

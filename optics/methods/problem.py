@@ -29,42 +29,43 @@ __all__ = ["SLOPE_MARGIN", "Problem"]
 
 # Choice: factor on the steepest slope of a wavefront, because the grid of slopes may miss the steepest point.
 SLOPE_MARGIN = 1.02
-# Choice: amplitude ripple of the soft aperture and of the spectral taper, relative to the tolerance on intensity. The
-# relative error of the amplitude of edge-diffracted light is several ripples, and the relative error of its intensity
-# is twice as large: half the tolerance in a window that contains no other light.
+# Choice: amplitude ripple of the soft aperture and of the spectral taper, relative to the tolerance on intensity.
+# Edge-diffracted light then has a relative amplitude error of several ripples. Its relative intensity error is twice as
+# large, which is half the tolerance in a window without other light.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
+BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3  # choice: the same ripple if only light within `reach` must be accurate
+FADE_RIPPLE_PER_TOLERANCE = 3.0  # choice: the same for a steep pupil's light beyond the band, which fades out
 DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the tolerance
-# Choice: factor by which detail is finer if derivatives with respect to single numbers are requested. Such a derivative
-# can be a small difference to which the detail contributes most, as for the focal length of a lens in focus.
+# Choice: divisor of DETAIL_PART if derivatives with respect to single numbers are requested. Neglected detail can
+# dominate such a derivative, for example with respect to the focal length of a lens in focus.
 FINER_DETAIL = 10.0
-BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
-FADE_RIPPLE_PER_TOLERANCE = 3.0  # choice: the same for the fade of a steep pupil's light beyond the band
 
 
 @dataclass(frozen=True)
 class Problem:
     """One monochromatic propagation from a pupil to a window, described by numbers.
 
-    light: the light, without derivatives with respect to the distances.
+    light: the beam. Its source and its distance are plain numbers, without derivatives.
     aperture: shape of the pupil.
     radius, distance: radius of the pupil and distance of the window's plane [m].
     wavelength: wavelength [m] in the medium.
-    window: grid of the output.
+    window, tolerance: grid of the output, and relative L2 error of the intensity that is allowed there.
     symmetric: True if the light behind the pupil is rotationally symmetric.
     even: True if this light is even in x and in y.
-    widest_band: frequency [1/m] beyond which light may be omitted (infinite: all light that reaches the window counts).
+    widest_band: frequency [1/m] beyond which light may be omitted; infinite if no light may be omitted.
     reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
-        beyond it may be wrong, and edge-diffracted light less accurate (None: the whole window must be accurate).
+        beyond it may be wrong, and edge-diffracted light less accurate. None: the whole window must be accurate.
     medium_n: refractive index behind the pupil.
     masked: True if a mask scatters light where no rays arrive. Approximations then cannot predict their error.
     spread: spread of the light over the pupil, see `light_spread`.
-    differentiated: whether the PSF carries derivatives.
-    moves: whether derivatives with respect to the distance are requested.
-    knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
-    mask_detail: bandwidth [1/m] of the amplitude of the mask.
+    differentiated: True if the PSF carries derivatives.
+    moves: True if derivatives with respect to the distance are requested.
+    knots: knots of the maps whose samples have derivatives; None if no such derivatives are requested.
+    mask_detail: bandwidth [1/m] of the mask's amplitude; 0 without a mask.
     detail_part: largest phase [rad] of neglected detail, divided by the tolerance.
-    all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
-    steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Light beyond `reach` is lost.
+    all_light: True if the samples must resolve all light behind the pupil, even if the window needs fewer samples.
+    steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Methods then remove light
+        beyond `reach`.
     """
 
     light: Beam
@@ -136,7 +137,7 @@ class Problem:
 
     @cached_property
     def detail(self) -> float:
-        """Bandwidth [1/m] of the phase that the slopes of the wavefront do not include."""
+        """Bandwidth [1/m] of the fine phase that the slopes of the wavefront do not include."""
         return self.light.pupil.bandwidth(self.light.wavelength, self.detail_part * self.tolerance)
 
     @cached_property
@@ -158,7 +159,7 @@ class Problem:
 
     @cached_property
     def turning(self) -> float:
-        """Highest frequency [1/m] in the combined phase of pupil and path. For a lens in focus, both nearly cancel."""
+        """Highest frequency [1/m] of the combined phase of pupil and path; in focus, both phases nearly cancel."""
         return self._turning[0]
 
     @cached_property
@@ -180,10 +181,10 @@ class Problem:
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
-        """Return the aperture, divided at the knots of splines into cells with nodes for derivatives; None if too many.
+        """Return the aperture, divided at the knots of splines into cells of nodes; None if there would be too many.
 
-        band: highest frequency [1/m] in the pupil's plane of the light that must be resolved. None: the light that
-            arrives at any point of the window, as in `turning`.
+        band: highest frequency [1/m] in the pupil's plane of the light that the nodes must resolve. None: they
+            resolve the combined phase of pupil and path for all points of the window, as in `turning`.
         """
         assert self.knots is not None
         slopes = self._turning_slopes if band is None else self._slopes
@@ -193,17 +194,17 @@ class Problem:
 
     @cached_property
     def _slopes(self) -> np.ndarray:
-        """Slopes of the wavefront at the nodes of cells, see `Slopes.spread`."""
+        """Slopes of the wavefront over all cells, see `Slopes.spread`."""
         return self.slopes.spread(self._beyond_rim)
 
     @cached_property
     def _turning_slopes(self) -> np.ndarray:
-        """Slopes of the combined phase of pupil and path at the nodes of cells."""
+        """Slopes of the combined phase of pupil and path over all cells."""
         return self.slopes.spread(self._beyond_rim, (self.window, self.distance, self.medium_n))
 
     @property
     def _beyond_rim(self) -> float:
-        """Distance [R] beyond the rim up to which nodes lie: the diagonal of the largest cell that the rim cuts."""
+        """Distance [R] beyond the rim up to which nodes may lie: the diagonal of the largest cell."""
         assert self.knots is not None
         return math.sqrt(2) * max(after - before for before, after in pairwise(self.knots.borders))
 
@@ -239,7 +240,7 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Longest path plus the steepest slope times the radius, in waves; it bounds phases including whole waves."""
+        """Upper bound [waves] on all phases: longest path from pupil to window plus steepest slope times radius."""
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
         return path + self.radius * self.phase_band_inside
@@ -249,7 +250,7 @@ class Problem:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
         straight, per_slope = self.radius / math.hypot(self.radius, self.distance), SLOPE_MARGIN / self.medium_n
         if per_slope * self.sampled_slopes.steepest_inside >= straight:
-            return straight  # all slopes and finer detail can only increase the sine of light that leaves the pupil
+            return straight  # the remaining slopes and the detail can only increase the sine of light behind the pupil
         leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius
         return steepest_sine(self.radius, self.distance, leaving)
 

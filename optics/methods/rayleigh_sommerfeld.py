@@ -32,8 +32,8 @@ __all__ = [
     "turns",
 ]
 
-MOST_DIGITS = 14.0  # choice: most digits that can be requested of float64 sums, whose numbers have 16
-# Choice: digits beyond the tolerance. They are few, because the rule resolves the highest frequency everywhere.
+MOST_DIGITS = 14.0  # choice: largest number of digits of a sum in float64, which has 16 digits itself
+# Choice: digits beyond the tolerance. Few suffice, because the rule resolves the highest frequency everywhere.
 SPARE_DIGITS = 0.5
 ON_AXIS = 1e-9  # rounding: points closer to the x axis than this fraction of the radius lie on it
 # Choice, limited by memory: numbers of nodes up to which 128 or 16 rules are cached. Of larger rules, one is cached.
@@ -84,7 +84,7 @@ class NodeSampling:
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`.
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`.
 
         It is the width of the focus times the square root of the number of nodes, because the rounding errors of the
         summands are independent.
@@ -134,9 +134,9 @@ def turns(problem: Problem, digits: float) -> float:
     """Return the cycles per radius that the nodes must resolve.
 
     These are the cycles of the phase. In addition, the kernel has poles at the height z above the pupil's plane. If z
-    is short, the poles slow convergence: Gauss-Legendre rules over [0, R] converge like e^{-4nz/R}, and the trapezoid
-    rule around a ring of radius R like e^{-nz/R}. Additional cycles then represent the poles. In a focus, where the
-    phase is constant, only the poles matter.
+    is short, the poles slow convergence: with n nodes, the errors of Gauss-Legendre rules over [0, R] fall like
+    e^{-4nz/R}, and those of the trapezoid rule around a ring of radius R like e^{-nz/R}. Additional cycles then
+    represent the poles. In a focus, where the phase is constant, only the poles matter.
     """
     phase, poles = problem.radius * problem.turning_inside, digits * math.log(10) / (2 * math.pi)
     nearness = problem.radius / problem.distance
@@ -167,6 +167,7 @@ def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool 
 
 
 def _made(aperture: Aperture, cycles: float, digits: float, halved: bool) -> Nodes:
+    """Return the nodes of an aperture without a cache, see `cached_nodes`."""
     found = aperture.nodes(cycles, digits)
     if not halved:
         return found
@@ -193,8 +194,8 @@ def _intensity_band(problem: Problem) -> float:
 def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> Field:
     """Return the first Rayleigh-Sommerfeld integral at points (x, y) [m].
 
-    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). Whole waves of D - z = d²/(D + z) are subtracted in
-    float64.
+    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ik(D - z)} dξ (Goodman, §3.5), where d = |x - ξ| and D = √(d² + z²). The path
+    D - z is computed as d²/(D + z). Whole waves of the phase are subtracted in float64.
 
     rule: aperture, cycles, digits and `halved` of the nodes, see `cached_nodes`.
     """
@@ -213,7 +214,12 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
 def _added(
     beam: Beam, rule: tuple[np.ndarray, ...], at: tuple[Array, Array], total: tuple[Array, Array], types: Precision
 ) -> tuple[Array, Array]:
-    """Return `total`, real and imaginary part at points (x, y), plus the sum over nodes (x, y, weight)."""
+    """Return real and imaginary part of `total` plus the sum over some nodes, float64.
+
+    rule: x, y [R] and weight [R²] of the nodes.
+    at: points (x, y) [m] of the image.
+    total: real and imaginary part of the sum over the previous nodes, at these points.
+    """
     import drjit as dr
 
     x, y = at

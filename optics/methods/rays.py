@@ -80,7 +80,7 @@ class Rays:
         return disk_area(self.to_x, self.to_y)
 
     def densest(self) -> list[tuple[float, float]]:
-        """Return two points (x, y): the median of the hit points, and their mean within the cell with the most rays."""
+        """Return two points (x, y) [m]: the median of all hit points, and the mean of those in the densest cell."""
         counts, x, y = np.histogram2d(self.to_x, self.to_y, CELLS)
         i, j = np.unravel_index(counts.argmax(), counts.shape)
         within = (self.to_x >= x[i]) & (self.to_x <= x[i + 1]) & (self.to_y >= y[j]) & (self.to_y <= y[j + 1])
@@ -105,12 +105,11 @@ def disk_area(x: np.ndarray, y: np.ndarray) -> float:
 
 
 def brightness(area: float, cell: float) -> float:
-    """Return the sum of squared samples of a PSF, times the area `cell` [m²] of a sample.
+    """Return the sum of squared samples of a PSF, times the area `cell` [m²] of a sample, in 1/m².
 
-    The PSF has unit power, which diffraction has spread over `area` [m²].
-
-    The result is 1/area. If samples are so coarse that one may hit the PSF's maximum without resolving it, the maximum
-    alone determines the result (that of the Airy pattern is π²/4 times the mean over its area).
+    The PSF has unit power, spread over `area` [m²]. If samples resolve it, the result is 1/area. Coarse samples may hit
+    the maximum of the PSF without resolving it, and then the maximum alone determines the result. The maximum of the
+    Airy pattern is π²/4 times its mean over this area.
     """
     area = max(area, 1e-30)
     return max(1.0, (math.pi**2 / 4) ** 2 * cell / area) / area

@@ -180,9 +180,10 @@ def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: flo
     The result is None if samples that are evenly spaced in sines are too uneven in the pupil, or if the grid would be
     too large.
 
-    The distance between two points in the pupil is at most z/cos³θ times the distance between their sines. The number
-    of cycles per unit of sine is therefore the number of cycles per metre times this factor.
+    The distance between two points in the pupil is at most z/cos³θ times the distance between their sines, with θ the
+    angle of the steepest ray. The number of cycles per unit of sine is therefore `cycles` times this factor.
 
+    cycles: number of cycles per metre [1/m].
     shift: distance by which the grid is shifted along both axes, in units of its pitch, at most 1.
     """
     angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)

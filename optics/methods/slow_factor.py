@@ -53,7 +53,7 @@ def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: floa
     lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
 
     def rest(at: np.ndarray) -> np.ndarray:
-        """Return the slow factor, (line, point of the rim, position on the line)."""
+        """Return the slow factor at positions `at` [m] on all lines, (line, point of the rim, position)."""
         u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
         return slow_factor(path, rim, directions, (u, v))
 
@@ -92,11 +92,11 @@ def slow_factor(
 ) -> np.ndarray:
     """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
 
-    u is relative to the window's centre. D is the distance from ξ to u, and ρ the distance from the pupil's centre to
-    u.
+    D is the distance from ξ to u, and ρ the distance from the pupil's centre to u. All arrays are broadcast.
 
-    s is the direction of ξ in the Fourier kernel e^{-ik s·u}.
-
+    pupil: points ξ (x, y) [m].
+    directions: directions s of these points in the Fourier kernel e^{-ik s·u}.
+    window: points u (x, y) [m], relative to the window's centre.
     dtype: type in which the phase is rounded, "float32" or "float64".
     """
     (xi, eta), (u, v), (s, t) = pupil, window, directions
@@ -111,13 +111,13 @@ def slow_factor(
 
 
 def axis_factor(path: Path, samples: SineSamples, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the slow factor along x (0) or y (1), relative to its value at the middle of the window, complex.
+    """Return the slow factor along x (0) or y (1), divided by its value at the middle of the window, complex.
 
     Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
     that kernel.
 
     sines: sines along the axis, minus that of the pupil's centre. Along the other axis, the sine is that of the centre.
-    places: positions [m] along the axis, relative to the middle of the window. They broadcast with the sines.
+    places: positions [m] along the axis, relative to the middle of the window. They are broadcast with the sines.
     """
     none = np.zeros(1)
     directions, window = ((sines, none), (places, none)) if axis == 0 else ((none, sines), (none, places))
@@ -131,7 +131,10 @@ def remaining_factor(
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Return the slow factor divided by both axis factors. It varies even more slowly over the window."""
+    """Return the slow factor divided by both axis factors (`axis_factor`). It varies even more slowly over the window.
+
+    directions, window: see `slow_factor`.
+    """
     whole = slow_factor(path, samples.points_at(*directions), directions, window)
     for axis in (0, 1):
         whole = whole / axis_factor(path, samples, axis, directions[axis], window[axis])
@@ -141,12 +144,13 @@ def remaining_factor(
 def fourier_kernel(
     at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float, dtype: str
 ) -> np.ndarray:
-    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u = `at` [m] relative to the window's centre.
+    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} along one axis, complex (position, node · sample).
 
     L_a are the Lagrange polynomials of the interpolation points.
 
-    directions: s of each sample.
-    nodes: interpolation points a [m].
+    at: positions u [m] relative to the window's centre.
+    directions: directions s of the samples.
+    nodes: interpolation points [m].
     dtype: "float32" or "float64".
     """
     waves = np.outer(at, directions) / -wavelength

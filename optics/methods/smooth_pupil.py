@@ -1,14 +1,15 @@
 """The light behind a steep pupil, convolved with a Gaussian. Few samples represent it, however steep the relief is.
 
 The convolution multiplies the light of a ray of the frequency ν by e^{-2π²δ²ν²}, where δ is the width of the Gaussian.
-Light that is too steep to arrive in a window disappears from the samples, and a division of the spectrum by this factor
+Light that is too steep to arrive in a window disappears from the samples. A division of the spectrum by this factor
 restores the light of all other rays exactly.
 
 Within the width of the Gaussian, the phase is approximated by a quadratic function, with the slope and the curvature of
-the wavefront. The integral then has a closed form. The edge of the aperture is a straight line there, so that light
-diffracted by it remains, even where the relief is steep. The integral of the Gaussian over one side of this line is a
-complementary error function of a complex argument. At a corner, the factors of both sides are multiplied. The largest
-neglected term is the third derivative of the phase, times δ³.
+the wavefront. The convolution then has a closed form. Near the edge of the aperture, the edge is approximated by a
+straight line. The samples therefore contain the light that the edge diffracts, even where the relief is steep. The
+integral of the Gaussian over one side of this line is a complementary error function of a complex argument. At a
+corner, the factors of both sides are multiplied. The largest neglected term is the third derivative of the phase, times
+δ³.
 """
 
 from __future__ import annotations
@@ -28,9 +29,9 @@ __all__ = ["REACH", "Side", "SmoothPupil", "sides_of"]
 
 REACH = 5.0  # choice, in δ: distance from the edge within which the edge changes the light
 DARKEST = 18.0  # choice: samples darker than e^-18 are omitted
-PARALLEL = 1e-6  # choice: smallest variance along a side, relative to that across it; parallel sides have none
+PARALLEL = 1e-6  # choice: ratio of the variances `along` and `variance` of `_within` below which sides are parallel
 TINY = 1e-30  # avoids a division by 0 in the middle of a circle
-INSIDE = 1e-6  # distance from the edge of a point that shows which side is open, in radii
+INSIDE = 1e-6  # distance from the edge, in radii, of the points at which the aperture is open or not
 TRIED = 101  # number of points along an axis at which the sides of an aperture are compared with its opening
 
 
@@ -38,9 +39,10 @@ TRIED = 101  # number of points along an axis at which the sides of an aperture 
 class Side:
     """A straight line or a circle that bounds an aperture, in radii.
 
-    sign: 1 if the opening lies inside the circle, -1 if it lies outside. The opening lies behind a line.
-    centre, radius: of the circle.
-    normal, offset: normal vector of the line, which points out of the opening, and distance of the line from the axis.
+    sign: 1 if the opening lies inside the circle, -1 if it lies outside.
+    centre, radius: centre and radius of the circle. The radius is 0 for a line.
+    normal, offset: unit normal vector of the line, which points out of the opening, and distance of the line from the
+        axis along this vector.
     """
 
     sign: int = 1
@@ -50,7 +52,10 @@ class Side:
     offset: float = 0.0
 
     def depth(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the depth of points inside the opening [radii], and the outward normal (x, y) of the side there."""
+        """Return the distance [radii] of points from the side, and the normal (x, y) that points out of the opening.
+
+        The distance is positive inside the opening and negative outside.
+        """
         if self.radius == 0:
             depth = self.offset - self.normal[0] * x - self.normal[1] * y
             return depth, np.full_like(depth, self.normal[0]), np.full_like(depth, self.normal[1])
@@ -61,9 +66,9 @@ class Side:
 
 @lru_cache(maxsize=64)
 def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
-    """Return sides whose openings have the aperture as their intersection; None for other apertures.
+    """Return sides such that the aperture is the intersection of their openings; None if no sides have this property.
 
-    Circles, rings of one opening, slits and convex polygons have such sides.
+    Circles, single rings, slits and convex polygons have such sides.
     """
     outline, sides = aperture.outline, []
     for start, end in outline.segments:
@@ -84,23 +89,28 @@ def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
 
 
 class _Gaussian(NamedTuple):
-    """The Gaussian times the light, again a Gaussian: logarithm of its integral, complex mean and covariance."""
+    """The Gaussian times the light around each sample. The product is a Gaussian with complex parameters.
+
+    log: logarithm of its integral.
+    mean: mean (x, y) [m].
+    covariance: covariances xx, xy and yy [m²].
+    """
 
     log: np.ndarray
     mean: tuple[np.ndarray, np.ndarray]
     covariance: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def along(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and variance along directions (x, y)."""
+        """Return mean and variance of the component along unit vectors (x, y)."""
         return x * self.mean[0] + y * self.mean[1], self.between((x, y), (x, y))
 
     def between(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Return the covariance of the components along two directions (x, y)."""
+        """Return the covariance of the components along two unit vectors (x, y)."""
         xx, xy, yy = self.covariance
         return one[0] * other[0] * xx + (one[0] * other[1] + one[1] * other[0]) * xy + one[1] * other[1] * yy
 
     def at(self, points: np.ndarray) -> _Gaussian:
-        """Return the values at some points in double precision."""
+        """Return the Gaussians of the samples with the indices `points`, in double precision."""
         log, mean_x, mean_y, *covariance = (
             part[points].astype(complex) for part in (self.log, *self.mean, *self.covariance)
         )
@@ -109,9 +119,11 @@ class _Gaussian(NamedTuple):
 
 @dataclass(frozen=True)
 class SmoothPupil:
-    """A pupil of some radius [m], whose light is convolved with a Gaussian of a width δ [m].
+    """A pupil whose light is convolved with a Gaussian.
 
     sides: sides of the aperture.
+    radius: radius [m] of the pupil.
+    width: width δ [m] of the Gaussian, its standard deviation.
     """
 
     sides: tuple[Side, ...]
@@ -125,7 +137,7 @@ class SmoothPupil:
 
     @cached_property
     def exponent(self) -> float:
-        """2π²δ² [m²], with which the convolution multiplies light of the frequency ν by e^{-2π²δ²ν²}."""
+        """Coefficient 2π²δ² [m²] of the factor e^{-2π²δ²ν²}, by which light of the frequency ν is attenuated."""
         return 2 * (math.pi * self.width) ** 2
 
     def light(self, beam: Beam, x: np.ndarray, y: np.ndarray, dtype: Any) -> np.ndarray:
@@ -157,9 +169,9 @@ class SmoothPupil:
     def _gaussian(
         self, waves: np.ndarray, slope: tuple[np.ndarray, np.ndarray], bends: tuple[np.ndarray, ...]
     ) -> _Gaussian:
-        """Return ∫ e^{-u²/2δ²} e^{2πi (W + ∇W·u + uᵀHu/2)} du / 2πδ².
+        """Return the Gaussian e^{-u²/2δ²} e^{2πi (W + ∇W·u + uᵀHu/2)} / 2πδ² of the displacement u.
 
-        waves: W, without whole waves.
+        waves: W, the phase behind the pupil [waves], without whole waves.
         slope: gradient of W [1/m].
         bends: H, the second derivatives of W along xx, xy and yy [1/m²].
         """
@@ -174,10 +186,14 @@ class SmoothPupil:
         return _Gaussian(log - np.log(determinant) / 2, (mean_x, mean_y), covariance)
 
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the integral of the Gaussian over the aperture, at points in radii.
+        """Return the integral of each Gaussian over the aperture, complex (point,).
 
-        The factors of all near sides are multiplied. If light is diffracted by one side and the slope there is steep,
-        the light comes from this side itself. All other factors then refer to the Gaussian along this side.
+        Each side that is near contributes one factor. Where the relief is steep, only light that one side diffracts
+        remains. This light comes from points on this side, so the factors of all other sides are computed for the
+        conditional Gaussian along this side.
+
+        inner: Gaussians of the points.
+        x, y: positions of the points, in radii.
         """
         depth, across, down = np.stack([np.broadcast_arrays(*side.depth(x, y)) for side in self.sides], axis=1)
         mean, variance = inner.along(across, down)
@@ -194,15 +210,15 @@ class SmoothPupil:
         u = (depth * self.radius - mean) / np.sqrt(2 * along)
         near[first] = False
         for own, mine in zip(u, near, strict=True):
-            more, share = _behind(own[mine])
+            more, fraction = _behind(own[mine])
             log[mine] += more
-            factor[mine] *= share
+            factor[mine] *= fraction
         found: np.ndarray = np.exp(inner.log + log) * factor
         return found
 
 
 def _behind(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (a, b) with e^a b = erfc(-u)/2, the share of a Gaussian behind a line. Neither overflows.
+    """Return (a, b) with e^a b = erfc(-u)/2, the fraction of a Gaussian behind a line. Neither number overflows.
 
     The scaled function w(z) = e^{-z²} erfc(-iz) is bounded in the upper half plane (Abramowitz & Stegun, 7.1.3).
     """
@@ -213,5 +229,5 @@ def _behind(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     square = -u * u
     steep = square.real > 0
     ratio = np.exp(np.where(steep, -square, square))
-    share = np.where(outside, rest, np.where(steep, ratio - rest, 1 - ratio * rest))
-    return np.where(outside | steep, square, 0), share
+    fraction = np.where(outside, rest, np.where(steep, ratio - rest, 1 - ratio * rest))
+    return np.where(outside | steep, square, 0), fraction

@@ -1,9 +1,9 @@
 """The angular spectrum of a steep pupil, from samples of its light convolved with a Gaussian (`smooth_pupil`).
 
-Samples of all light of a rough relief would need the pitch of its steepest slopes, even if nearly all of this light
-misses the window or is evanescent. The convolved light needs the pitch of the light that arrives in the window. Its
-spectrum is divided by that of the Gaussian, and propagated as in `angular_spectrum`. Light beyond the `reach` of the
-problem is removed.
+Samples of all light behind a rough relief would have to resolve its steepest slopes, even if nearly all of this light
+misses the window or is evanescent. Samples of the convolved light only have to resolve the light that arrives in the
+window. The spectrum of the convolved light is divided by that of the Gaussian, and propagated as in `angular_spectrum`.
+Light beyond the `reach` of the problem is removed.
 """
 
 from __future__ import annotations
@@ -33,20 +33,22 @@ from optics.numerics.precision import padded_for_packets, precision
 
 __all__ = ["SmoothSpectrum", "may_be_steep", "smooth_spectrum"]
 
-# Choices. Largest error of the amplitude due to the third derivative of the phase, relative to the tolerance; largest
-# exponent by which the Gaussian attenuates light in the window, at a tolerance of 0.01; and light that the samples
-# alias, relative to the tolerance. See test_smooth_spectrum.py.
-CUBIC, ATTENUATED, ALIASED = 0.5, 2.5, 0.02
+# Choices, see test_smooth_spectrum.py.
+CUBIC = 0.5  # largest error of the amplitude due to the third derivative of the phase, relative to the tolerance
+ATTENUATED = 2.5  # largest a, where e^{-a} is the Gaussian's factor on light in the window, at a tolerance of 0.01
+ALIASED = 0.02  # largest amplitude of aliased light, relative to the tolerance
 AT_ONCE = 2**19  # choice: samples of columns that are transformed at once
 SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
 
 
 @dataclass(frozen=True)
 class SmoothSpectrum(SpectrumSampling):
-    """Spectrum of a pupil whose light is convolved with a Gaussian. pupil_period: number of its samples per period.
+    """Spectrum of a pupil whose light is convolved with a Gaussian.
 
-    blur: width [m] of a further Gaussian, with which the light is convolved numerically before it is sampled for the
-        spectrum. The Gaussian of the closed form may be too narrow for the longest possible pitch. 0: none.
+    smooth: pupil with the Gaussian of the closed form.
+    blur: width [m] of a second Gaussian, with which the light is convolved numerically. It allows a longer pitch if the
+        Gaussian of the closed form is narrow. 0: none.
+    pupil_period: number of the pupil's samples per period.
     """
 
     smooth: SmoothPupil
@@ -64,12 +66,12 @@ class SmoothSpectrum(SpectrumSampling):
 
     @cached_property
     def pupil(self) -> Grid:
-        """Samples from which the spectrum is computed."""
+        """Grid of the samples from which the spectrum is computed."""
         return _samples(self.smooth.outermost + REACH * self.blur, self.period / self.pupil_period)
 
     @cached_property
     def closed_form(self) -> Grid:
-        """Samples at which the convolved light is computed in closed form."""
+        """Grid of the samples at which the convolved light is computed in closed form."""
         if self.blur == 0:
             return self.pupil
         return _samples(self.smooth.outermost, _pitch(self.taper.end, self.smooth.width, self.tolerance))
@@ -102,9 +104,9 @@ class SmoothSpectrum(SpectrumSampling):
         return found
 
     def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
-        """Return the transfer function to the window, divided by the spectrum e^{-2π²δ²f²} of the Gaussian.
+        """Return the transfer function to the window, divided by the spectrum of both Gaussians, complex (fy, fx).
 
-        It is even, so the result is the quarter with frequencies of at least 0.
+        The function is even along both axes, so only its values at non-negative frequencies are returned.
         """
         found = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
         exponent = 2 * math.pi**2 * (self.smooth.width**2 + self.blur**2)
@@ -116,7 +118,7 @@ class SmoothSpectrum(SpectrumSampling):
         """Return the field over the window (y, x), times the squared number of samples per period.
 
         The sums along y, to the spectrum and back, are computed for some columns at a time, which fit into the cache.
-        The first sample is the origin of all transforms, and phases that are linear in the frequency move it.
+        All transforms have the first sample as their origin. Phases that are linear in the frequency correct this.
         """
         from scipy import fft
 
@@ -138,7 +140,10 @@ class SmoothSpectrum(SpectrumSampling):
 
 
 def _centred(spectrum: np.ndarray, top: int) -> np.ndarray:
-    """Return the frequencies from -top to top of lines in FFT order."""
+    """Return the part of a spectrum between the frequencies -top and top, (line, 2 top + 1).
+
+    spectrum: lines in the order of the FFT, (line, frequency).
+    """
     return np.concatenate([spectrum[:, len(spectrum[0]) - top :], spectrum[:, : top + 1]], axis=1)
 
 
@@ -146,7 +151,7 @@ def _back(spectrum: np.ndarray, top: int, period: int) -> np.ndarray:
     """Return Σ_k U[k] exp(2πi j k / period) over k from -top to top, for j from 0 to period - 1, along axis 1."""
     from scipy import fft
 
-    before = -top % period  # frequencies that the samples do not distinguish are added
+    before = -top % period  # frequencies that differ by multiples of `period` are added
     wrapped = np.zeros((len(spectrum), -(-(before + 2 * top + 1) // period) * period), spectrum.dtype)
     wrapped[:, before : before + 2 * top + 1] = spectrum
     if wrapped.shape[1] > period:
@@ -167,7 +172,7 @@ def may_be_steep(beam: Beam) -> bool:
 
 
 def smooth_spectrum(problem: Problem) -> list[SmoothSpectrum]:
-    """Return samplings with which the spectrum meets the problem's tolerance, for tapers with increasing blur."""
+    """Return samplings with which the spectrum meets the problem's tolerance, one for each taper."""
     third = _third_derivative(problem)
     return [_sampling(problem, taper, third) for taper in tapers(problem)]
 
@@ -187,9 +192,10 @@ def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
 
 
 def _pitch(band: float, width: float, tolerance: float) -> float:
-    """Return the sampling pitch [m] for a band [1/m] of light that is convolved with a Gaussian of this width [m].
+    """Return the sampling pitch [m] for light that is convolved with a Gaussian of this width [m].
 
-    The Gaussian attenuates light that is aliased onto the band more than light in the band.
+    Sampling aliases the frequency 1/pitch - band onto the edge of the band [1/m]. The pitch is the one for which the
+    Gaussian attenuates the aliased light by the factor ALIASED * tolerance relative to the light at the edge.
     """
     exponent = math.log(1 / (ALIASED * tolerance))
     return 1 / (band + math.sqrt(band**2 + exponent / (2 * (math.pi * width) ** 2)))
@@ -200,7 +206,7 @@ def _samples(outermost: float, pitch: float) -> Grid:
 
 
 def _third_derivative(problem: Problem) -> float:
-    """Return the largest third derivative of the phase behind the pupil, in cycles [1/m³], or 1/radius³ if larger."""
+    """Return the largest third derivative of the phase behind the pupil [cycles/m³], but at least 1/radius³."""
     slopes = problem.slopes
     along = slopes.along_x / problem.light.wavelength, slopes.along_y / problem.light.wavelength
     xx, yy = _gradient(along[0], slopes.grid.dx)[0], _gradient(along[1], slopes.grid.dx)[1]

@@ -29,7 +29,9 @@ MOMENT = (0.0, 0.0, 1.0, 0.0, 1.0)
 
 
 def smythe(beam: Beam, window: Grid, propagated: Callable[[Beam], np.ndarray]) -> np.ndarray:
-    """Return Ex, Ey, Ez for light that is polarised along x in front of the pupil, and the same for y, (6, y, x).
+    """Return the field Ex, Ey, Ez over the window for light polarised along x, and then along y, (6, y, x), complex.
+
+    The polarisation is that of the light in front of the pupil.
 
     propagated: function that returns the scalar field of a beam over the window, (y, x).
     """

@@ -13,7 +13,7 @@ __all__ = ["FADES", "TAPER_END_SINE", "Taper", "tapers"]
 
 # Choice: sine at which the taper must end at the latest, because z tan θ has no bound at grazing incidence.
 TAPER_END_SINE = 0.9995
-# Choice: blurs to try, relative to the size of the pupil plus that of the window.
+# Choice: blurs of the tapers to try, relative to the radius of the pupil plus that of the window.
 FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 
@@ -56,13 +56,13 @@ class Taper:
 
         steepness = 2 / self.width * math.sqrt(math.pi * self.width * self.blur / 2)
         middle = self.band + self.width / 2
-        # f - m = (f² - m²) / (f + m), so a root of low precision is sufficient.
+        # With m the middle, f - m is (f² - m²) / (f + m), so a square root of low precision is sufficient for f.
         beyond = types.Float((f2 - opaque(types, middle**2)) * opaque(types, steepness / middle))
         return (1 - dr.erf(beyond / (1 + dr.sqrt(types.Float(f2 * opaque(types, middle**-2)))))) / 2
 
 
 def tapers(problem: Problem) -> list[Taper]:
-    """Return the tapers that end before grazing incidence."""
+    """Return the tapers that end before grazing incidence, in the order of increasing blur."""
     size = problem.radius + problem.outermost
-    found = [Taper.for_problem(problem, share * size) for share in FADES]
+    found = [Taper.for_problem(problem, blur * size) for blur in FADES]
     return [taper for taper in found if taper.sine < TAPER_END_SINE]

@@ -44,10 +44,12 @@ class SpectrumSampling:
 
     @cached_property
     def spectrum(self) -> Grid:
+        """Grid of the spatial frequencies [1/m]."""
         return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
 
     @cached_property
     def relay(self) -> Grid:
+        """Grid [m] of the relay plane, from which the split method continues with Fresnel's integral."""
         return Grid.square(self.output_period, self.period / self.output_period)
 
     def part(self, grid: Grid) -> Grid:
@@ -68,17 +70,17 @@ class SpectrumSampling:
         return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
 
     def sum_bytes(self, start: Grid, end: Grid, dtype: str) -> float:
-        """Return the memory of a sum between the stored samples of two planes, or between blocks of them."""
+        """Return the memory [bytes] of a sum from some stored samples of one plane to some of another."""
         return predicted_bytes(start.shape, end.shape, ITEM_BYTES[dtype])
 
     def bytes_from_spectrum(self, window: Grid, dtype: str) -> float:
-        """Return the predicted memory of the transforms from the spectrum to the window."""
+        """Return the predicted memory [bytes] of the transforms from the spectrum to the window."""
         planes = [self.spectrum, window] if self.is_whole else [self.spectrum, self.relay, window]
         stored = [self.part(plane) for plane in planes]
         return max(self.sum_bytes(*pair, dtype) for pair in pairwise(stored))
 
     def seconds_from_spectrum(self, window: Grid) -> float:
-        """Return the predicted time of the transforms from the spectrum to the window."""
+        """Return the predicted time [s] of the transforms from the spectrum to the window."""
         if self.is_whole:
             return self.sum_seconds(self.spectrum, self.output_period, window)
         to_relay = self.sum_seconds(self.spectrum, self.output_period, self.relay)
@@ -95,5 +97,5 @@ class SpectrumSampling:
         return field * Field.from_waves(1.0, waves, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
         return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx

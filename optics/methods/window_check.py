@@ -1,9 +1,9 @@
 """The error of a PSF from few samples of the pupil, by a sum over other samples in a few rows and columns.
 
-The other samples are finer, their grid is shifted by a fraction of the pitch that is not a simple ratio, and their edge
-is sharper. The comparison therefore shows light that the samples alias, detail that they miss, and the softness of the
-edge. It also shows the error of the rank, because the check interpolates the slow factor over the pupil instead of the
-window. The sum has an error of its own, which is at most half of the error that it finds.
+The other samples are finer, and their edge is sharper. Their grid is shifted by a fraction of the pitch that is not a
+simple ratio. The comparison therefore shows the errors due to aliased light, to detail between the samples, and to the
+soft edge. It also shows the error due to the rank, because the check interpolates the slow factor over the pupil
+instead of the window. The error of the sum itself is at most half of the error that it finds.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ __all__ = ["window_errors"]
 
 CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_sampling.py
 ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
-SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
-INTERPOLATED = 2e-4  # choice: error of the interpolated kernel of the check
-# Choices: numbers of interpolation points across the pupil, and phases [rad] from which on each is too small.
+SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the four distributions of rows and columns, see `_drawn`
+INTERPOLATED = 2e-4  # choice: allowed error of the slow factor that the check interpolates
+# Choices: numbers of interpolation points across the pupil, and phases [rad] at which each but the last is too small.
 ORDERS, PHASES = (3, 5, 7, 9, 12, 16), (0.1, 0.6, 1.5, 3.0, 6.0)
 
 
@@ -52,7 +52,7 @@ def window_errors(samples: SineSamples, path: Path, light: np.ndarray, images: n
     exact = _at_points(samples, path, light, u, v)
     drawn = images[np.arange(len(images))[:, None, None], rows[:, :, None], columns[:, None, :]]
     squared = np.mean(np.square(drawn - exact) / chance, (1, 2))
-    # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the exact PSF
+    # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the darker of the two
     bright = np.minimum(total, np.mean(np.square(exact) / chance, (1, 2)))
     total = np.where(squared > 0.01 * total, bright, total)
     rounding = float(np.finfo(light.real.dtype).eps)
@@ -63,7 +63,7 @@ def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarra
     """Return |U|² in columns u and rows v [m], relative to the middle of the window, (stack, v, u).
 
     The slow factor G is interpolated from a few points (ξ_a, η_b) of the pupil, with weights L_a and L_b. P is the
-    light:
+    light behind the pupil, and s and t are the sines of its rays:
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v)/G(ξ_a, η_b; 0, 0) Σ_ηξ L_b e^{-ik v t} P G(ξ, η; 0, 0) L_a e^{-ik u s}.
     """
@@ -80,7 +80,7 @@ def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarra
 
 @lru_cache(maxsize=64)
 def _in_middle(samples: SineSamples, path: Path) -> np.ndarray:
-    """Return the slow factor of all samples for the middle of the window, (y, x)."""
+    """Return the slow factor between all samples and the middle of the window, complex (y, x)."""
     middle = np.zeros(1), np.zeros(1)
     return slow_factor(path, samples.points, (samples.at[None, :], samples.at[:, None]), middle)
 
@@ -94,10 +94,11 @@ def _interpolated_kernel(path: Path, place: np.ndarray, sines: np.ndarray, weigh
 def _ratios(
     samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray, dtype: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return interpolation points in sines, and the slow factor there relative to the middle, (stack, v, u, b, a).
+    """Return interpolation points in sines, and the slow factor G(·; u, v)/G(·; 0, 0) there, (stack, v, u, b, a).
 
-    The interpolation is compared with the factor at the rim, for the outermost columns and rows of all windows. The
-    search starts with a number of points that is usually sufficient for the phase there.
+    The number of points is increased until the interpolated factor equals the exact one, up to an error of
+    INTERPOLATED, on the pupil's rim and for the outermost columns and rows. The first number is usually sufficient for
+    the largest phase of the factor there.
     """
 
     def ratio(directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -122,11 +123,12 @@ def _ratios(
 
 
 def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the rows and columns of a grid of samples of each PSF, and the probability of each sample.
+    """Return rows and columns of each PSF, and the probability with which each of their crossings is drawn.
 
-    Rows and columns are drawn at even steps of their cumulative probabilities. If the amplitude has the same error
-    everywhere, the error of the intensity is proportional to the square root of the intensity. Other errors are next to
-    the brightest samples, or at the sides of the window, where phases change fastest.
+    Rows and columns are drawn at even steps of their cumulative probabilities. These are a mixture of four
+    distributions. The first is uniform. The second is proportional to the square root of the intensity, like the error
+    of the intensity if the error of the amplitude is the same everywhere. The third favours the brightest samples and
+    their neighbours, and the last the sides of the window, where phases change fastest.
 
     The shapes are (stack, row), (stack, column) and (stack, row, column).
     """

@@ -22,10 +22,10 @@ RANK_OF_DISTANCE = 3  # least rank for derivatives by the distance, which are qu
 
 
 def window_rank(problem: Problem, samples: SineSamples, half: float) -> int | None:
-    """Return the necessary rank; None if it is too large.
+    """Return the necessary rank; None if it exceeds MOST_RANK.
 
-    The rank suffices at the end points of rays, around which the light arrives. If derivatives are requested, light may
-    move anywhere. The rank then also suffices on average over the whole window.
+    The rank is sufficient at the end points of rays, around which the light arrives. If derivatives are requested,
+    light may move anywhere. The rank is then also sufficient on average over the whole window.
 
     half: distance [m] from the middle of the window within which the interpolation points lie.
     """
@@ -56,8 +56,9 @@ def _error(
     points: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> float:
-    """Return the root mean square error of the slow factor that is interpolated from nodes of the window.
+    """Return the root mean square error of the slow factor (without axis factors) interpolated from nodes.
 
+    nodes: positions [m] of the nodes along either axis, relative to the middle of the window.
     points: points (x, y) [m] of the pupil.
     window: positions (u, v) [m] relative to the middle of the window, which broadcast with the points.
     """

@@ -1,12 +1,12 @@
 """The method "low_rank" at coarse tolerances: as few samples of the pupil as the light in the window needs.
 
-Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
-width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
-diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. The softer edge only
-changes light far from the geometrical rays of the edge, where there is little light.
+Samples at the pitch Δs, in sines, repeat the image with the period λ/Δs. The period must be at least half the width of
+the window, plus the distance from the middle within which nearly all light arrives. Light that the edge of the pupil
+diffracts spreads further. A soft edge keeps the copies of this light out of the window. The soft edge only changes
+light far from the geometrical rays of the edge, where there is little light.
 
-All of these values are estimates. Every PSF is therefore compared with a sum over finer samples in a few rows and
-columns (`window_check`).
+The period and the softness follow from estimates. Every PSF is therefore compared with a sum over finer samples in a
+few rows and columns (`window_check`).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling save
 # the passband relative to that of the whole spectrum.
 RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
 # Choices for the number of samples, at a tolerance of 0.01: neglected fraction of the light; cycles per radius for the
-# edge; these cycles relative to those of the rays at the edge; exponent of the tolerance.
+# edge; additional cycles for the edge, per cycle of the rays near it; exponent of the tolerance for the edge.
 NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 3.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
 CELL_CYCLES = 0.375  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
@@ -104,7 +104,7 @@ class WindowSampling:
         return _window_sums(self.pupil, self.rank, self.half_width, path, dtype)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which the light of rounding errors is spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
         return problem.wavelength / self.pupil.grid.dx
 
     @property
@@ -114,7 +114,7 @@ class WindowSampling:
     def error(self, beam: Beam, problem: Problem, image: np.ndarray) -> float | None:
         """Return the relative L2 error of the intensity over the window, see `window_errors`; None without light.
 
-        image: |U|² over the window, divided by the area of the pupil, flat.
+        image: |U|² over the window, divided by the area of the pupil [1/m²], flat.
         """
         light, seen = self.finer.light(beam, problem.dtype), image.reshape(1, *problem.window.shape)
         error = window_errors(self.finer, Path.from_problem(problem), light[None], seen * beam.pupil.area)
@@ -152,8 +152,8 @@ def _density(problem: Problem, half: float) -> float:
     radius, tolerance = problem.radius, problem.tolerance
     along, outward = problem.sampled_slopes.to_window(problem.distance, problem.window.centre, problem.medium_n)
     cycles = np.sort(along) * radius / (problem.wavelength * problem.medium_n)
-    share = NEGLECTED * min(tolerance / 0.01, 1.0) ** 2
-    reach = float(cycles[max(0, math.ceil(len(cycles) * (1 - share)) - 1)])
+    neglected = NEGLECTED * min(tolerance / 0.01, 1.0) ** 2
+    reach = float(cycles[max(0, math.ceil(len(cycles) * (1 - neglected)) - 1)])
     rim = float(np.median(along[outward > RIM])) * radius / (problem.wavelength * problem.medium_n)
     window = half * radius / (problem.wavelength * problem.distance)
     cells = 0.0 if problem.knots is None else (len(problem.knots.borders) - 1) * CELL_CYCLES

@@ -44,8 +44,8 @@ def like(x: Array, value: Any) -> Array:
         _refuse_mixture(value)
         value = plain(value)
     if own.__name__ == "torch":
-        held = value if is_differentiable(value) else own.tensor(value, dtype=x.dtype)
-        return held.to(x.device, x.dtype)
+        tensor = value if is_differentiable(value) else own.tensor(value, dtype=x.dtype)
+        return tensor.to(x.device, x.dtype)
     if is_differentiable(value):
         return type(x)(own.ravel(value))
     return type(x)(padded_for_packets(value)) if isinstance(value, np.ndarray) else own.opaque(type(x), value)

@@ -54,9 +54,11 @@ def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int 
 def _cosines(
     types: Precision, n_out: int, n_in: int, period: Scalar, first: int = 0, count: int | None = None
 ) -> Array:
-    """Return the weights (k, j) of sample j together with its mirror image for frequency k, both counted from 0.
+    """Return the matrix (k, j) of the cosines with which samples contribute to frequencies, both counted from 0.
 
-    first, count: first sample j and number of samples; None: all.
+    An entry is the contribution of sample j plus that of its mirror image.
+
+    first, count: first sample j and number of samples. None: all samples from `first` on.
     """
     import drjit as dr
 

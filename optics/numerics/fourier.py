@@ -5,7 +5,7 @@ One function, `dft2`, computes all transforms of this package:
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
 The period may have any value, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT
-can be used instead. `dft2` selects the one with the shorter predicted time (optics.numerics.cost). Dr.Jit's matrix
+can be used instead. `dft2` selects the faster of both by their predicted times (optics.numerics.cost). Dr.Jit's matrix
 product executes more operations per second, but SciPy's FFT needs fewer operations. Matrices are therefore faster for
 small windows, and the FFT is faster for large windows. Both are differentiable.
 """
@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 LONGEST_FFT = 2**31
-SUM_ARRAYS = 4  # number of real arrays that each complex array of a sum needs: two parts, each with a temporary array
+SUM_ARRAYS = 4  # real arrays that each complex array of a sum needs: two parts, each with a temporary array
 AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a megabyte), and fewest lines
 
 
@@ -106,8 +106,9 @@ def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> n
 
 
 def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
-    """Return u[j] exp(±2πi j·c / period). Its sum at samples k equals the sum of `field` at samples k + c.
+    """Return u[j] exp(±2πi j·c / period), whose sum at samples k equals the sum of u at samples k + c.
 
+    field: u.
     by: ±c, (x, y), in samples of the output. Fractions are allowed.
     """
     types = field.types
@@ -149,7 +150,7 @@ def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int,
 
 
 def kept_indices(across: int) -> np.ndarray:
-    """Return the `across` indices nearest 0 in FFT order: 0, 1, …, -2, -1. They are the same for every period."""
+    """Return the `across` indices nearest 0 in FFT order, 0, 1, …, -2, -1, where -1 is the last sample of a period."""
     kept = np.arange(across) - across // 2
     return np.roll(kept, -(across // 2))
 

@@ -113,7 +113,7 @@ def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[li
     """Return the sums and the differences of rows j and -j, after the sum along x.
 
     across: sums along x in the form that `_both_sides` combines.
-    size: number of rows, and of results in each.
+    size: number of rows j and number of results along x.
     """
     ny, mx = size
     shape = ny // 2 + 1, mx
@@ -155,6 +155,7 @@ def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, t
 
 
 def _read(part: Array, ahead: Array, behind: Array, there: Array) -> Parts:
+    """Return the elements at the indices `ahead`, with 0 outside the mask `there`, and those at `behind`."""
     import drjit as dr
 
     return dr.gather(type(part), part, ahead, there), dr.gather(type(part), part, behind)

@@ -163,7 +163,7 @@ def chebyshev_basis(x: np.ndarray, n: int) -> np.ndarray:
     nodes, angle = chebyshev_points(n), np.pi * (np.arange(n) + 0.5) / n
     apart = np.asarray(x)[..., None] - nodes
     hit = apart == 0
-    share = (-1.0) ** np.arange(n) * np.sin(angle) / np.where(hit, 1, apart)
-    share = np.where(hit.any(-1, keepdims=True), hit, share)
-    found: np.ndarray = share / share.sum(-1, keepdims=True)
+    weight = (-1.0) ** np.arange(n) * np.sin(angle) / np.where(hit, 1, apart)
+    weight = np.where(hit.any(-1, keepdims=True), hit, weight)
+    found: np.ndarray = weight / weight.sum(-1, keepdims=True)
     return found

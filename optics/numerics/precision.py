@@ -15,7 +15,7 @@ from optics.numerics.device import Device, make_ready
 
 __all__ = ["PACKET", "Precision", "aligned", "opaque", "padded_for_packets", "precision"]
 
-PACKET = 128  # [bytes] what a processor reads at once at most: sixteen float64 (AVX-512)
+PACKET = 128  # largest number of bytes that a processor reads at once: sixteen float64 numbers (AVX-512)
 
 
 @dataclass(frozen=True)

@@ -78,8 +78,8 @@ def _tabulated(ommatidium: Ommatidium, wavelengths: tuple[float, ...], loss: flo
         half = min(half, STEEPEST[-1])
         side = math.ceil(half / pitch)
         grid = Grid((2 * side + 1,) * 2, pitch)
-        found, shares = zip(*(_accepted(ommatidium, at, grid) for at in wavelengths), strict=True)
-        if min(shares) >= 1 - loss or half == STEEPEST[-1]:
+        found, contained = zip(*(_accepted(ommatidium, at, grid) for at in wavelengths), strict=True)
+        if min(contained) >= 1 - loss or half == STEEPEST[-1]:
             break
         half *= WIDER
     sines = pitch * np.arange(-side, side + 1)
@@ -89,9 +89,9 @@ def _tabulated(ommatidium: Ommatidium, wavelengths: tuple[float, ...], loss: flo
 
 
 def _accepted(ommatidium: Ommatidium, wavelength: float, grid: Grid) -> tuple[np.ndarray, float]:
-    """Return the accepted fraction for a grid of direction sines, and the part of all accepted light in the grid."""
+    """Return the accepted fraction for a grid of sines (y, x), and its integral relative to that over all sines."""
     steepest = math.hypot(grid.dx * grid.shape[0] / 2, grid.dx * grid.shape[1] / 2)
-    caught: ModesAtPupil = coupled_modes(ommatidium, wavelength, next((s for s in STEEPEST if s >= steepest), 1.0))
+    coupled: ModesAtPupil = coupled_modes(ommatidium, wavelength, next((s for s in STEEPEST if s >= steepest), 1.0))
     taken = np.array([ommatidium.rhabdom.absorbed(mode) for mode in ommatidium.modes(wavelength)])
-    values = np.maximum(caught.power_on(grid, taken, DIGITS), 0)
-    return values, float(values.sum() * grid.dx**2 / caught.total(taken))
+    values = np.maximum(coupled.power_on(grid, taken, DIGITS), 0)
+    return values, float(values.sum() * grid.dx**2 / coupled.total(taken))

@@ -76,8 +76,8 @@ class ModesAtPupil:
         found = np.zeros(sines.shape)
         for start in range(0, len(taken), TOGETHER):
             some = slice(start, start + TOGETHER)
-            for amplitude, share in zip(sums.evaluate(self.weights[some] * middle), taken[some], strict=True):
-                found += share * (amplitude.real**2 + amplitude.imag**2)
+            for amplitude, weight in zip(sums.evaluate(self.weights[some] * middle), taken[some], strict=True):
+                found += weight * (amplitude.real**2 + amplitude.imag**2)
         return found / self.area
 
     def total(self, taken: np.ndarray) -> float:

@@ -17,8 +17,8 @@ from optics.ommatidia.ommatidium import Ommatidium
 __all__ = ["AppositionEye", "hexagonal_directions"]
 
 MOST_RINGS = 60
-EVERY = 2  # choice: every second sample of the acceptance function is used, which are four per λ/D
-LOST = 0.01  # choice: fraction of the accepted light that a field may lose, because tails reach far
+EVERY = 2  # choice: every second sample of the acceptance function is used, which leaves four per λ/D
+LOST = 0.01  # choice: fraction of the accepted light that a field may lose, because its tails are wide
 MOST = 2**22  # choice: largest number of directions at which a radiance is evaluated at once
 
 
@@ -68,7 +68,8 @@ class AppositionEye:
     def field(self, wavelength: float = 500e-9) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return directions x, y [rad] relative to the ommatidium's axis, flat, and their weights, which sum to 1.
 
-        They are every second sample of `acceptance_function`, and contain at least 99 % of the accepted light.
+        The directions are every second sample of `acceptance_function`. They contain at least 99 % of the accepted
+        light.
         """
         accepted = acceptance_function(self.ommatidium, np.array([vacuum_wavelength(wavelength)]), LOST)
         samples = slice(len(accepted.sines) // 2 % EVERY, None, EVERY)  # contains the axis

@@ -71,7 +71,7 @@ def radiated(
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
     """Return G D² at points at the distances D = z/cos θ, as a function of the mode's number.
 
-    It is interpolated linearly between close points. G is defined at the top of the module.
+    It is interpolated linearly between closely spaced points. G is defined at the top of the module.
     """
     z = float((distance * np.sqrt(1 - sine**2)).mean())
     sines = 0.0, float(sine.max()) * (1 + CLEAR)

@@ -25,8 +25,8 @@ __all__ = ["arriving_light"]
 HELD_TOO_MUCH = 1e-2
 DIGITS = 5.0  # choice: digits of the sum over the spectrum
 MOST_PAIRS = 2e8  # choice: largest number of pairs of nodes and frequencies in this sum; they take about a second
-WORTH_MOST = 1e-3  # choice: uncertainty of the fraction from which the sum may have MOST_PAIRS
-STEEPEST = 0.96  # choice: squared sine at which the evanescent light of an edge is limited to that of this sine
+WORTH_MOST = 1e-3  # choice: uncertainty of the estimate above which the sum may have MOST_PAIRS; below, fewer
+STEEPEST = 0.96  # choice: largest squared sine in the formula of `_at_edge`, which diverges at 1
 SURE = 1e-4  # choice: the sum, which has about this error, is computed only if the estimate is less certain
 
 
@@ -50,7 +50,7 @@ def arriving_light(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]
 
 
 def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
-    """Return the fraction of light that is not evanescent, and its uncertainty.
+    """Return the fraction of light that is not evanescent, and its uncertainty, (wavelength,).
 
     The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge.
     For an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent, see `_at_edge`. This
@@ -102,12 +102,12 @@ def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
 
 
 def _at_edge(request: Request) -> Array:
-    """Return the factor by which the directions of rays at an edge change its evanescent light.
+    """Return the evanescent light of an edge, divided by that for rays along the axis.
 
-    The light at a point of the edge is spread along the line s + t n of frequencies, in units of 1/λ. Here s is the
-    frequency of the ray, and n is the normal of the edge. Its power is proportional to 1/t². The line leaves the unit
-    circle at t = -s·n ± √((s·n)² + 1 - s²). The power outside the circle is √((s·n)² + 1 - s²) / (1 - s²) times the
-    power for s = 0.
+    A point of the edge spreads its light along the line s + t n of frequencies, in units of 1/λ. Here s is the
+    frequency of the ray, and n is the normal of the edge. The power of this light is proportional to 1/t². The line
+    leaves the unit circle at t = -s·n ± √((s·n)² + 1 - s²). The power outside the circle is √((s·n)² + 1 - s²) / (1 -
+    s²) times the power for s = 0. The result is the mean over the edge.
     """
     import drjit as dr
 
@@ -143,12 +143,12 @@ def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
 
 
 def _summed(request: Request, unsure: float = 1.0) -> Array | None:
-    """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum is too long.
+    """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum would take too long.
 
-    unsure: uncertainty of the estimate. The sum may take longer if it is large.
+    The fraction is ∫ |F(u)|² df / A over |f| < 1/λ, with the field u behind the pupil and the area A of its aperture.
+    Lengths are in units of the radius. |F(u)|² has no structure finer than one cycle per diameter.
 
-    It is ∫ |F(u)|² df / A over |f| < 1/λ, with the field u behind the pupil and the area A of its aperture. Lengths are
-    in units of the radius. |F(u)|² has no structure finer than one cycle per diameter.
+    unsure: uncertainty of the estimate. The larger it is, the longer the sum may take.
     """
     beam, asked = request.beam, request.problem
     problem = Problem.from_beam(beam, asked.window, asked.tolerance, asked.dtype, derivatives=False)
@@ -212,7 +212,7 @@ class _Sum:
 
     @staticmethod
     def _slopes(at: Sequence[Array], places: Sequence[Array], back: Sequence[Array], total: Array) -> tuple[Array, ...]:
-        """Return the derivatives of `fraction` by h, by the waves and by the amplitudes of the nodes.
+        """Return the derivatives of `fraction` with respect to h, and to the waves and the amplitudes of the nodes.
 
         at: h, waves and amplitudes
         places: x, y of the nodes, and sx, sy of the frequencies
@@ -221,7 +221,7 @@ class _Sum:
         import drjit as dr
 
         (h, waves, u), (x, y, sx, sy) = at, places
-        # The sum over frequencies has the opposite roles of nodes and frequencies, and the sign of the phase is kept.
+        # These sums over frequencies have the same phases as the sum over nodes, including the sign.
         re, im = _sums((h * x, h * y, 0.0), (sx, sy, 0 * sx, *back))
         re, im = _turned(re, im, waves)
         along_x = _turned(*_sums((h * x, h * y, 0.0), (sx, sy, 0 * sx, sx * back[0], sx * back[1])), waves)

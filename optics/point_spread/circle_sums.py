@@ -1,9 +1,9 @@
 """Sums over samples within circles about one centre, computed for all circles at once.
 
-Sums over samples are integrals if frequencies that alias onto those of the intensity are removed. The weights for a
-circle of radius R are therefore the circle's indicator function, convolved with a kernel. The kernel's radial spectrum
-G is 1 at the intensity's frequencies, and 0 at frequencies that alias onto them. At the distance ρ from the centre, the
-weight is
+A weighted sum over samples equals an integral if the weights contain no frequencies that alias onto those of the
+intensity. The weights for a circle of radius R are therefore the circle's indicator function, convolved with a kernel.
+The kernel's radial spectrum G is 1 at the intensity's frequencies, and 0 at frequencies that alias onto them. At the
+distance ρ from the centre, the weight is
 
     w(ρ, R) = 2π R ∫ G(f) J₁(2πRf) J₀(2πρf) df
 
@@ -64,8 +64,8 @@ class SoftCircles:
         cycles = end * (float(at.max(initial=0.0)) + float(wide.max()))
         node, weight = gauss_legendre(gauss_legendre_count(cycles, -math.log10(error)))
         f = end * node
-        share = 2 * math.pi * end * weight * _spectrum(kernel, f)
-        back = share[:, None] * wide * j1(2 * math.pi * np.multiply.outer(f, wide))
+        passed = 2 * math.pi * end * weight * _spectrum(kernel, f)
+        back = passed[:, None] * wide * j1(2 * math.pi * np.multiply.outer(f, wide))
         return cls(near, samples, j0(2 * math.pi * np.multiply.outer(at, f)), back, circles, distance.size)
 
     def evaluate(self, values: np.ndarray) -> np.ndarray:
@@ -110,11 +110,13 @@ def soft_sums(circles: SoftCircles, values: Array) -> Array:
 def sums_of_cells(values: Array, distance: np.ndarray, radii: np.ndarray, dx: float) -> Array:
     """Return sums within circles of values that are means over cells, flat (row, radius), with derivatives.
 
-    Cells have the side dx. A cell at the distance ρ has the weight (R - ρ)/dx + 1/2, limited to [0, 1]. The sum is the
-    difference between two values of the function t ↦ Σ v max(t - ρ, 0)/dx. This function follows from the sums of v and
-    of vρ over all cells nearer than t.
+    Cells have the side dx. A cell at the distance ρ has the weight (R - ρ)/dx + 1/2, limited to [0, 1]. The sum of the
+    weighted values v is the difference of the function t ↦ Σ v max(t - ρ, 0)/dx between t = R + dx/2 and t = R - dx/2.
+    This function follows from the sums of v and of vρ over all cells nearer than t.
 
     values: flat Dr.Jit Float64 array (row, sample).
+    distance: distance ρ [m] of each sample from the centre, (sample,).
+    radii: radii R [m] of the circles, (radius,).
     """
     import drjit as dr
 
@@ -136,9 +138,10 @@ def sums_of_cells(values: Array, distance: np.ndarray, radii: np.ndarray, dx: fl
 
 
 def _between(places: np.ndarray, step: float) -> tuple[Any, np.ndarray]:
-    """Return the matrix that interpolates from multiples of `step` to `places` >= 0, and the multiples that it uses.
+    """Return the sparse matrix that interpolates even functions at `places` >= 0, and the nodes of the interpolation.
 
-    The functions are even, so values at positive multiples replace those at negative ones.
+    The nodes are multiples of `step`. Because the functions are even, values at positive nodes replace those at
+    negative ones.
     """
     from scipy.sparse import csr_array
 

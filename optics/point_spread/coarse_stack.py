@@ -26,7 +26,7 @@ __all__ = ["coarse_stack"]
 def coarse_stack(
     stack: WindowStack, without: WindowStack, tolerance: float, method: str
 ) -> tuple[Array, np.ndarray] | None:
-    """Return PSFs (source, wavelength, y, x), and which of them meet the tolerance, (source, wavelength).
+    """Return PSFs (source, wavelength, y, x), and a mask of those that meet the tolerance, (source, wavelength).
 
     The result is None if other methods are faster, or must be used.
 
@@ -34,15 +34,15 @@ def coarse_stack(
     without: the same light without derivatives.
     tolerance, method: see `optics.psf`.
     """
-    # The edge of the aperture is a function of Dr.Jit, so that PyTorch cannot compute derivatives by the radius.
+    # Dr.Jit computes the edge of the aperture, so PyTorch cannot compute derivatives with respect to the radius.
     if tolerance < TIGHTEST or carries_derivative(stack.pupil.aperture_radius):
         return None
     sampling = _sampling(stack, without, tolerance, method)
     if sampling is None:
         return None
     images = stack.intensity(sampling)
-    met: np.ndarray = without.errors(sampling, plain(images)) <= tolerance
-    return images, met  # a dark window has the error NaN, so other methods compute it
+    accurate: np.ndarray = without.errors(sampling, plain(images)) <= tolerance
+    return images, accurate  # a dark window has the error NaN, so other methods compute it
 
 
 def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method: str) -> WindowSampling | None:

@@ -22,7 +22,7 @@ from optics.point_spread.psf_result import PSFResult
 __all__ = ["encircled_energy"]
 
 RIPPLE = 1e-5  # choice: ripple of the circle's spectrum
-CELLS = 20.0  # choice: error of a circle's edge between cells, in units of the ripple
+CELLS = 20.0  # choice: error of sums over values that are means over cells, in units of the ripple
 SPREAD = 0.1  # choice: lower limit of the error in a circle, as a fraction of the error in the whole window
 FINE = 1 / 3  # choice: coarsest pitch for circles in units of 1/cutoff; finer pitches need less area beyond a circle
 
@@ -35,10 +35,10 @@ def encircled_energy(
 ) -> Any:
     """Return the fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m], (wavelength, radius).
 
-    The result for a `WhitePSF` is (type, radius). It is a weighted sum over samples. The weights are the circle,
-    convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies that alias onto
-    them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the circle, which are
-    computed if the window does not contain them.
+    The result for a `WhitePSF` is (type, radius). The fraction is computed as a weighted sum over samples. The weights
+    are the circle, convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies
+    that alias onto them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the
+    circle, which are computed if the window does not contain them.
 
     centre: None for the middle of the PSF's window.
     with_error: True to return (value, predicted error).
@@ -73,20 +73,20 @@ def encircled_energy(
     if not with_error:
         return total
     # The PSF's error may be concentrated in the circle, even if the circle is dark.
-    share = np.maximum(plain(total), SPREAD * plain(seen.window_sums)[:, None]) / plain(seen.window_sums)[:, None]
+    fraction = np.maximum(plain(total), SPREAD * plain(seen.window_sums)[:, None]) / plain(seen.window_sums)[:, None]
     bright = np.pi * wanted**2 * seen.psf.max(axis=(1, 2))[:, None]
-    return total, seen.sum_error[:, None] * share + RIPPLE * (CELLS if kernel is None else np.minimum(bright, 1.0))
+    return total, seen.sum_error[:, None] * fraction + RIPPLE * (CELLS if kernel is None else np.minimum(bright, 1.0))
 
 
 def _around(
     result: PSFResult, middle: tuple[float, float], radius: float, edge: float
 ) -> tuple[PSFResult, SoftEdge | None]:
-    """Return a PSF whose samples suffice for sums within a circle, and the kernel (None for means over cells).
+    """Return a PSF whose samples are sufficient for sums within a circle, and the kernel (None for means over cells).
 
-    Samples are fine enough, and they extend beyond the circle by the reach of the kernel.
+    The samples are fine enough, and they extend beyond the circle by the width of the kernel.
 
     radius: radius [m] of the circle.
-    edge: distance [m] from its centre to the outermost samples.
+    edge: distance [m] from the circle's centre to the outermost samples.
     """
     if result.holds_cells:
         return result, None
@@ -105,9 +105,9 @@ def _around(
 def _kernel(dx: float, cutoff: float, room: float) -> SoftEdge:
     """Return a kernel in units of 1/cutoff that passes the intensity's frequencies and blocks their aliases.
 
-    Its spectrum ends as early as its reach permits, because sums then need fewer nodes.
+    The spectrum ends at the lowest frequency that the width of the kernel permits, because sums then need fewer nodes.
 
-    room: largest reach [m].
+    room: largest distance [m] over which the kernel may extend.
     """
     last = 1 / (dx * cutoff) - 1
     latest = SoftEdge(1.0, last, RIPPLE)

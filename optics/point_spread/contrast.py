@@ -24,7 +24,7 @@ from optics.point_spread.window_loss import ErrorCauses
 
 __all__ = ["combined_mtf", "image_quality", "mtf"]
 
-GROWTHS = 3  # choice: largest number of windows that are tried
+GROWTHS = 3  # choice: largest number of enlarged windows
 ROOM = 0.5  # choice: an enlarged window exceeds the necessary width by √2 to this power
 
 
@@ -86,14 +86,15 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
 
 
 def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: float) -> PSFResult:
-    """Return the PSF over a window that loses at most the tolerance.
+    """Return the PSF over a window that misses at most the fraction `tolerance` of the arriving light.
 
-    If no such window can be computed, the error message states a tolerance that smaller windows meet.
-
-    The intensity of diffracted light falls like r⁻³ with the distance r, so the loss of a window is proportional to the
-    inverse of its width. Widths and pitches change in steps, so that a small change of the pupil changes neither.
+    The intensity of diffracted light falls like r⁻³ with the distance r, so the light that a window misses is inversely
+    proportional to its width. Widths and pitches change in steps, so that a small change of the pupil changes neither.
 
     known, unsure: fraction of the light that arrives, and its uncertainty, (wavelength,).
+
+    Raises:
+        AccuracyError: no such window can be computed. The message states a tolerance that smaller windows meet.
     """
     seen, coarsest = result, 0.5 / result.highest_cutoff
     for _ in range(GROWTHS):
@@ -116,7 +117,7 @@ def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: f
 
 
 def _looser(error: float) -> str:
-    """Return advice on the next larger tolerance with one digit above this error; empty if it would be 1 or more."""
+    """Return advice to use the next tolerance of one digit above this error; empty if it would be 1 or more."""
     step = 10.0 ** math.floor(math.log10(error))
     enough = step * math.ceil(error / step)
     return f"; tolerance={enough:.3g} needs fewer samples" if enough < 1 else ""

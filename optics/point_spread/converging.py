@@ -109,11 +109,13 @@ class Converging(ReadOnlyArrays):
         return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "confirmed by a check against the direct sum")
 
     def _crossed(self, scalar: np.ndarray, window: Grid) -> float:
-        """Return the error of field components to which both planes of polarisation contribute.
+        """Return the error of field components to which light of both planes of polarisation contributes.
 
         A check of a single plane of polarisation does not detect this error. It results from the approximation that the
-        path has the same curvature for the whole pupil. Only the light that rotated rays contribute to the other
-        component interferes. Its fraction is the squared sine of the steepest ray.
+        path has the same curvature for the whole pupil. Only light whose polarisation rotates with its ray contributes
+        to the other component. The fraction of this light is the squared sine of the steepest ray.
+
+        scalar: scalar field over the window, (y, x).
         """
         z, bright = number(self.beam.distance), np.abs(scalar) ** 2
         off = np.add.outer((window.y - self.image[1]) ** 2, (window.x - self.image[0]) ** 2)
@@ -123,9 +125,9 @@ class Converging(ReadOnlyArrays):
         return bend * math.sqrt(float((bright * off**2).sum() / bright.sum())) * squared / 2
 
     def _exact(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        """Return the field from Smythe's integral. All fields use the method that suits the scalar field.
+        """Return the field from Smythe's integral. All components use the samples that suit the scalar field.
 
-        The other fields may need more samples. If a check shows that they do, they are computed again with more.
+        If a check shows that other components need more samples, all are computed again with a smaller tolerance.
         """
         for tolerance in (self.tolerance, self.tolerance / FINER):
             found, plan = self._smythe(window, tolerance)

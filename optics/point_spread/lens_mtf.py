@@ -83,7 +83,7 @@ def lens_mtf(
     lens: from `read_exit_pupils`.
     frequencies: spatial frequencies [1/m] on the image plane, a number or (frequency,).
     shifts: distances [m] by which the image plane is moved along the light, a number or (shift,).
-    weights: share of each wavelength in the light, (wavelength,); they are divided by their sum. None: equal shares.
+    weights: relative weight of each wavelength, (wavelength,). They are divided by their sum. None: equal weights.
     tolerance: largest error of any contrast, see `optics.mtf`.
 
     Raises:
@@ -118,7 +118,10 @@ def lens_mtf(
 def _otf(
     pupils: tuple[ExitPupil, ...], wavelengths: np.ndarray, parts: np.ndarray, f: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, float]:
-    """Return Σ parts OTF at frequencies f (2, n) [1/m], and its predicted error."""
+    """Return Σ parts · OTF at frequencies f (2, n) [1/m], complex (n,), and the predicted error of the sum.
+
+    pupils, parts: exit pupil and weight for each wavelength.
+    """
     total, error, highest = np.zeros(f.shape[1], complex), 0.0, float(np.hypot(*f).max())
     for pupil, wavelength, part in zip(pupils, wavelengths, parts, strict=True):
         if part == 0:

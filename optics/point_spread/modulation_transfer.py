@@ -122,9 +122,9 @@ class MTF(ReadOnlyArrays):
     def errors(self) -> np.ndarray:
         """Predicted error of each contrast, in the shape of `mtf`. Most are far smaller than `predicted_error`.
 
-        Light outside the window changes contrasts at frequencies near 0 by its whole share, and other contrasts much
-        less, see `optics.point_spread.window_loss`. An uncertainty of the total light that arrives changes each
-        contrast in proportion to that contrast.
+        Light outside the window changes contrasts at frequencies near 0 by its fraction of all light, and other
+        contrasts much less, see `optics.point_spread.window_loss`. An uncertainty of the total light that arrives
+        changes each contrast in proportion to that contrast.
         """
         if self.causes is None:
             return read_only(np.broadcast_to(self.predicted_error[:, None, None], self.mtf.shape).copy())
@@ -140,8 +140,8 @@ class MTF(ReadOnlyArrays):
     def _at_nyquist(self) -> np.ndarray:
         """Root mean square of the contrasts at the highest frequencies along each axis, (wavelength,).
 
-        Contrasts beyond these frequencies are of this size, and are aliased. Behind pupils about a wavelength wide,
-        contrasts do not end sharply at the cutoff.
+        Contrasts beyond these frequencies are aliased, and are assumed to be of this size. They exist because the
+        contrasts of pupils about a wavelength wide do not end sharply at the cutoff.
         """
         rim = np.concatenate([self.mtf[:, 0], self.mtf[:, :, 0]], axis=1)
         found: np.ndarray = np.sqrt(np.mean(np.square(rim), axis=1))
@@ -237,16 +237,16 @@ class MTF(ReadOnlyArrays):
 
         types, waves = precision("float64"), self.shares.shape[0]
         turns = np.array([np.outer(f, part).ravel() * self._dx for part in (np.cos(angle), np.sin(angle))])
-        told = (np.abs(turns) <= 0.5 * (1 + 1e-9)).all(axis=0)
-        p, q = np.where(told, turns, 0)
+        resolved = (np.abs(turns) <= 0.5 * (1 + 1e-9)).all(axis=0)
+        p, q = np.where(resolved, turns, 0)
         sums = ScatteredSum(p, q, self.shares.shape[1:], DIGITS)
         re, im = sums_at(sums, types.Float(flat(self.shares)))
-        contrast = dr.sqrt(dr.maximum(re * re + im * im, 1e-300)) * types.Float(np.tile(told, waves))
+        contrast = dr.sqrt(dr.maximum(re * re + im * im, 1e-300)) * types.Float(np.tile(resolved, waves))
         return dr.block_reduce(dr.ReduceOp.Add, contrast, angle.size)
 
 
 def _transforms(shares: Array, dx: float) -> Iterator[Field]:
-    """Yield the transform of the samples at each wavelength; the origin is sample n//2."""
+    """Yield the Fourier transform of the samples at each wavelength, a field (fy, fx); the origin is sample n//2."""
     import drjit as dr
 
     types, (waves, height, width) = precision("float64"), shares.shape

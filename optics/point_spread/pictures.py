@@ -103,7 +103,7 @@ class _Attempt:
 
     @property
     def for_window(self) -> bool:
-        """True if the samples suffice for the light of the window alone."""
+        """True if the samples of the pupil resolve only the light that arrives in the window."""
         return isinstance(self.sampling, WindowSampling)
 
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
@@ -121,8 +121,8 @@ class _Attempt:
         if self.approximates:
             request = replace(request, method="exact")
         else:
-            share = (LAST_TOLERANCE if last else 1.0) * NEXT_TOLERANCE
-            smaller = max(share * problem.tolerance * tolerance / error, 10 * FLOAT_NOISE[problem.dtype])
+            factor = (LAST_TOLERANCE if last else 1.0) * NEXT_TOLERANCE
+            smaller = max(factor * problem.tolerance * tolerance / error, 10 * FLOAT_NOISE[problem.dtype])
             if smaller >= problem.tolerance:
                 return None
             whole = problem.all_light or (self.for_window and smaller < TIGHTEST)
@@ -159,8 +159,8 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
         check_window(problem.window, problem.dtype, len(requests))
     planned: list[tuple[Request, tuple[Plan, Sampling]]] = []
     for request in requests:
-        told = request.after(planned[-1][0], planned[-1][1][0]) if alike and planned else request
-        planned.append((told, told.planned()))
+        own = request.after(planned[-1][0], planned[-1][1][0]) if alike and planned else request
+        planned.append((own, own.planned()))
     started = [_Attempt.at(*each) for each in planned]
     for attempt in started:
         if not isinstance(attempt.image, np.ndarray):
@@ -209,13 +209,13 @@ def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) ->
     """Return the error that follows from the PSF itself, for a PSF without a spot check.
 
     Sampling causes an error of up to half the tolerance. Rounding adds an error δU to the field U, which is as large in
-    a dark window as in a bright one. Assume that the transform spreads the error evenly over a plane of width W. The
-    mean square of δU is then ε² times the mean intensity of the pupil's light on this plane, which is 1/W² in the units
-    of a PSF. The error of the intensity is then 2|U| |δU| + |δU|², so
+    a dark window as in a bright one. Assume that the transform spreads this error evenly over a square of width W. In
+    the units of a PSF, the pupil's light would have the mean intensity 1/W² there, so the mean square of δU is ε²/W²,
+    with ε the relative rounding error. The error of the intensity is 2|U| |δU| + |δU|². Relative to the PSF, it is
 
         rounding = (2 ε √(mean PSF / W²) + ε² / W²) / √(mean PSF²).
 
-    If an approximation predicts a dark window, its error counts as 1, because it misses all light there.
+    If an approximation predicts a dark window, its error counts as 1, because it may miss all light there.
 
     Raises:
         AccuracyError: the window is so dark that rounding errors exceed the tolerance.

@@ -5,10 +5,10 @@ window's centre,
 
     U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²).
 
-c² is z² + ξ² plus the mean squares of the other coordinates. Pupils are sampled in units of their radius. All therefore
-share the soft edge, the positions of samples, and the values of B-splines (for reliefs) and of powers (for Zernike
-polynomials) at these positions. Slight changes of the slow factor's phase over the window are neglected. The error is
-predicted for each PSF from its own light. If the error exceeds the tolerance, `optics.psf` computes the PSF instead.
+P is the light behind the pupil. Π is the product over both axes. Along an axis, c² is z² + ξ², plus the mean squares of
+the other coordinates. In units of the radius, all pupils share the soft edge and the positions of samples, with the
+values of B-splines (for reliefs) and powers (for Zernike polynomials). Changes of the slow factor's phase over the
+window cause an error, which is predicted for each PSF. If it exceeds the tolerance, `optics.psf` computes the PSF.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def _plan(member: Member, samples: _Samples, window: Grid, error: float, leaving
 
 @dataclass(frozen=True, eq=False)
 class _Stack:
-    """Parameters of many members, as arrays (member, 1, 1) of float32."""
+    """Parameters of many members, see `Member.numbers`, as arrays (member, 1, 1) of float32."""
 
     radius: np.ndarray
     wavelength: np.ndarray
@@ -210,7 +210,7 @@ def _light(samples: _Samples, masks: np.ndarray) -> np.ndarray:
 
 
 def _images(stack: _Stack, samples: _Samples, masks: np.ndarray, window: Grid) -> np.ndarray:
-    """Return |U|²/R², (member, y, x)."""
+    """Return |U|²/R² [1/m²] over the window, with R the pupil's radius, (member, y, x)."""
     u = samples.at
     r2 = np.square(stack.radius) * (np.square(u)[:, None] + np.square(u)[None, :])
     square_z = np.square(stack.distance)
@@ -281,7 +281,7 @@ def _rings(window: Grid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _spread(stack: _Stack, window: Grid) -> np.ndarray:
-    """Return the spread [rad] of the slow factor's phase over the pupil, at each ring's outer end, (member, ring)."""
+    """Return the spread [rad] over the pupil of the slow factor's phase at each ring's outer end, (member, ring)."""
     turns = (np.arange(40) + 0.5) * (math.sqrt(5) - 1) / 2
     r = np.sqrt((np.arange(40) + 0.5) / 40)
     xi = stack.radius[:, 0, :, None].astype(np.float64) * (r * np.exp(2j * np.pi * turns))

@@ -106,8 +106,9 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
 def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> float:
     """Return the relative error of the intensity that the direct sum itself has.
 
-    It has two causes. The quadrature has `digits` digits relative to the amplitude of all light in phase, and the
-    relative error of the intensity is twice that of the amplitude. The other cause is the rounding of paths.
+    It has two causes. The first is the quadrature, whose error is 10^-digits times the amplitude that all light would
+    have in phase; the relative error of the intensity is twice that of the amplitude. The second is the rounding of
+    paths.
     """
     return 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
 
@@ -165,7 +166,7 @@ def _finer_detail(beam: Beam, problem: Problem) -> float:
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the flat indices of the points to compare, and the probability with which each was drawn.
 
-    They are drawn at even steps of the cumulative probability, so that no likely point is omitted.
+    The points are drawn at even steps of the cumulative probability, so that no likely point is omitted.
     """
     # If there are few points, each is compared once.
     even = np.full(points, 1 / points)
@@ -197,6 +198,7 @@ def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarra
 
 
 def _at_points(beam: Beam, problem: Problem, reference: _DirectSum, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the exact PSF [1/m²] at points (x, y) [m], (point,)."""
     import drjit as dr
 
     types = precision("float64")
@@ -268,7 +270,7 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of points to sides and corners, and the part of their probabilities that no PSF affects.
+    """Return the nearness of points to sides and corners, and the probabilities that do not depend on the PSF.
 
     Both are flat arrays. The second one is the sum of three of the distributions that `_chances` lists.
 

@@ -228,8 +228,8 @@ def _vertex(result: PSFResult, middle: tuple[int, int] | None = None) -> Peak:
 def _measured_error(result: PSFResult, peak: Peak) -> float:
     """Return the relative error of a peak: its difference from the direct sum, if this is affordable.
 
-    The direct sum is evaluated on 3 x 3 points around the peak, so close that the error of a paraboloid through them is
-    far smaller than that of the PSF's samples.
+    The direct sum is evaluated on 3 x 3 points around the peak. Their pitch is CLOSER times finer than AT_A_PEAK, so
+    the error of a paraboloid through them is PARABOLOID_ERROR / CLOSER^4.
     """
     if result.holds_cells or not result.can_recompute:
         return peak.error

@@ -176,10 +176,10 @@ def white_psf(
         raise ValueError("wavelengths: must not be given; white light covers the receptors' range in `waves` steps")
     within = in_range("tolerance", tolerance, 1e-12, 0.5) * OF_PICTURES
     kinds = receptors_of(receptors)
-    caught, ends = _quantum_catch(light, kinds), kinds.limits_nm
+    catches, ends = _quantum_catch(light, kinds), kinds.limits_nm
     result = psf(pupil, np.linspace(*ends, count) * 1e-9, tolerance=within, **asked)
     while True:
-        found = _weighed(result, caught, ends)
+        found = _weighed(result, catches, ends)
         worst = float(found.spectral_error.max())
         if worst <= tolerance - within:
             return found
@@ -193,10 +193,10 @@ def white_psf(
         result = _with_middles(result, psf(pupil, np.linspace(*ends, count)[1::2] * 1e-9, tolerance=within, **asked))
 
 
-def _weighed(result: PSFResult, caught: np.ndarray, ends: tuple[float, float]) -> WhitePSF:
+def _weighed(result: PSFResult, catches: np.ndarray, ends: tuple[float, float]) -> WhitePSF:
     nodes = np.linspace(*ends, len(result.wavelengths))
-    weights, coarse = caught @ _splines(nodes, ends), np.zeros((len(caught), len(nodes)))
-    coarse[:, ::2] = caught @ _splines(nodes[::2], ends)
+    weights, coarse = catches @ _splines(nodes, ends), np.zeros((len(catches), len(nodes)))
+    coarse[:, ::2] = catches @ _splines(nodes[::2], ends)
     flat = result.psf.reshape(len(nodes), -1).astype(np.float64)
     fine = weights @ flat
     error = LEFT * np.linalg.norm(coarse @ flat - fine, axis=1) / np.linalg.norm(fine, axis=1)
@@ -213,12 +213,12 @@ def _quantum_catch(light: Any, kinds: Any) -> np.ndarray:
     power = np.broadcast_to(given, nm.shape)
     if not (np.isfinite(power).all() and (power >= 0).all()):
         raise ValueError("light: must be finite and not negative over the receptors' range")
-    caught = np.stack([kind.at(nm * 1e-9) * nm * power for kind in kinds.types])
-    caught[:, [0, -1]] /= 2  # trapezoid rule
-    total = caught.sum(axis=1, keepdims=True)
+    catches = np.stack([kind.at(nm * 1e-9) * nm * power for kind in kinds.types])
+    catches[:, [0, -1]] /= 2  # trapezoid rule
+    total = catches.sum(axis=1, keepdims=True)
     if not (total > 0).all():
         raise ValueError(f"light: receptors of type {int(np.argmin(total))} absorb none of it")
-    found: np.ndarray = caught / total
+    found: np.ndarray = catches / total
     return found
 
 
@@ -227,7 +227,7 @@ def _nanometres(ends: tuple[float, float]) -> np.ndarray:
 
 
 def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
-    """Return cubic splines (nm, wavelength). Each is 1 at one of the nodes [nm] and 0 at all others."""
+    """Return cubic splines at steps of 1 nm, (nm, node). Each is 1 at one of the nodes [nm] and 0 at all others."""
     from scipy.interpolate import CubicSpline
 
     found: np.ndarray = CubicSpline(nodes, np.eye(len(nodes)))(_nanometres(ends))
@@ -235,7 +235,7 @@ def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
 
 
 def _with_middles(result: PSFResult, between: PSFResult) -> PSFResult:
-    """Return both results as one. The wavelengths of the second lie between the wavelengths of the first."""
+    """Return both results as one, by ascending wavelength; those of `between` lie between those of `result`."""
     import drjit as dr
 
     def braided(first: Any, second: Any) -> list[Any]:

@@ -45,8 +45,8 @@ def check_seconds(problem: Problem, sampling: Sampling) -> float:
     points = max(min(EFFORT.points, samples), LANES)
     needed = 2 * sampling.samples[0] * points / PAIRS_PER_SECOND["float64"]
     slower = PAIRS_PER_SECOND["float32"] / PAIRS_PER_SECOND["float64"]
-    share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
-    return needed if samples < EFFORT.fewest else min(needed, share * sampling.seconds * slower)
+    most = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
+    return needed if samples < EFFORT.fewest else min(needed, most * sampling.seconds * slower)
 
 
 def population_seconds(across: int, window: Grid) -> float:

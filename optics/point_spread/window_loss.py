@@ -1,10 +1,11 @@
 """Errors of contrasts at each spatial frequency.
 
-Light outside the window is missing in the sum ∫ PSF(x) exp(-2πi f·x) dx. Near f = 0, all of this light is missing. At
-other frequencies, contributions of different places cancel, and most of the error results from the sharp end of the
-samples at the sides of the window. If the samples fade towards the sides instead, this error disappears. The difference
-between the spectra of sharp and fading samples therefore estimates it. At some frequencies, such as those of the rings
-around the focus of an annulus, the lost light itself has contrast. It is estimated from the outer parts of the window.
+Light outside the window is missing in the integral ∫ PSF(x) exp(-2πi f·x) dx. Near f = 0, the error is all of this
+light. At other frequencies, contributions of different places cancel, and most of the error results from the sharp end
+of the samples at the sides of the window. If the samples fade towards the sides, this error disappears. It is therefore
+estimated as the difference between the spectra of sharp and fading samples. At some frequencies, such as those of the
+rings around the focus of an annulus, the lost light itself has contrast. This contrast is estimated from the outer
+parts of the window.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class ErrorCauses(ReadOnlyArrays):
 def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
     """Return the error of each contrast due to light outside the window, (fy, fx), at the frequencies of `MTF.fx`.
 
-    The largest error of nine neighbouring frequencies is used, because spectra have zeros.
+    Spectra have zeros, so each result is the largest estimate of nine neighbouring frequencies.
 
     image: samples (y, x) of the PSF, as fractions of all light that arrives.
     lost: fraction of this light outside the window.
@@ -67,10 +68,10 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
 
 
 def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return the spectrum of the lost light if it is spread like the light in the outer parts of the window."""
+    """Return the contrast of the lost light, (fy, fx), if it is spread like light in the outer parts of the window."""
     squares, parts = np.zeros((max(image.shape),) * 2), 0
-    for share in INNER:
-        inner = tuple(slice(n // 2 - round(share * n / 2), n // 2 + round(share * n / 2) + 1) for n in image.shape)
+    for part in INNER:
+        inner = tuple(slice(n // 2 - round(part * n / 2), n // 2 + round(part * n / 2) + 1) for n in image.shape)
         outer = image.copy()
         outer[inner] = 0
         light = float(outer.sum())

@@ -4,14 +4,18 @@ Each plane has its own lateral coordinates about the centre of its pupil, so a d
 the propagation to its plane. The plane of a tilted pupil has the depth ζ(x) = x·tan α. The field that arrives at a
 point of this plane is the field at the depth ζ of the point, and light leaves from this depth. If the light's angles to
 the axis are at most θ, the field is the product of a carrier exp(ikcζ) with c = (1 + cos θ)/2 and a function that
-varies slowly with the depth. This function is interpolated between a few planes at Chebyshev nodes z_j. For light that
-arrives at the tilted plane, and for light that leaves it,
+varies slowly with the depth. This function is interpolated between a few planes at Chebyshev nodes z_j, with Lagrange
+polynomials L_j. The light that arrives at the tilted plane is
 
-    U(x, ζ) = exp(ikcζ) Σ_j L_j(ζ) exp(-ikcz_j) U(x, z_j),   w → Σ_j exp(ikcz_j) P(-z_j) [L_j(ζ) exp(-ikcζ) w],
+    U(x, ζ) = exp(ikcζ) Σ_j L_j(ζ) exp(-ikcz_j) U(x, z_j).
 
-where w is the field that leaves the plane, and P the propagation to the next plane. The second formula is the adjoint
-of the first one. It becomes the inverse if light at the angle θ is multiplied by 1 - tan α tan θ. Fields on tilted
-planes are stored without exp(ikζ).
+The light w that leaves the tilted plane arrives at the next plane as
+
+    Σ_j exp(ikcz_j) P(-z_j) [L_j(ζ) exp(-ikcζ) w],
+
+where P(-z_j) is the propagation from the depth z_j to the next plane. The second formula is the adjoint of the first
+one. It becomes the inverse if light at the angle θ is multiplied by 1 - tan α tan θ. Fields on tilted planes are stored
+without exp(ikζ).
 """
 
 from __future__ import annotations

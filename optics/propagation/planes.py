@@ -37,7 +37,7 @@ class PlaneField:
 
     band: highest frequency [1/m] in the field.
     rays: highest frequency [1/m] of geometrical rays in the field.
-    kept: frequency [1/m] beyond which the field is to be faded out until `band`; None for no fade.
+    kept: frequency [1/m] at which a fade begins that will remove all light at `band`. None: the field needs no fade.
     alignment: position of the plane. Samples are counted from its centre.
     """
 
@@ -147,11 +147,11 @@ class StepSettings:
         arriving, error_in = stop.alignment.nodes(stop.half_width, sine, wavelength, self.tolerance / 4)
         found: list[PropagationResult] = []
         into = stop.alignment.weights(arriving, grid, -turns)
-        for start, share in zip(leaving, field.alignment.weights(leaving, source, turns), strict=True):
+        for start, own in zip(leaving, field.alignment.weights(leaving, source, turns), strict=True):
             for end, weight in zip(arriving, into, strict=True):
                 distance = stop.distance + float(end - start)
                 passage = Passage(wavelength, distance, False, EVERYTHING, self.ripple, window.centre, limit)
-                out = propagated_field(field.u * share, field.dx, passage, window, self.tolerance, self.dtype)
+                out = propagated_field(field.u * own, field.dx, passage, window, self.tolerance, self.dtype)
                 carrier = np.exp(2j * np.pi * (end - start) * (turns - 1 / wavelength))
                 found.append(replace(out, u=(out.u * (weight * carrier)).astype(out.u.dtype)))
         worst = max(found, key=lambda result: result.plan.predicted_error)

@@ -36,7 +36,8 @@ PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 WRAP_RIPPLE_PER_TOLERANCE = 3e-3
 # Choice: initial padding, in units of √(λz), for the blur due to truncation of the spectrum at the Nyquist frequency.
 SPARE = 1.0
-# Choice: a field is propagated again if the blur, estimated to a factor of two or three, exceeds the limit this much.
+# Choice: a field is propagated again if the blur exceeds the limit by this factor. The blur is an estimate, which is
+# correct to a factor of two or three.
 CLEARLY = 1.5
 # Choice: fraction of the tolerance for the part of the kernel that is not separable.
 SEPARABLE_SHARE = 0.7

@@ -134,8 +134,8 @@ def propagate_through(
     )
     found = _converged(stops, field, source or PointSource(), settings, tolerance)
     power = brightest**2
-    told = (replace(one, power_in=one.power_in * power, power_out=one.power_out * power) for one in found.steps)
-    return StackResult(found.u * found.u.dtype.type(brightest), window.dx, tuple(told), found.error, window)
+    steps = (replace(one, power_in=one.power_in * power, power_out=one.power_out * power) for one in found.steps)
+    return StackResult(found.u * found.u.dtype.type(brightest), window.dx, tuple(steps), found.error, window)
 
 
 @dataclass(frozen=True)
@@ -271,8 +271,8 @@ def _medium(elements: Sequence[Element]) -> float:
 def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings, tilted: float) -> float:
     """Return the sum of the errors of the steps and of the soft edges between them.
 
-    Errors are relative to the light at their step. If only part of this light arrives at the end, the relative error of
-    the result is larger, so each error is divided by that part.
+    Errors are relative to the light at their step. If only a fraction of this light arrives at the end, the relative
+    error of the result is larger, so each error is divided by the square root of this fraction.
 
     tilted: sum of the errors due to tilts.
 

@@ -160,15 +160,16 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
     error is of the order of the cell's width squared.
     """
     f = np.fft.fftfreq(samples) * wavelength / dx
-    share: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
-    return share
+    fraction: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
+    return fraction
 
 
 @lru_cache(maxsize=8)
 def _fade_table(ripple: float) -> Interpolant:
     """Return a fade from 1 at 0 to 0 at 1: the complement of the integral of a Kaiser window.
 
-    The fade blurs a field over the distance β/(π fade). Beyond this distance, a fraction `ripple` remains.
+    A fade of this shape over a band of width Δf blurs a field over the distance β/(π Δf). The amplitude beyond this
+    distance is the fraction `ripple`.
     """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)

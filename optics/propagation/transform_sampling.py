@@ -229,10 +229,10 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of the power |U|² at the Nyquist frequency along one axis that comes back into the window.
 
-    There is one weight per frequency along the other axis. It is derived as follows. In terms of samples, U = Σ u
-    e^{-2πi...} equals S/dx. Therefore (2) times dx² |U|² is the power ∫|b|² dx, and division by dx gives the sum over
-    samples along the axis. By Parseval's theorem, the factor 1/period gives the sum along the other axis. The two ends
-    ±f_N of the spectrum contribute a factor of 2.
+    There is one weight per frequency along the other axis, (frequency,). It follows from the fraction of eq. (2) above.
+    The sum over samples U = Σ u e^{-2πi...} equals S/dx, so this fraction times dx² |U|² is the power ∫|b|² dx.
+    Division by dx gives the sum over samples along the axis. By Parseval's theorem, the factor 1/period gives the sum
+    along the other axis. The two ends ±f_N of the spectrum contribute a factor of 2.
     """
     source, window = how.source, how.window
     others = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
@@ -254,8 +254,8 @@ def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> n
     """
     lit, seen = (grid.shape[axis] * grid.dx for grid in (how.source, how.window))
     missed = np.maximum(walks - abs(how.window.centre[1 - axis]), 0)
-    share: np.ndarray = np.clip((lit + seen) / 2 - missed, 0, min(lit, seen)) / lit
-    return share
+    fraction: np.ndarray = np.clip((lit + seen) / 2 - missed, 0, min(lit, seen)) / lit
+    return fraction
 
 
 def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:

@@ -87,21 +87,21 @@ class SpectralBands(ReadOnlyArrays):
             seen + 1e-6 * seen.max()
         )  # avoids 0/0 in a band whose light no receptor absorbs
         means = daylight(self.wavelengths) * (shares @ of_daylight) / shares.sum(axis=1)
-        caught = catch @ of_daylight
-        found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
-        return _nonnegative(self.weights, caught, means) if nonnegative and found.min() < 0 else found
+        catches = catch @ of_daylight
+        found: np.ndarray = means + np.linalg.pinv(self.weights) @ (catches - self.weights @ means)
+        return _nonnegative(self.weights, catches, means) if nonnegative and found.min() < 0 else found
 
     def white_light(self, kernels: np.ndarray) -> np.ndarray:
         """Return kernels (channel, k, k) for a colourless scene in daylight, given kernels (band, k, k)."""
         return np.tensordot(self.weights * daylight(self.wavelengths), kernels, axes=1)
 
 
-def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> np.ndarray:
+def _nonnegative(weights: np.ndarray, catches: np.ndarray, means: np.ndarray) -> np.ndarray:
     """Return x >= 0 with weights @ x closest to the catches; among several such x, the one closest to the means."""
     from scipy.optimize import lsq_linear
 
     equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
-    wanted = np.concatenate([caught * CATCHES_FIRST, means])
+    wanted = np.concatenate([catches * CATCHES_FIRST, means])
     found: np.ndarray = lsq_linear(equations, wanted, bounds=(0, np.inf), method="bvls").x
     return found
 

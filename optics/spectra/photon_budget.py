@@ -77,8 +77,8 @@ class PhotonBudget:
         of_kind("bands", bands, SpectralBands, "SpectralBands.uniform(4)")
         positive("etendue", etendue, "m² sr")
         radiance = self.spectral_irradiance / math.pi
-        caught = self.quantum_efficiency * self.integration_time * etendue
-        return caught * radiance / (PLANCK * LIGHT_SPEED) * bands.white_catch
+        factor = self.quantum_efficiency * self.integration_time * etendue
+        return factor * radiance / (PLANCK * LIGHT_SPEED) * bands.white_catch
 
 
 def light_level(name: str) -> float:

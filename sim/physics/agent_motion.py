@@ -107,6 +107,8 @@ class AgentPhysics:
 
         An agent is simulated in the whole world instead if too many geoms are within reach, if a contact deflects it
         towards other geoms, or if the simulation breaks down.
+
+        met: obstacles within reach of each agent, (n, obstacle) bool
         """
         if self.local_contacts is None:
             return self._simulate(agents, velocity)

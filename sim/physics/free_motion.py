@@ -30,8 +30,7 @@ class FreeMotion:
     """Motion of an agent that touches nothing, during one action.
 
     response: path [m] and velocity [m/s] after each substep, for each axis: (path | velocity, substep, speed | command,
-        2). One response is to an initial speed of 1 m/s without a command, the other to a command of 1 without an
-        initial speed.
+        2). One response is to an initial speed of 1 m/s with command 0, the other to a command of 1 m/s from rest.
     obstacles: ids of the geoms that could be touched (n,)
     lower, upper: axis-aligned bounding boxes of the obstacles in the horizontal plane (n, 2) [m]
     reach: distance of the agent's centre from a box beyond which the agent cannot touch the obstacle [m]

@@ -113,7 +113,7 @@ class EdgeRays:
 
 
 def _shifted(y: int, x: int) -> tuple[slice, slice]:
-    """Return slices of all but the last rows and columns, or of all but the first for a negative shift."""
+    """Return slices (rows, columns) of the receptors that have a neighbour y rows below and x columns to the right."""
     return slice(max(-y, 0), -y if y > 0 else None), slice(max(-x, 0), -x if x > 0 else None)
 
 

@@ -67,11 +67,11 @@ def own_bands(world: World, eye: optics.Eye) -> Level:
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
     """Return a single PSF for infinity if its error is certainly allowed, else the fewest layers for random views.
 
-    With the focal length f, light from a point at the distance z that passes the pupil at the position p arrives on the
-    retina at a distance (Δx, Δy) = f p/z from light from infinity. The means of |Δx| and |Δy| over a disk of radius R
-    are both 4/(3π) f R/z. Divided by a receptor's width and height, respectively, they add up to the fraction of the
-    receptor's field that moves. This fraction is an upper bound of the error in scenes that are not brighter than
-    white.
+    Consider light that passes the pupil at the position p. On the retina, light from a point at the distance z is
+    displaced by (Δx, Δy) = f p/z relative to light from infinity, with the focal length f. The means of |Δx| and |Δy|
+    over a pupil of radius R are both 4/(3π) f R/z. Divided by a receptor's width and height, respectively, they add up
+    to the fraction of the receptor's field that moves. This fraction is an upper bound of the error in scenes that are
+    not brighter than white.
     """
     if eye.pupil is None:
         return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens does not blur")

@@ -125,7 +125,7 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether neighbouring receptors have different signals if this number of areas is used per receptor."""
+        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:

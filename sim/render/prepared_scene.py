@@ -132,7 +132,7 @@ class PreparedScene:
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether areas may be larger than a receptor's square, with this number of areas per receptor."""
+        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals."""
         return isinstance(sampling, FieldSampling) and sampling.may_share(per_receptor, in_rows=self._in_rows)
 
     @property

@@ -115,7 +115,7 @@ def _points(data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom: int, apart: float) -> bool:
-    """Return whether any of the points is closer than `apart` to the surface of a geom with the same normal."""
+    """Return whether any of the points is closer than `apart` to a geom's surface, and the normals there are equal."""
     model, turn = data.model, data.geom_xmat[geom].reshape(3, 3)
     kind, box = surfaces.geom_type(model, geom), model.geom_aabb[geom]
     local = (points - data.geom_xpos[geom]) @ turn

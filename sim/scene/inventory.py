@@ -25,7 +25,8 @@ _NAMED = 4  # largest number of elements of one kind that a message names; it on
 def left_out(model: mujoco.MjModel, geoms: Sequence[int], groups: Sequence[int]) -> list[str]:
     """Return messages about features that have no counterpart in a model's mirror.
 
-    They may belong to the visible geoms, to their materials, or to other elements that MuJoCo draws in these groups.
+    The features of visible geoms, of their materials, and of other elements that MuJoCo draws in these groups are
+    considered.
     """
     materials = sorted({int(model.geom_matid[g]) for g in geoms if model.geom_matid[g] >= 0})
     return [*_geoms(model, geoms), *_textures(model, materials), *_sky(model, geoms), *_others(model, groups)]
@@ -83,7 +84,7 @@ def _others(model: mujoco.MjModel, groups: Sequence[int]) -> list[str]:
 
 
 def _alpha(model: mujoco.MjModel, rgba: np.ndarray, material: np.ndarray) -> np.ndarray:
-    """Return alphas by MuJoCo's rule: that of an element's own colour if it is set, else that of its material's."""
+    """Return the alpha of each element by MuJoCo's rule: that of its own colour if set, else that of its material."""
     unset = (rgba == np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)).all(axis=1) & (material >= 0)
     return np.where(unset, model.mat_rgba[material, 3] if model.nmat else 1.0, rgba[:, 3])
 

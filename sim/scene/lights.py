@@ -5,8 +5,8 @@ there has radiance daylight(λ): D65, 1 at 560 nm. Mitsuba's own `d65` is scaled
 `rgb` emitters inherit this scale. This module therefore uses the tables of `optics`.
 
 A light has a single colour: its diffuse colour also makes the highlights, and its specular colour is ignored. Light
-from a point decreases with the square of the distance. If MuJoCo's attenuation differs, both agree at the model's
-centre.
+from a point decreases with the square of the distance. If a light of the model has another attenuation, its irradiance
+is the same as in MuJoCo only at the distance of the model's centre.
 """
 
 from __future__ import annotations

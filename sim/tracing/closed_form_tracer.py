@@ -128,7 +128,7 @@ class ClosedForm:
         return SphereRows(self.world.spheres, n_envs)
 
     def around(self, scenes: None, rows: Array, tables: ClosedFormTables, world: Array) -> ClosedFormSurroundings:
-        """Return what the rays of each Dr.Jit lane can hit: visible spheres of its world, and all other surfaces."""
+        """Return the surfaces that rays of each Dr.Jit lane can hit: visible spheres of its world, walls and floor."""
         return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), tables)
 
     def all_bodies(self, centres: list[Array], stand: Array) -> list[Array]:

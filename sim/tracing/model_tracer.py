@@ -172,19 +172,19 @@ class ModelTracer:
 
     def radiance(self, seen: EyeRay, there: Surroundings, samples: Array) -> tuple[list[Array], Array]:
         """Return the light along each ray, per band, and the distance to the visible surface [m], see `Tracer`."""
-        met = self._first_hits(seen.ray, there)
-        arrives = self._irradiance(met, seen.axis, there)
+        hit = self._first_hits(seen.ray, there)
+        arrives = self._irradiance(hit, seen.axis, there)
         if self.light == lighting.BOUNCE:
-            reflected = self._returned(met, seen.axis, there, samples)
+            reflected = self._returned(hit, seen.axis, there, samples)
             arrives = [e + dr.pi * more for e, more in zip(arrives, reflected, strict=True)]
-        spectra = self._sent(met, arrives, there)
+        spectra = self._sent(hit, arrives, there)
         sent = [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))]
-        return sent if self._medium is None else self._medium.through(sent, met.t), met.t
+        return sent if self._medium is None else self._medium.through(sent, hit.t), hit.t
 
-    def _returned(self, met: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
+    def _returned(self, hit: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
         """Return the light that a bounce ray collects for each visible surface, see the module's docstring."""
-        bounce_ray = lighting.spawn_bounce_ray(met.point, met.normal, mi.Point2f(samples.x, samples.y))
-        second = self._first_hits(bounce_ray, there, met.seen)
+        bounce_ray = lighting.spawn_bounce_ray(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
+        second = self._first_hits(bounce_ray, there, hit.seen)
         arrives = self._irradiance(second, axis, there)
         if self._scene.has_sky or self._scene.glows:
             further = lighting.spawn_bounce_ray(second.point, second.normal, mi.Point2f(samples.z, samples.w))
@@ -192,7 +192,7 @@ class ModelTracer:
             emitted = self._emitted(last, there)
             arrives = [e + dr.pi * more for e, more in zip(arrives, emitted, strict=True)]
         found = self._sent(second, arrives, there)
-        return [dr.select(met.seen, spectrum, 0) for spectrum in found]
+        return [dr.select(hit.seen, spectrum, 0) for spectrum in found]
 
     def _first_hits(self, ray: Array, there: Surroundings, active: Array | None = None) -> _SurfaceHit:
         """Return the first hits of rays."""
@@ -240,14 +240,14 @@ class ModelTracer:
         shape: Array = dr.reinterpret_array(mi.UInt32, si.shape) if any_still else mi.UInt32(0)
         return dr.select(hit.which < movers, hit.which, movers + dr.select(si.is_valid(), shape, 0))
 
-    def _irradiance(self, met: _SurfaceHit, axis: Array, there: Surroundings) -> list[Array]:
+    def _irradiance(self, hit: _SurfaceHit, axis: Array, there: Surroundings) -> list[Array]:
         """Return the irradiance of surfaces due to lamps, as spectra of LANES bands each."""
-        start = lighting.clear_of(met.point, met.normal)
+        start = lighting.clear_of(hit.point, hit.normal)
         total = [mi.Spectrum(0) for _ in self._bands]
         for k, light in enumerate(self._scene.lights.found):
-            towards, far, share = self._scene.lights.towards(k, met.point, axis, there.lights)
-            cosine = dr.dot(met.normal, towards)
-            shines = met.seen & (cosine > 0) & (share > 0)
+            towards, far, share = self._scene.lights.towards(k, hit.point, axis, there.lights)
+            cosine = dr.dot(hit.normal, towards)
+            shines = hit.seen & (cosine > 0) & (share > 0)
             if light.casts_shadow:
                 shines &= ~self._shadowed(mi.Ray3f(start, towards), far, shines, there)
             arrives = dr.select(shines, cosine * share, 0)
@@ -260,33 +260,33 @@ class ModelTracer:
         blocked = self._scene.movers.block(ray, dr.select(active, far, 0), there.movers)
         return blocked | there.still.ray_test(ray, active & ~blocked) if self._any_still else blocked
 
-    def _sent(self, met: _SurfaceHit, arrives: list[Array], there: Surroundings) -> list[Array]:
+    def _sent(self, hit: _SurfaceHit, arrives: list[Array], there: Surroundings) -> list[Array]:
         """Return the radiance of surfaces: reflected light, and emission."""
-        emitted, found = self._emitted(met, there), []
-        for band, color, e, own in zip(self._bands, met.colors, arrives, emitted, strict=True):
-            met.si.wavelengths = band
-            reflected = color * e * met.bsdf.eval_diffuse_reflectance(met.si, met.seen) * dr.inv_pi
-            found.append(own + dr.select(met.seen, reflected, 0))
+        emitted, found = self._emitted(hit, there), []
+        for band, color, e, own in zip(self._bands, hit.colors, arrives, emitted, strict=True):
+            hit.si.wavelengths = band
+            reflected = color * e * hit.bsdf.eval_diffuse_reflectance(hit.si, hit.seen) * dr.inv_pi
+            found.append(own + dr.select(hit.seen, reflected, 0))
         return found
 
-    def _emitted(self, met: _SurfaceHit, there: Surroundings) -> list[Array]:
+    def _emitted(self, hit: _SurfaceHit, there: Surroundings) -> list[Array]:
         """Return the radiance of the sky for rays without a hit, and of glowing geoms."""
         found = [mi.Spectrum(0) for _ in self._bands]
         if self._scene.has_sky:
-            nothing = met.active & ~met.seen
-            sky = (self._heaven(there.still, met.direction, nothing, band) for band in self._bands)
+            nothing = hit.active & ~hit.seen
+            sky = (self._sky_radiance(there.still, hit.direction, nothing, band) for band in self._bands)
             found = [e + light for e, light in zip(found, sky, strict=True)]
         if there.tables.glows is not None:
-            k = dr.gather(mi.UInt32, there.tables.glowing, met.which, met.seen)
-            glows = met.seen & (k < len(there.tables.glows))
+            k = dr.gather(mi.UInt32, there.tables.glowing, hit.which, hit.seen)
+            glows = hit.seen & (k < len(there.tables.glows))
             glow = dr.gather(mi.BSDFPtr, there.tables.glows, k, glows)
             for i, band in enumerate(self._bands):
-                met.si.wavelengths = band
-                found[i] += dr.select(glows, met.glow[i] * glow.eval_diffuse_reflectance(met.si, glows), 0)
+                hit.si.wavelengths = band
+                found[i] += dr.select(glows, hit.glow[i] * glow.eval_diffuse_reflectance(hit.si, glows), 0)
         return found
 
     @staticmethod
-    def _heaven(still: MitsubaObject, direction: Array, active: Array, band: Array) -> Array:
+    def _sky_radiance(still: MitsubaObject, direction: Array, active: Array, band: Array) -> Array:
         """Return the radiance of the sky."""
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.wi, si.wavelengths = -direction, band

@@ -60,11 +60,11 @@ class _Frame:
     size: Array
     reach: Array
 
-    def taken(self, v: Array) -> Array:
+    def to_mover(self, v: Array) -> Array:
         """Convert a direction from the world's frame to the mover's frame."""
         return mi.Vector3f(*(dr.dot(axis, v) for axis in self.axes))
 
-    def given(self, v: Array) -> Array:
+    def to_world(self, v: Array) -> Array:
         """Convert a direction from the mover's frame to the world's frame."""
         return self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
 
@@ -239,8 +239,8 @@ class Movers:
         """Return the normals in the world and the texture coordinates of hits."""
         k = dr.minimum(which, len(self) - 1)
         frame = _frame(there, k)
-        o, d = frame.taken(ray.o - frame.origin), frame.taken(ray.d)
-        local = frame.taken(ray(dr.select(which < len(self), t, 0)) - frame.origin)
+        o, d = frame.to_mover(ray.o - frame.origin), frame.to_mover(ray.d)
+        local = frame.to_mover(ray(dr.select(which < len(self), t, 0)) - frame.origin)
         normal, uv = mi.Vector3f(0, 0, 1), mi.Point2f(0)
         for i, (kind, primitive) in enumerate(PRIMITIVES.items()):
             if self._ends[i] < self._ends[i + 1]:
@@ -253,7 +253,7 @@ class Movers:
             mine = self._is_kind(len(PRIMITIVES), which, there)
             of_mesh = self.atlas.surface(o, d, frame.size, frame.reach, mine)
             normal, uv = dr.select(mine, of_mesh[0], normal), dr.select(mine, of_mesh[1], uv)
-        return dr.normalize(frame.given(normal)), uv
+        return dr.normalize(frame.to_world(normal)), uv
 
     @staticmethod
     def _is_kind(i: int, which: Array, there: MoverRows) -> Array:
@@ -270,7 +270,7 @@ def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Arr
     # A branch skips the intersection for rays that miss the sphere around the mover, as most rays do.
     def within() -> Array:
         frame = _frame(there, k)
-        return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), frame)
+        return hit(frame.to_mover(ray.o - frame.origin), frame.to_mover(ray.d), frame)
 
     found: Array = dr.if_stmt((), _may_hit(ray, there, 1 + k * ROWS), within, lambda: mi.Float(dr.inf))
     return found

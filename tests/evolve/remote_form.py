@@ -37,8 +37,8 @@ def slow(phenotype, config, seed, policy_path, progress):
 
 
 def long(phenotype, config, seed, policy_path, progress):
-    """Evaluate like `bowl`, but for 15 s without a progress report."""
-    time.sleep(15.0)
+    """Evaluate like `bowl`, but for 10 s without a progress report."""
+    time.sleep(10.0)
     return bowl(phenotype, config, seed, policy_path, progress)
 
 

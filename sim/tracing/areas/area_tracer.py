@@ -213,7 +213,7 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return the fractions of the area in which a sphere hides left wall, right wall and floor, and its light.
+        """Return fractions of the area in which a sphere hides left wall, right wall and floor, and the sphere's light.
 
         The light is multiplied by the fraction of the area that the sphere fills, per component. Parts of the sphere
         that nearer spheres hide are omitted.
@@ -277,7 +277,7 @@ class AreaTracer:
 
 
 def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) -> list[Array]:
-    """Divide light among depth layers. It comes from the distance 1 / inverse_distance along the eye's axis."""
+    """Return light from the distance 1 / inverse_distance along the eye's axis, divided among depth layers."""
     if depth.count == 1:
         return light
     return [share * component for share in depth.shares(inverse_distance) for component in light]

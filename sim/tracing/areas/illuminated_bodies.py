@@ -1,6 +1,6 @@
 """Light on the moving bodies: the fraction of each light that reaches them, and the reflected light around them.
 
-It does not depend on the eye, so it is computed once per world, in a table that all areas of the world read.
+The light does not depend on the eye, so it is computed once per world, in a table that all areas of the world read.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ class IlluminatedBodies:
         return PLACES * len(self._radii)
 
     def table(self, place: Array, bodies: list[Array], walls_around: Array | None, reflected: Reflected) -> list[Array]:
-        """Return the fraction of each light that reaches a place on a body, in fours, followed by the harmonics.
+        """Return the fraction of each light that reaches a place on a body, followed by the harmonics.
+
+        Both are in groups of four.
 
         Walls block the light at all places. Other bodies block it only at places on a side, not at the place that
         represents the whole body.
@@ -77,7 +79,10 @@ class IlluminatedBodies:
         return [dr.ravel(four) for four in (*shares, *harmonics)]
 
     def reflected_around(self, k: Array, world: Array, table: list[Array]) -> list[list[Array]]:
-        """Return the harmonics of the reflected light around the k-th body of a world, in fours, per component."""
+        """Return the harmonics of the reflected light around the k-th body of a world.
+
+        There is one list per component, with the harmonics in groups of four.
+        """
         first = (world * len(self._radii) + k) * PLACES
         return [[dr.gather(mi.Vector4f, rows, first + i) for i in range(FOURS)] for rows in table[self._fours :]]
 

@@ -67,7 +67,7 @@ class FrameState:
 class Illumination:
     """Direct and reflected light on patches, without the light that walls and bodies block.
 
-    around: for each cell, which cells around it are walls, for the kernel
+    around: table of the walls around each cell, see `WallShadows`
     bodies: the light on bodies
 
     Raises:
@@ -146,7 +146,7 @@ class Illumination:
 
         If the patch's horizon crosses the sphere, Snyder's (1996) form factor applies. The hidden light is the light
         that arrives on the body's far side, as seen from the patch. Its radiance follows from the irradiance of that
-        side, but at most the light that arrives at the patch is subtracted.
+        side. At most the light that arrives at the patch is subtracted.
         """
         way, radius = select(k, now.bodies) - patch.point, select(k, self._radii)
         distance = dr.maximum(dr.norm(way), radius)

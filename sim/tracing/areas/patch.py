@@ -28,10 +28,10 @@ class Area:
 
     @classmethod
     def from_extent(cls, middle: Array, axis: Array, extent: tuple[Array, Array]) -> Area:
-        """Return the area around a ray of an upright eye. Its x is horizontal, and its y is vertical.
+        """Return the area around a ray of an upright eye. The area's width is horizontal, and its height is vertical.
 
         middle: the ray, whose component along the eye's axis is 1
-        axis: of the eye (Vector2f)
+        axis: horizontal axis of the eye, a unit vector (Vector2f)
         extent: width and height on the tangent plane
         """
         width, height = extent

@@ -60,7 +60,7 @@ class WallShadows:
     across the corner. A table states for each cell which of these neighbours are walls. Three straight lines across the
     patch separate points whose rays enter different neighbours, or pass above the wall there.
 
-    around: for each cell, which cells around it are walls, for the kernel; None without walls
+    around: table for the kernel that states, for each cell, which of its neighbours are walls; None without walls
 
     Raises:
         NoClosedForm: the walls lie on no grid, or shadows are longer than a cell.

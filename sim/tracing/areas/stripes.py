@@ -60,7 +60,7 @@ class Stripes:
     reflectance: (texel, component)
     places: first texel and number of columns of each texture, (texture, 2)
 
-    tables: for the kernel
+    tables: the tables in the form in which the kernel receives them
     """
 
     def __init__(self, reflectance: np.ndarray, places: np.ndarray) -> None:
@@ -121,12 +121,12 @@ class Stripes:
         return [dr.gather(mi.Float, tables.means[k], mi.UInt32(texture.first)) for k in range(self.components)]
 
     def _once(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the integral of the texture minus its mean, up to the column middle + beyond."""
+        """Return the integral over columns of the texture minus its mean, up to the position `middle + beyond`."""
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma((row.w - row.z) / 2, past, row.z), past, row.y) for row in rows]
 
     def _twice(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the second integral of the texture minus its mean, up to the column middle + beyond."""
+        """Return the second integral of the texture minus its mean, up to the position `middle + beyond`."""
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 

@@ -65,7 +65,11 @@ class Cluster:
             self.processes[kind] = []
 
     def heal(self, workers=2):
-        """Continue stopped processes, replace dead ones, and wait until all workers are connected."""
+        """Continue stopped processes, replace dead ones, and wait until all workers are connected.
+
+        A worker that was stopped may be given up by the scheduler and not connect again, although its process runs. If
+        a worker is missing after half a minute, all are replaced.
+        """
         for kind, processes in self.processes.items():
             self.processes[kind] = [process for process in processes if process.poll() is None]
             self.signal(kind, signal.SIGCONT)
@@ -79,7 +83,12 @@ class Cluster:
                 break
             except ExecutorError:
                 assert time.monotonic() < deadline, "the scheduler does not answer"
-        client.wait_for_workers(workers, timeout=120)
+        try:
+            client.wait_for_workers(workers, timeout=30)
+        except TimeoutError:
+            self.kill("worker")
+            self.start(workers)
+            client.wait_for_workers(workers, timeout=120)
         client.close()
 
     def executor(self, function, patience_s=60.0, **options):

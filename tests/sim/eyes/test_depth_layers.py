@@ -91,7 +91,9 @@ def test_auto_takes_layers_for_large_eyes_alone(close_by):
     world, large, _ = close_by
     small = sim.Eyes(2, (5, 5), optics=optics.Pupil(25e-6, thin_lens_focal_length=2.4e-4))
     assert sim.choose_fidelity(world, small, bands="own").depth == DepthLayers()
-    sharp, noisy = (sim.choose_fidelity(world, dataclasses.replace(large, noise_sigma=sigma)) for sigma in (2e-3, 0.05))
+    sharp, noisy = (
+        sim.choose_fidelity(world, dataclasses.replace(large, noise_sigma=sigma), bands="own") for sigma in (2e-3, 0.05)
+    )
     assert sharp.depth.count > 1
     assert sharp.depth.nearest < 0.5
     assert next(level for level in sharp.levels if level.stage == "depth").predicted_error < 1e-3

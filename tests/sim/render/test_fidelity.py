@@ -77,7 +77,7 @@ def test_the_pick_is_enough_and_not_far_more_than_enough(name):
     world, fidelity = picked(name)
     assert fidelity.samples == "rays"  # the requested tracer has no areas
     rays = fidelity.rays_per_receptor
-    states = [(lived_through(world), np.s_[:])]
+    states = [(lived_through(world, 8), np.s_[:])]
     if world.objects:
         states.append(near_objects(world, eyes))
     truths = [signals(world, eyes, state, fidelity, FINER * rays) for state, _ in states]
