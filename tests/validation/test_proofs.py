@@ -35,6 +35,4 @@ def test_whatever_writes_a_page_is_a_proof():
         ROOT / f"validation/{path}.py" for path in PROOFS if (PAGES / f"{Path(path).name}.md").is_file()
     } - {
         ROOT / "validation/peers/work_precision.py"  # its page is written by hand
-    } | {
-        ROOT / "validation/peers/optimisation_costs.py"  # its page requires an idle machine
     }

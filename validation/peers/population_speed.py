@@ -12,7 +12,7 @@ heights and of all matrices that an eye needs. The error of a PSF is its relativ
 nodes, which is accurate to 1e-5. The table states the median and the largest error over every fifth eye.
 
 **Table.** `psf_batch` runs with five tolerances and `psf` with three. The peers run with 32 to 256 samples across the
-pupil. `python -m validation.peers.optimisation_costs` measures PSFs with gradients.
+pupil. [Costs of optimisation](optimisation_costs.md) reports PSFs with gradients.
 
 **Limits.** The other codes cannot share a plan between the eyes of a population. Unlike `optics.psf`, they also have no
 exact propagator whose output grid can be chosen freely. Their matrix Fourier transform from the pupil to the focal
