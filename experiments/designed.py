@@ -28,6 +28,7 @@ __all__ = ["Design", "Experiment", "HeldOut", "Trained", "crossed", "evaluate_an
 
 
 INDEX = 1.9  # refractive index of glass; strong lenses then stay within the maximum height of reliefs
+RHABDOM_LENGTH_UM = 200.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class Design:
     vertical_fov_deg: 0: receptors are square
     features: features per eye, the width of its encoder; 0: a quarter of the neurons
     own: settings of this design alone, "section.name=value" separated by spaces
+    facet_diameter_um: width of the facets of compound eyes; 0: camera eyes
+    rhabdom_diameter_um, f_number: of the ommatidia of compound eyes
     """
 
     task: str
@@ -56,6 +59,9 @@ class Design:
     vertical_fov_deg: float = 0.0
     features: int = 0
     own: str = ""
+    facet_diameter_um: float = 0.0
+    rhabdom_diameter_um: float = 0.0
+    f_number: float = 0.0
 
     @property
     def animal(self) -> Phenotype:
@@ -73,13 +79,21 @@ class Design:
 
     def _optics(self) -> dict[str, Any]:
         if not self.relative_aperture:
-            return {"relative_aperture": None, "relief": None, "refractive_index": None}
+            return {"relative_aperture": None, "relief": None, "refractive_index": None, **self._ommatidia()}
         relief = paraboloid(self.glass_power, self.relative_aperture, self.fov_deg, INDEX, EyeConfig())
         return {"relative_aperture": self.relative_aperture, "relief": relief, "refractive_index": INDEX}
 
+    def _ommatidia(self) -> dict[str, float]:
+        if not self.facet_diameter_um:
+            return {}
+        own = {name: getattr(self, name) for name in ("facet_diameter_um", "rhabdom_diameter_um", "f_number")}
+        return {**own, "rhabdom_length_um": RHABDOM_LENGTH_UM, "acute_zone": 1.0}
+
     def config(self, settings: Sequence[str]) -> RunConfig:
         """Return the configuration of a run in which this animal could be a candidate."""
-        own = (f"eye.optics={str(self.relative_aperture > 0).lower()}", f"eye.noise_sigma={self.noise_sigma}")
+        own = [f"eye.optics={str(self.relative_aperture + self.facet_diameter_um > 0).lower()}"]
+        own += ["eye.compound=true"] if self.facet_diameter_um else []
+        own += [f"eye.noise_sigma={self.noise_sigma}"]
         return assemble(self.task, assignments=(*own, *settings, *self.own.split()))
 
 

@@ -42,11 +42,12 @@ RESAMPLED_AT_ONCE = 2**20  # largest number of samples that are drawn at once; i
 
 @dataclass(frozen=True)
 class GenerationStatistics:
-    """Statistics of the fitness in one generation; NaN if every candidate has failed.
+    """Statistics of the fitness in one generation.
 
     evaluated, failed: number of evaluated candidates, and number of failed candidates among them
-    low, high: the 10 % and 90 % quantiles of the population (linear interpolation)
-    best_so_far: best fitness up to and including this generation
+    best, median: best fitness and median of the population; NaN if all its candidates have failed
+    low, high: the 10 % and 90 % quantiles of the population (linear interpolation); NaN in the same case
+    best_so_far: best fitness up to and including this generation; NaN before a candidate has succeeded
     """
 
     generation: int

@@ -18,14 +18,14 @@ Tree = dict[str, Any]
 
 
 def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
-    """Return the settings `tree` with start values for the number of relief genes that these eyes have.
+    """Return the settings `tree`, with the start values of relief genes converted to the number of genes of the eyes.
 
     If `tree` contains start values of all 4 x 4 genes, or of all genes of a symmetric relief of 4 x 4 points, and the
     eyes have more genes, the values are converted to the same surface with more genes. If reliefs are symmetric, start
     values that follow from others are removed.
 
     Raises:
-        ConfigError: `tree` contains start values for more than 4 x 4 genes, but the eyes have another number of genes.
+        ConfigError: `tree` contains start values for more than 4 x 4 genes, and the eyes have more genes than that.
     """
     genes, names = tree.get("genome", {}), doe_names(eye.relief_points)
     side = _spelled_out(genes)

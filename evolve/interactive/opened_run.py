@@ -118,9 +118,11 @@ class OpenedRun(Run):
 
         Raises:
             LockedError: another process works on the run.
-            RunError: the run has a former format.
+            RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or
+                the run has a format that is too old to be continued.
             ConfigError: the user task was not named when the run was opened, or fails at its start; or callbacks are
                 not functions.
+            BackendError: Dr.Jit cannot find a usable LLVM library.
         """
         watchers = Callbacks(callbacks, progress)
         with resuming(self) as unfinished:

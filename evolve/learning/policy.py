@@ -206,7 +206,10 @@ def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy
 
 
 def save_policy(policy: EyePolicy, path: Path | str) -> None:
-    """Write the policy's tensors as safetensors with its shape in the metadata, completely or not at all."""
+    """Write the policy's tensors as a safetensors file, with the policy's configuration in the metadata.
+
+    The file is written completely or not at all.
+    """
     tensors = {name: tensor.detach().clone() for name, tensor in learnt(policy).items()}
     # One entry only: safetensors writes several entries in random order, but equal policies must give equal bytes.
     metadata = {"config": json.dumps({**policy.config.record(), "units": UNITS.__name__})}

@@ -85,7 +85,7 @@ def check_layouts(config: RunConfig) -> None:
     """Draw the random layouts of all sets, if the run has a family of them.
 
     Raises:
-        ConfigError: two layouts have the same walls, or courses of this size cannot be drawn.
+        ConfigError: two layouts have the same walls, or no navigation course of the configured size can be drawn.
     """
     if config.world.layouts != FAMILY:
         return

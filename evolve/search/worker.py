@@ -46,12 +46,13 @@ class Message:
 
 
 def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: Callable[[], None] | None) -> None:
-    """Evaluate the candidates that arrive through the pipe, and send a message for each result.
+    """Evaluate the candidates that arrive through the pipe, and send messages with progress and results.
 
-    This is the main function of a worker process.
+    This is the main function of a worker process. It returns when the pipe is closed. It also returns after the message
+    "unfit", if the worker cannot evaluate candidates.
 
     connection: the worker's end of the pipe
-    evaluate: function that is called as `evaluate(*job.arguments, progress=...)`
+    evaluate: function that is called as `evaluate(*arguments, progress=...)` with the arguments from the pipe
     prepare: function that is called before the first candidate; None: no preparation
     """
     send_all_to_stderr()

@@ -214,7 +214,13 @@ _COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, 
 
 
 def _not_negative(value: Any, name: str) -> float:
-    """Return a number of at least 0. The tolerance of `real` for rounding errors is too large for so wide a range."""
+    """Return `value` as a float of at least 0.
+
+    `real` with the range [0, 1e300] would accept negative numbers, because its tolerance is proportional to the range.
+
+    Raises:
+        ValueError: the value is negative or not a number.
+    """
     if (number := real(value, name, _ANY)) < 0:
         raise ValueError(f"{name} = {number}: must be 0 or more")
     return number

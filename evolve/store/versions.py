@@ -60,7 +60,10 @@ def present() -> dict[str, str]:
 
 
 def recorded(run: Path) -> dict[str, str]:
-    """Return the versions at the first start of a run; {} if they cannot be read."""
+    """Return the versions of the software, by name as in `present`, at the first start of a run.
+
+    The result is {} if the record cannot be read.
+    """
     starts = _starts(run)
     return starts[0]["versions"] if starts else {}
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from optics.elements.pupil import Pupil
 from optics.eye.eye import Eye
-from optics.numerics.arguments import one_of
+from optics.numerics.arguments import one_of, positive
 from optics.ommatidia.facet import FacetLens
 from optics.ommatidia.mosaic import AppositionEye
 from optics.ommatidia.ommatidium import Ommatidium
@@ -40,21 +40,23 @@ class Facet:
     focal_length: focal length f [m] in front of the lens.
     rhabdom: diameter d [m] of the rhabdom's tip.
     length: length l [m] of the rhabdom.
+    proximal: diameter [m] of the rhabdom's far end, if it tapers.
     """
 
     diameter: float
     focal_length: float
     rhabdom: float
     length: float
+    proximal: float | None = None
 
     def ommatidium(self) -> Ommatidium:
         """Return a plano-convex facet lens of this focal length, and the rhabdom in its focus."""
         lens = FacetLens(self.diameter, self.focal_length * (LENS_N - 1), n=LENS_N)
-        return Ommatidium(lens, _guide(self.rhabdom, self.length))
+        return Ommatidium(lens, _guide(self.rhabdom, self.length, self.proximal))
 
 
-def _guide(diameter: float, length: float) -> Waveguide:
-    return Waveguide(diameter, length=length, absorption=INVERTEBRATE_ABSORPTION)
+def _guide(diameter: float, length: float, proximal: float | None = None) -> Waveguide:
+    return Waveguide(diameter, length=length, absorption=INVERTEBRATE_ABSORPTION, proximal_diameter=proximal)
 
 
 def _by_angle(diameter: float, focal_length: float, angle_deg: float, length: float) -> Facet:
@@ -103,13 +105,15 @@ def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
     """Return the frontal eye of a blowfly, *Calliphora*, with the rhabdomeres R1-6, for the receptors "blowfly".
 
     Source: Stavenga, J. Exp. Biol. 207, 1703, 2004, fig. 4: D = 25 µm, F = 2.2, tips of 1.4 to 2 µm, length 250 µm. The
-    rhabdomeres of flies taper to 1 µm at their ends. Here they are straight. The interommatidial angle of 1.3° is a
-    typical value, for which no source has been read.
+    rhabdomeres taper to 1 µm at their ends. In the article, the taper is a parabola whose equation has not been read;
+    here it is linear. The interommatidial angle of 1.3° is a typical value, for which no source has been read.
 
     rings: rings of ommatidia around the central one.
-    rhabdomere: diameter [m] of the rhabdomere's tip.
+    rhabdomere: diameter [m] of the rhabdomere's tip. Rhabdomeres of at most 1 µm do not taper.
     """
-    return AppositionEye(Facet(25e-6, 2.2 * 25e-6, rhabdomere, 250e-6).ommatidium(), rings, 1.3)
+    tip = positive("rhabdomere", rhabdomere)
+    facet = Facet(25e-6, 2.2 * 25e-6, tip, 250e-6, min(1e-6, tip))
+    return AppositionEye(facet.ommatidium(), rings, 1.3)
 
 
 def dragonfly(rings: int = 20) -> AppositionEye:

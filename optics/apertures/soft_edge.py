@@ -64,7 +64,8 @@ class SoftEdge:
     def ring(self, r: np.ndarray) -> np.ndarray:
         """Return 2π r g(r), the weight of the kernel g on the circle of radius r <= reach.
 
-        The integral from 0 to `reach` is 1.
+        r and `reach` are in units of the pupil's radius R, and the result is in units of 1/R. The integral from 0 to
+        `reach` is 1.
         """
         return np.asarray(self._odd_series(np.minimum(r, self.reach)))
 

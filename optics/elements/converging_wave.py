@@ -131,9 +131,15 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
 
 
 def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWave:
-    """Return the wave of an object with data (complex), dx [mm] and wavelength [µm].
+    """Return the wave of an object with the attributes data (complex), dx [mm] and wavelength [µm].
 
-    The samples lie on a plane at a distance [m] from the image plane and parallel to it.
+    system: the object. Its samples lie on a plane that is parallel to the image plane.
+    wavelength: vacuum wavelength [m]. The wavelength of the object must be equal to it.
+    distance: distance [m] of the samples from the image plane.
+
+    Raises:
+        ValueError: the wavelengths differ, the data are not finite or not two-dimensional, or the pupil is dark,
+            obscured, not convex or unevenly illuminated.
     """
     data, own = complexes("data", system.data), _one("wavelength", system.wavelength)
     pitch = positive("dx", _one("dx", system.dx), "mm") * MM

@@ -22,7 +22,7 @@ FLAT = 1e-9  # choice [m]: largest distance of images from a common plane
 class ExitPupils(ReadOnlyArrays):
     """Exit pupils of a lens whose images lie on one plane.
 
-    fields: points of the field in the other program's order and units.
+    fields: points of the field, in the order and units of the program that computed the pupils.
     wavelengths: vacuum wavelengths [m], ascending.
     pupils: one row per field, with one exit pupil per wavelength.
     """

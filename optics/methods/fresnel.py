@@ -84,7 +84,10 @@ def fraunhofer(problem: Problem) -> list[ParaxialSampling]:
 
 
 def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSampling]:
-    """Return a sampling for an integrand of frequencies up to `turning` [1/m]; empty for a pupil of pixels."""
+    """Return a list with one sampling, for an integrand with frequencies up to `turning` [1/m].
+
+    The list is empty if the pupil consists of pixels.
+    """
     if problem.pixelated is not None:
         return []
     edge = problem.soft_edge(turning)

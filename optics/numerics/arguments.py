@@ -257,7 +257,11 @@ def is_sized(value: Any) -> bool:
 
 
 def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
-    """Return `values` as a tuple; ValueError, which shows `example`, unless all are instances of `kind`."""
+    """Return `values` as a tuple of instances of `kind`.
+
+    Raises:
+        ValueError: a value has another type, or `values` is no sequence. The message shows `example`.
+    """
     try:
         found = tuple(values)
     except TypeError:

@@ -67,9 +67,9 @@ def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
 
 @lru_cache(maxsize=4096)
 def _degree(cycles: float, digits: float) -> int:
-    """Return the degree of the polynomial that represents a wave of `cycles` cycles between the ends.
+    """Return the degree of a polynomial that represents a wave with `cycles` cycles on an interval to 10^-digits.
 
-    It is cached, because rules for the many parts of an opening often need the same number.
+    The degree is cached, because the rules for the many parts of an aperture often need the same degree.
     """
     return int(harmonics(np.array(pi * cycles), digits))
 

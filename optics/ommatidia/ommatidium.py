@@ -72,11 +72,14 @@ class Ommatidium:
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
         """Return the fraction of a distant point source's light on the facet that enters each mode, (mode, ...).
 
-        angle_x, angle_y: direction [rad] of the source, along x and y off the lens' axis. The light travels in the
-            opposite direction, so the angles of its `PointSource` are the negative of these.
+        angle_x, angle_y: angles [rad] between the axis of the lens and the direction of the source, projected onto the
+            planes (x, z) and (y, z). The light travels in the opposite direction, so its `PointSource` has the negative
+            angles. The arrays are broadcast together, to the shape (...).
+        wavelength: vacuum wavelength [m].
 
         Raises:
-            ValueError: an angle's sine is above 0.5, the angles have different shapes, or the rhabdom has no modes.
+            ValueError: an angle has a sine above 0.5 or below -0.5, the shapes of the angles cannot be broadcast, or
+                the rhabdom has no modes.
         """
         x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)
         try:

@@ -11,11 +11,14 @@ import numpy as np
 
 from optics.elements.refractive_index import Dispersion, index_of
 from optics.numerics.arguments import positive, reals, vacuum_wavelength
+from optics.numerics.quadrature import gauss_legendre
 
 __all__ = ["Mode", "Waveguide"]
 
 MOST_V = 60.0  # choice: about a thousand modes, where ray optics is accurate enough
 EDGE = 1e-9  # margin for rounding next to the poles of the equation
+NODES = 32  # choice: nodes along a taper; the error of the mean share in the core is below 2e-6
+GRADING = 2  # choice: power by which the nodes gather at a cut-off, where the share in the core has a kink
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,11 @@ class Mode:
         square = self.u**2 + self.w**2
         return 1 - self.u**2 / square * (1 - self._kappa())
 
+    @property
+    def cut_off(self) -> float:
+        """Waveguide parameter V below which the mode is not guided: a zero of J_{l-1}, and 0 for LP01."""
+        return _brackets(self.l, self.m)[self.m - 1][0]
+
     def _kappa(self) -> float:
         from scipy.special import kve
 
@@ -74,14 +82,22 @@ class Mode:
 
 @dataclass(frozen=True)
 class Waveguide:
-    """A waveguide with the shape of a straight cylinder: a rhabdom or a rhabdomere.
+    """A straight, round waveguide: a rhabdom or a rhabdomere. It is a cylinder, or tapers from its tip to its far end.
 
-    diameter: diameter [m] of the core.
+    In a taper, light enters the modes of the tip, and each mode keeps its light while it becomes the local mode of the
+    thinner guide (Snyder & Love, ch. 19). A mode that reaches its cut-off loses its remaining light. This model holds
+    for slow tapers, whose radius shrinks by less than itself over a beat length 2π/(β₁ - β₂). β₁ belongs to the mode
+    LP01, and β₂ to LP02 or, without it, to the surroundings (Love et al., IEE Proc. J 138, 343, 1991). Tapers that are
+    too fast at the tip are refused.
+
+    diameter: diameter [m] of the core at the tip, where light enters.
     n_core, n_clad: refractive indices of core and surroundings, constant or dispersive. The index of the core should be
         only slightly larger, because modes are computed for weak guiding.
     length: length [m] over which light is absorbed (None: all guided light is absorbed).
     absorption: absorption coefficient of the core [1/m] at the pigment's peak. A mode loses the fraction 1 -
         exp(-absorption · core_share · length) of its light.
+    proximal_diameter: diameter [m] of the core at its far, proximal end, at most `diameter` (None: equal to it). In
+        between, the diameter is linear, and core_share is averaged over the length on which the mode is guided.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -92,6 +108,7 @@ class Waveguide:
     n_clad: float | Dispersion = 1.340
     length: float | None = None
     absorption: float = 6e3
+    proximal_diameter: float | None = None
 
     def __post_init__(self) -> None:
         positive("diameter", self.diameter)
@@ -100,9 +117,15 @@ class Waveguide:
         if self.length is not None:
             positive("length", self.length)
         positive("absorption", self.absorption, "1/m")
+        if self.proximal_diameter is not None:
+            end = positive("proximal_diameter", self.proximal_diameter)
+            if end > self.diameter:
+                raise ValueError(f"proximal_diameter = {end:g} m: must be at most diameter = {self.diameter:g} m")
+            if self.length is None:
+                raise ValueError(f"length = None: must be a length in m, because proximal_diameter = {end:g} m")
 
     def v_number(self, wavelength: float) -> float:
-        """Return V = πd/λ √(n_core² - n_clad²) at a vacuum wavelength [m]. Below 2.405 there is a single mode.
+        """Return V = πd/λ √(n_core² - n_clad²) of the tip at a vacuum wavelength [m]. Below 2.405, it has one mode.
 
         Raises:
             ValueError: the index of the core is not above that of the surroundings, or V is above 60.
@@ -117,46 +140,104 @@ class Waveguide:
         return v
 
     def modes(self, wavelength: float) -> tuple[Mode, ...]:
-        """Return the guided modes at a vacuum wavelength [m], the best confined first. Modes with l >= 1 come in pairs.
+        """Return the modes that the tip guides at a vacuum wavelength [m], the best confined first.
+
+        Modes with l >= 1 come in pairs.
 
         Raises:
-            ValueError: see `v_number`.
+            ValueError: see `v_number`, or the guide tapers too fast for light to stay in its mode.
         """
         v, found = self.v_number(wavelength), []
         for l in range(math.ceil(v) + 1):
             for m, u in enumerate(_roots(l, v), start=1):
                 mode = Mode(l, m, u, math.sqrt(v * v - u * u), self.diameter / 2)
                 found += [mode] if l == 0 else [mode, Mode(l, m, u, mode.w, mode.radius, True)]
+        self._check_taper(vacuum_wavelength(wavelength), [mode.u for mode in found if mode.l == 0], v)
         return tuple(sorted(found, key=lambda mode: mode.u))
 
+    def _check_taper(self, wavelength: float, axial: list[float], v: float) -> None:
+        """Refuse a taper that is too fast for LP01 at the tip. The roots U of the modes with l = 0 are `axial`."""
+        if self.length is None or self.proximal_diameter is None or not axial:
+            return
+        first, second = [*axial, v][:2]
+        # β₁ - β₂ = (U₂² - U₁²)/(2 k n b²), and the radius b may change by b (β₁ - β₂)/2π per length.
+        n = index_of("n_core", self.n_core).at(wavelength)
+        steepest = (second**2 - first**2) * wavelength / (4 * math.pi**2 * n * self.diameter)
+        least = (self.diameter - self.proximal_diameter) / (2 * steepest)
+        if self.length < least:
+            raise ValueError(
+                f"length = {self.length:g} m: must be at least {least:.3g} m at a wavelength of {wavelength:g} m, "
+                f"for a taper to proximal_diameter = {self.proximal_diameter:g} m in which light stays in its mode"
+            )
+
+    def guided_length(self, mode: Mode) -> float:
+        """Return the length [m] from the tip over which the guide is wide enough for a mode; inf if length is None."""
+        if self.length is None:
+            return math.inf
+        v, end = self._v_range(mode)
+        return self.length if end > mode.cut_off or end == v else self.length * (v - mode.cut_off) / (v - end)
+
     def absorbed(self, mode: Mode) -> float:
-        """Return the fraction of a mode's light that is absorbed along the whole length."""
-        return 1.0 if self.length is None else 1 - math.exp(-self.absorption * mode.core_share * self.length)
+        """Return the fraction of a mode's light that is absorbed along the whole length, or up to its cut-off.
+
+        For a taper, the mean of core_share comes from a quadrature over the length, with an error below 2e-6.
+        """
+        if self.length is None:
+            return 1.0
+        share = mode.core_share if self.proximal_diameter is None else self._mean_core_share(mode)
+        return 1 - math.exp(-self.absorption * share * self.guided_length(mode))
+
+    def _v_range(self, mode: Mode) -> tuple[float, float]:
+        """Return V at the tip and at the far end, at the wavelength of a mode."""
+        v = math.hypot(mode.u, mode.w)
+        return v, v if self.proximal_diameter is None else v * self.proximal_diameter / self.diameter
+
+    def _mean_core_share(self, mode: Mode) -> float:
+        """Return the mean of the local mode's share in the core, over the length on which it is guided."""
+        v, end = self._v_range(mode)
+        low = max(end, mode.cut_off)
+        node, weight = gauss_legendre(NODES)
+        shares = [_core_share(mode.l, mode.m, float(at)) for at in low + (v - low) * node**GRADING]
+        return float(GRADING * node ** (GRADING - 1) * weight @ shares)
+
+
+@lru_cache(maxsize=65536)
+def _core_share(l: int, m: int, v: float) -> float:
+    """Return `Mode.core_share` of the mode LP_lm at V, and its limit 1 - 1/l (0 for l = 0) too near to the cut-off."""
+    u = _root(l, *_brackets(l, m)[m - 1], v)
+    share = math.nan if u is None else Mode(l, m, u, math.sqrt(v * v - u * u), 1.0).core_share
+    return share if math.isfinite(share) else 1 - 1 / max(l, 1)
+
+
+@lru_cache(maxsize=4096)
+def _brackets(l: int, count: int) -> list[tuple[float, float]]:
+    """Return the cut-offs of the first modes of azimuthal order l, each with the next zero of J_l, its largest U."""
+    from scipy.special import jn_zeros
+
+    cutoffs = [0.0, *jn_zeros(1, count)] if l == 0 else list(jn_zeros(l - 1, count))
+    return [(float(low), float(high)) for low, high in zip(cutoffs, jn_zeros(l, count), strict=False)]
 
 
 @lru_cache(maxsize=4096)
 def _roots(l: int, v: float) -> tuple[float, ...]:
-    """Return U of all guided modes of azimuthal order l: the roots of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W).
+    """Return U of all guided modes of azimuthal order l at V = v."""
+    found = (_root(l, low, high, v) for low, high in _brackets(l, int(v / math.pi) + 2) if low < v)
+    return tuple(u for u in found if u is not None)
 
-    Here W² = v² - U².
 
-    Each mode above its cut-off has one root, between a zero of J_{l-1} and the next zero of J_l.
+def _root(l: int, low: float, high: float, v: float) -> float | None:
+    """Return the root of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W) between low and high; None without a root.
+
+    Here W² = v² - U². Each mode above its cut-off has one root, between a zero of J_{l-1} and the next zero of J_l.
     """
     from scipy.optimize import brentq
-    from scipy.special import jn_zeros, jv, kve
+    from scipy.special import jv, kve
 
     def difference(u: float) -> float:
         w = math.sqrt(max(v * v - u * u, 0.0))
         return float(u * jv(l + 1, u) * kve(l, w) - w * kve(l + 1, w) * jv(l, u))
 
-    count = int(v / math.pi) + 2
-    poles = [at for at in jn_zeros(l, count) if at > 0]
-    cutoffs = [0.0, *jn_zeros(1, count)] if l == 0 else list(jn_zeros(l - 1, count))
-    found = []
-    for low, high in zip(cutoffs, poles, strict=False):
-        if low >= v:
-            break
-        ends = low + EDGE * max(low, 1), min(high, v) - EDGE * v
-        if ends[0] < ends[1] and difference(ends[0]) * difference(ends[1]) < 0:
-            found.append(float(brentq(difference, *ends, xtol=1e-13)))
-    return tuple(found)
+    ends = low + EDGE * max(low, 1), min(high, v) - EDGE * v
+    if ends[0] < ends[1] and difference(ends[0]) * difference(ends[1]) < 0:
+        return float(brentq(difference, *ends, xtol=1e-13))
+    return None

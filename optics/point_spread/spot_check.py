@@ -216,18 +216,17 @@ KINDS = 6  # kinds of points in `_chances`
 
 
 def _chances(bright: np.ndarray, window: Grid) -> np.ndarray:
-    """Return the probability with which each point is drawn, flat.
+    """Return the probability with which each point is drawn, as a flat array.
 
     It is the mean of six distributions. The first is uniform. The others are proportional to the following quantities:
 
-    - Intensity: if the amplitude has the same error everywhere, the error of the intensity is proportional to the
-        square root of the intensity. Next to a bright focus, only this distribution detects such an error.
+    - Intensity: if the amplitude has the same error everywhere, the squared error of the intensity is proportional to
+        the intensity. Next to a bright focus, only this distribution detects such an error.
     - Squared intensity, spread over neighbouring samples: the errors of a focus of one sample lie next to it.
-    - Nearness of a side, and nearness of a corner: phases change fastest there, so quadratures fail there first, and
-        within a few samples. In a window off the axis, phases change fastest at the sides that are farthest from the
-        axis.
-    - Intensity times nearness: the light of a slit reaches the sides only in few places, and errors are largest in
-        bright places.
+    - Nearness to a side, and nearness to a corner: phases change fastest there, so quadratures fail first at the few
+        outermost samples. In a window off the axis, phases change fastest at the sides that are farthest from the axis.
+    - Intensity times the sum of both kinds of nearness: the light of a slit reaches the sides only in few places, and
+        errors are largest in bright places.
     """
     height, width = shape = window.shape
     squares = np.zeros((height + 2, width + 2))

@@ -69,7 +69,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def tensor(self) -> Array:
-        """PSFs in Dr.Jit, (type, y, x), with derivatives."""
+        """PSFs [1/m²] as a Dr.Jit tensor (type, y, x) that carries derivatives."""
         return mixed(self.waves.tensor, self.weights)
 
     @cached_property

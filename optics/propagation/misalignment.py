@@ -168,9 +168,10 @@ def slowness(sine: float) -> float:
 
 
 def path_to_tilted_plane(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:
-    """Return the path [m] of a source's light from a pupil's plane without tilt to that with tilt, minus the depth ζ.
+    """Return the path [m] of a source's light from the untilted to the tilted plane of a pupil, minus the depth ζ.
 
-    The result has one value for each sample of a grid about the pupil's centre, (y, x).
+    The depth ζ is the distance between both planes along the axis, see `Alignment.depth`. The result has one value for
+    each sample of a grid about the pupil's centre, (y, x).
     """
     tangents = [math.tan(angle) for angle in source.angle]
     distance = number(source.distance)

@@ -189,9 +189,9 @@ def _fade_table(ripple: float) -> Interpolant:
 class TransferFunction:
     """Factors for each frequency of a spectrum.
 
-    transfer: the transfer function, with all factors that do not depend on the field.
-    grazing: fraction of the light of each frequency that is too near grazing incidence, for real and imaginary parts,
-        (fy, 2 fx); None if all are 0.
+    transfer: the transfer function, with all factors that do not depend on the field, complex (fy, fx).
+    grazing: 1 for frequencies whose light is too near grazing incidence, else 0, (fy, 2 fx). Each value occurs twice in
+        succession, for the real and the imaginary part of the spectrum. None if all values are 0.
     """
 
     transfer: np.ndarray

@@ -35,6 +35,8 @@ class RegisteredEnv(EyesEnv):
 class RegisteredVectorEnv(EyesVectorEnv):
     """An `EyesVectorEnv` that truncates its episodes after `max_episode_steps` actions.
 
+    A course or a family of layouts with a smaller number of actions truncates them earlier.
+
     Raises:
         ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """

@@ -91,6 +91,13 @@ class CompoundEye:
     def __len__(self) -> int:
         return len(self.directions)
 
+    def __repr__(self) -> str:
+        """Return a short description that omits the directions."""
+        each = self.ommatidium if isinstance(self.ommatidium, optics.Ommatidium) else self.ommatidium[0]
+        facets = f"{len(self)} ommati{'dium' if len(self) == 1 else 'dia'}, {self.fov_deg:.3g}° wide"
+        first = "" if each is self.ommatidium else "first "
+        return f"<CompoundEye of {facets}, {first}facet {1e6 * each.lens.diameter:.3g} µm, {self.receptors}>"
+
     def with_mirror_image(self) -> CompoundEye:
         """Return this eye together with its mirror image on the other side of the body.
 

@@ -61,8 +61,9 @@ class EyeRays(Protocol):
         """Return the buffer of the eyes on the device, which the kernel reads."""
 
     def directions(self, ways: np.ndarray, origins: np.ndarray | None = None) -> Directions:
-        """Return the directions of samples (ray, 3), given in an eye's frame.
+        """Return the directions of all samples on the device, in the frame that `Directions` describes.
 
+        ways: directions of the samples in the eye's frame, (ray, 3)
         origins: starting points in the eye's frame [m], (ray, 3), of free eyes; None: the pupil
         """
 

@@ -45,7 +45,7 @@ class ReferenceRenderer:
     Raises:
         ValueError: an argument is invalid, the world has a medium, the eyes are compound eyes, or the sides of a
             receptor are not in the ratio of small whole numbers.
-        optics.AccuracyError: the light of a pupil spreads too far.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
 
     def __init__(

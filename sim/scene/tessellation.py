@@ -86,7 +86,9 @@ _QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def box(half_size: np.ndarray) -> Triangles:
-    """Return a box.
+    """Return a box around the origin.
+
+    half_size: half the lengths [m] along x, y and z, (3,)
 
     Faces ±x have (u, v) = (y, -z), faces ±y (x, -z), faces ±z (x, -y), each over [0, 1]. Opposite faces show mirror
     images of each other.

@@ -41,7 +41,7 @@ class _OfWorld:
 
 
 class PerWorld(BatchTask):
-    """Batch task for one animal of a `sim.Task` and its `others`, or for all animals of a `sim.Encounter`.
+    """Batch task for all animals of a `sim.Encounter`, or for the animal of a `sim.Task` and the task's `others`.
 
     learners: tasks of the learning animals
     frozen: animals that do not learn

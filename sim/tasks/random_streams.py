@@ -114,9 +114,9 @@ class MotionNoise:
         self._drawn = np.empty((0, 2, len(generators), 0))
 
     def next(self, movers: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return numbers for the next action, one for each moving object: standard normal, and uniform in [-1, 1).
+        """Return standard normal numbers, and uniform numbers in [-1, 1), for the next action.
 
-        Both arrays have the shape (n, movers).
+        Both arrays contain one number for each moving object in each world, (world, movers).
         """
         if not len(self._drawn):
             shape = (AHEAD, movers)

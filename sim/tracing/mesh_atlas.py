@@ -55,7 +55,12 @@ class MeshAtlas:
         return MeshAtlas(cells, mi.load_dict({"type": "scene", **merged(placed, "meshes")}, optimize=False))
 
     def hit(self, o: Array, d: Array, cell: Array, reach: Array) -> Array:
-        """Return the distance from o to a mesh in direction d [m], in the mesh's frame; infinite for a miss."""
+        """Return the distance [m] from the point o to a mesh in the direction d; infinite for a miss.
+
+        o, d: origin [m] and direction (a unit vector) of the ray, in the mesh's frame
+        cell: centre of the mesh's cell
+        reach: largest distance of the mesh's surface from its origin [m]
+        """
         ray, start = _within(o, d, cell, reach)
         assert self.scene is not None
         found = self.scene.ray_intersect_preliminary(ray)

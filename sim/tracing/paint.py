@@ -100,8 +100,8 @@ class Paint:
     def _spectrum(self, rgb: tuple[float, ...], emitted: bool) -> np.ndarray:
         """Return the reflectance (band,) of a display-referred colour.
 
-        emitted: True to return the factor of an emission instead: the reflectance of the colour's hue, times the
-            colour's largest component
+        emitted: True to return instead the factor by which an emission is multiplied. It is the reflectance of the
+            brightest colour with the same hue and saturation, times the largest linear component of the colour
         """
         if (rgb, emitted) not in self._known:
             if len(self._known) > 10_000:

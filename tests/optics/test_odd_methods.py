@@ -101,6 +101,7 @@ CALLS = {
     "SpectralBands.uniform": lambda: (optics.SpectralBands.uniform, {"bands": 4, "receptors": "rgb"}),
     "Spectrum.at": lambda: (optics.Spectrum((400.0, 700.0), (1.0, 1.0)).at, SPECTRUM),
     "Waveguide.absorbed": lambda: (optics.Waveguide(2e-6).absorbed, {"mode": mode()}),
+    "Waveguide.guided_length": lambda: (optics.Waveguide(2e-6).guided_length, {"mode": mode()}),
     "Waveguide.modes": lambda: (optics.Waveguide(2e-6).modes, GREEN),
     "Waveguide.v_number": lambda: (optics.Waveguide(2e-6).v_number, GREEN),
     "WhitePSF.encircled_energy": lambda: (

@@ -44,7 +44,9 @@ def in_time(**given):
 
 
 def guided(**given):
-    return [mode.field(1e-7, 2e-7) for mode in Waveguide(2e-6, **given).modes(5e-7)], Waveguide(2e-6, **given)
+    guide = Waveguide(2e-6, **{"length": 2e-4, **given})
+    modes = guide.modes(5e-7)
+    return [mode.field(1e-7, 2e-7) for mode in modes], [guide.absorbed(mode) for mode in modes]
 
 
 def ommatidium(**given):
@@ -220,6 +222,8 @@ OF_FACETS = {
     "AppositionEye.contrast": Walk(lambda **asked: COMPOUND.contrast(0.2, **asked), {**IN_COLOUR, "azimuth_deg": 15.0}),
     "AppositionEye.field": Walk(COMPOUND.field, IN_COLOUR),
     "AppositionEye.see": Walk(lambda **asked: COMPOUND.see(lambda x, y: x, **asked), IN_COLOUR),
-    "Waveguide": Walk(guided, {"n_core": 1.38, "n_clad": 1.33, "length": 1e-4, "absorption": 1e4}),
+    "Waveguide": Walk(
+        guided, {"n_core": 1.38, "n_clad": 1.33, "length": 1e-4, "absorption": 1e4, "proximal_diameter": 1e-6}
+    ),
     "Mode": Walk(lambda **given: optics.Mode(1, 1, 2.0, 2.0, 1e-6, **given).field(1e-7, 2e-7), {"sine": True}),
 }

@@ -29,9 +29,10 @@ def distances_to_wall(area: Area, piece: Piece, patch: Patch) -> list[Array]:
 
 
 def distances_to_floor(area: Area, a: Array, dip: Array, height: Array, above: Array) -> list[Array]:
-    """Return the distances [m] to two rows of a band of the floor.
+    """Return the distances [m] from the pupil to the floor at the two quadrature nodes of a band.
 
-    a, dip: middle of the band, as a column and a downward slope
+    a: column of the band's middle, see `Area`
+    dip: downward slope of the direction to the band's middle, on the eye's tangent plane
     height: height of the band, as a difference of slopes
     above: height of the pupil above the floor [m]
     """

@@ -6,7 +6,7 @@ search: test_search.py
 optimizers: test_search.py, test_ask_tell.py
 null_model: test_null_model.py, test_priced_search.py
 same_search: test_same_search.py
-successive_halving: test_successive_halving.py
+successive_halving: test_rungs.py, test_successive_halving.py
 job: test_local_executor.py, test_dask_executor.py
 local_executor: test_worker_deaths.py, test_local_executor.py
 worker: test_worker.py, test_local_executor.py

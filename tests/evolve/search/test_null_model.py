@@ -1,14 +1,17 @@
 """The null model is the search itself with random fitness, and its p-value is correct without selection."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
 from evolve.analysis.statistics import gene_values
+from evolve.search import null_model as null_model_module
 from evolve.search.loop import evolve
-from evolve.search.null_model import FIRST_SEED, NullModel, last_generations, null_model, p_value
+from evolve.search.null_model import FIRST_SEED, NullModel, fitness_spread, last_generations, null_model, p_value
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
 from tests.evolve.closed_form import tiny
@@ -96,3 +99,42 @@ def test_p_is_uniform_where_nothing_is_selected():
         found = [p_value(chance.gamma(2.0, size=several), ends) for _ in range(300)]
         assert kstest(found, "uniform").pvalue > 1e-3
     assert kstest([p_value([chance.gamma(2.0, size=3).mean()], ends) for _ in range(300)], "uniform").pvalue < 1e-3
+
+
+def test_spreads_are_pooled_over_runs_and_over_all_generations_where_there_are_too_few():
+    """The first generation has one degree of freedom in all, the second two, and the third none."""
+
+    def run(*generations):
+        members = [
+            [SimpleNamespace(task_fitness=fitness, failure=None if fitness < 9 else "lost") for fitness in fitnesses]
+            for fitnesses in generations
+        ]
+        return SimpleNamespace(generation=lambda number: members[number])
+
+    runs = [run([1.0, 2.0, 9.0], [0.0, 4.0], [3.0]), run([5.0], [1.0, 2.0], [9.0, 8.0])]
+    overall = (0.5 + 8 + 0.5) / 3
+    expected = [math.sqrt(0.5), math.sqrt(8.5 / 2), math.sqrt(overall)]
+    assert fitness_spread(runs, 3) == pytest.approx(expected)
+    assert fitness_spread([run([1.0])], 1) == [0]
+
+
+def test_ties_count_on_both_sides():
+    """A value that all searches reach is not extreme, even if it is 0 and leaves no room for rounding."""
+    for value in (0.0, 0.1, -3.0):
+        assert p_value([value], np.full(9, value)) == 1
+    ends = np.array([0.0, 0.0, 1.0, 2.0])
+    assert p_value([0.0], ends) == 1.0
+    assert p_value([2.0], ends) == pytest.approx(2 * (1 + 1) / 5)
+    assert p_value([3.0], ends) == pytest.approx(2 / 5)
+
+
+def test_means_leave_out_values_that_are_not_finite(monkeypatch):
+    """The first generation has two finite values of three, and the second none."""
+    values = iter([1.0, math.inf, 4.0, math.nan, math.nan])
+    vectors = [[SimpleNamespace(vector=None)] * count for count in (3, 2)]
+    monkeypatch.setattr(null_model_module, "_proposals", lambda config, generations, spread: vectors)
+    monkeypatch.setattr(null_model_module, "develop", lambda vector, config: None)
+    means, counts = null_model_module._search(None, lambda animal: {"acuity": next(values)}, 2, [])["acuity"]
+    assert counts == [2, 0]
+    assert means[0] == 2.5
+    assert math.isnan(means[1])

@@ -16,7 +16,14 @@ from evolve.learning.training_rung import TrainingRung
 from evolve.runs import progress
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
-from evolve.search.successive_halving import budgets, evaluations, finished, promoted, sizes, steps
+from evolve.search.successive_halving import (
+    budgets,
+    evaluations,
+    finished,
+    promoted,
+    sizes,
+    steps,
+)
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run, RunError
 from tests.evolve.closed_form import tiny

@@ -8,14 +8,14 @@ eye_spec: test_eye.py, test_patches.py, test_axes.py, test_receptor_density.py, 
 geometry: test_patches.py, test_vertical_field.py
 immersion: elements/test_turbid_medium.py
 depth_range: test_depth_range.py, test_occlusion.py, test_kernel_bank.py
-kernel_bank: test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py, test_eye_robustness.py
-kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py, test_sight_tolerance.py
+kernel_bank: test_eye_parts.py, test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py
+kernel_interpolation: test_eye_parts.py, test_kernel_interpolation.py, test_kernel_bank.py, test_sight_tolerance.py
 layered_image: test_occlusion.py
-occlusion: test_occlusion.py
+occlusion: test_eye_parts.py, test_occlusion.py
 photoreceptor: test_photoreceptor.py
-polarization: test_polarization.py
+polarization: test_eye_parts.py, test_polarization.py
 signals: test_eye.py, test_polarization.py
-receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py, test_eye_robustness.py
+receptive_field: test_eye_parts.py, test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py
 guided_field: test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retina: test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
@@ -25,5 +25,5 @@ camera: test_camera.py
 receptor_density: test_receptor_density.py
 receptor_lattice: test_receptor_density.py
 patch: test_receptor_density.py
-summary: test_summary.py
+summary: test_eye_parts.py, test_summary.py
 """

@@ -180,3 +180,26 @@ def test_kernels_of_a_camera_are_computed_once():
     assert camera_eye(PUPIL, SENSOR) is camera_eye(PUPIL, replace(SENSOR))
     assert camera_eye(PUPIL, SENSOR) is not camera_eye(PUPIL, SENSOR, tolerance=2e-2)
     np.testing.assert_array_equal(camera_image(WHITE, PUPIL, SENSOR), first)
+
+
+def test_filters_of_sensors():
+    """The default has rows of red, green and of green, blue, whose peaks are at 600, 520 and 460 nm."""
+    sensor = Sensor((4, 4), 1e-6)
+    assert sensor.filters.mosaic == ((0, 1), (1, 2))
+    assert [kind.peak_nm for kind in sensor.filters.types] == [600, 520, 460]
+    plain = Sensor((4, 4), 1e-6, "rgb")
+    assert plain.filters == optics.receptors_of("rgb")
+    assert plain.filters.mosaic is None
+    given = optics.receptors_of((440, 560))
+    assert Sensor((4, 4), 1e-6, given).filters == given
+
+
+@pytest.mark.parametrize(
+    ("name", "limits"),
+    [("full_well", (1, 1e9)), ("read_noise", (0, 1e6)), ("bits", (1, 16)), ("bands", (1, 64))],
+)
+def test_limits_of_sensors(name, limits):
+    for limit, beyond in zip(limits, (limits[0] - 1, limits[1] * 1.5), strict=True):
+        assert getattr(Sensor((4, 4), 1e-6, **{name: limit}), name) == limit
+        with pytest.raises(ValueError, match=rf"^{name} = "):
+            Sensor((4, 4), 1e-6, **{name: int(beyond) if name.startswith("b") else beyond})

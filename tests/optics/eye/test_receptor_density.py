@@ -233,3 +233,17 @@ def test_bad_input_names_itself(make, message):
     with pytest.raises(ValueError, match=message) as raised:
         make()
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("kind", [optics.Fovea, optics.VisualStreak])
+def test_limits_of_angles(kind):
+    for e2 in (1e-3, 1e3):
+        assert kind(e2).e2_deg == e2
+    for e2 in (0.99e-3, 1.01e3, math.nan):
+        with pytest.raises(ValueError, match=rf"{kind.__name__}: e2_deg = .*: must lie in \[0\.001, 1000\]"):
+            kind(e2)
+    for elevation in (-80, 80):
+        assert optics.VisualStreak(5, elevation).elevation_deg == elevation
+    for elevation in (-80.1, 80.1):
+        with pytest.raises(ValueError, match="VisualStreak: elevation_deg"):
+            optics.VisualStreak(5, elevation)

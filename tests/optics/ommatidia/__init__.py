@@ -6,5 +6,5 @@ radiation: test_radiation.py, test_ommatidium.py
 facet: test_facet.py
 mosaic: test_mosaic.py
 ommatidium: test_ommatidium.py
-waveguide: test_waveguide.py
+waveguide: test_waveguide.py, test_taper.py
 """

@@ -182,6 +182,8 @@ def test_derivatives_flow():
         ({"light": "D66"}, "illuminant = 'D66': must be one of"),
         ({"light": 5}, "light = 5: must be an illuminant's name"),
         ({"light": lambda at: -at}, "light: must be finite and not negative"),
+        ({"light": lambda at: at - 500e-9}, "light: must be finite and not negative"),
+        ({"light": lambda at: np.where(at > 500e-9, np.inf, 1)}, "light: must be finite and not negative"),
         ({"light": Spectrum((700.0, 701), (0.0, 1.0)), "receptors": (350,)}, "light: receptors of type 0 absorb none"),
         ({"waves": 30}, "waves = 30: must be odd"),
         ({"waves": 3}, r"waves = 3: must be a whole number in \[5, 513\]"),

@@ -1,12 +1,12 @@
 """Tests of environments: which test covers which module.
 
-assembly: test_arguments.py, test_env.py, test_vec_env.py, test_tasks_page.py
+assembly: test_batch_parts.py, test_arguments.py, test_env.py, test_vec_env.py, test_tasks_page.py
 parallel_env: test_parallel_env.py, test_pictures.py
 auxiliary: test_auxiliary.py
 one_environment: test_shared_environment.py, test_vec_env.py, test_pictures.py
 calls: test_calls.py
 env: test_env.py
-vec_env: test_vec_env.py, test_episode_infos.py, test_env.py, test_light_levels.py, test_handed_out.py
+vec_env: test_batch_parts.py, test_vec_env.py, test_episode_infos.py, test_env.py, test_handed_out.py
 vector_env: test_vector_env.py
 registered_env: test_vector_env.py
 registration: test_env.py, test_vector_env.py, worlds/test_catalog.py
@@ -18,8 +18,8 @@ ommatidia_space: test_ommatidia_in_worlds.py
 hexagon_images: test_images_for_people.py, test_ommatidia_in_worlds.py
 prepared_task: test_shared_environment.py, test_features.py, evolve/learning/test_fitness.py
 batch_task_checker: test_batch_task.py
-animals: test_encounter.py, test_parallel_env.py, test_features.py
-senses: test_task_vec_env.py, test_task_state.py, test_encounter.py
+animals: test_batch_parts.py, test_encounter.py, test_parallel_env.py, test_features.py
+senses: test_batch_parts.py, test_task_vec_env.py, test_task_state.py, test_encounter.py
 eyes_of_kind: test_receptors_in_time.py, test_eyes_of_kind.py, test_eye_kinds.py, test_features.py
 frame_choice: test_frame_choice.py, test_receptors_in_time.py
 renderers: test_features.py, test_light_levels.py, test_receptor_shapes.py

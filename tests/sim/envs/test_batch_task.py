@@ -123,6 +123,20 @@ class Mover(FindBalls):
         return super().judge(worlds, failed)
 
 
+class OwnClock(FindBalls):
+    """A task that counts actions in an attribute, which is not restored with the worlds."""
+
+    clock = np.zeros(99)
+
+    def reset(self, worlds, chosen, rngs):
+        super().reset(worlds, chosen, rngs)
+        self.clock[chosen] = 0
+
+    def rewards(self, worlds):
+        self.clock += 1
+        return {"near": self.clock[: worlds.n].copy()}
+
+
 class WrongWorld(FindBalls):
     def judge(self, worlds, failed):
         nothing = np.zeros(worlds.n, bool)
@@ -140,6 +154,7 @@ class WrongWorld(FindBalls):
         (OwnChance, "the same seed: .* differs after action 0: must repeat every episode"),
         (Crowd, "world 0: reward differs after action 0: must not depend on other worlds"),
         (Mover, "judge: moved bodies of world 0, which is not in Outcome.changed"),
+        (OwnClock, "a restored state: reward differs after action 0: must lead to the same future"),
         (WrongWorld, "judge: changed names world 7: must be within 0 and 3"),
     ],
 )

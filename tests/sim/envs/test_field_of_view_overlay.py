@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -173,3 +174,40 @@ def test_an_eye_is_a_disc_of_the_right_size_with_a_soft_edge_one_pixel_wide():
     row, column = (np.average(at, weights=dot.iris) for at in np.unravel_index(dot.pixels, size))
     assert row == pytest.approx(size[0] / 2 - 0.5, abs=0.05)
     assert column == pytest.approx(size[1] / 2 - 0.5 + 0.2 / pixel, abs=0.05)
+
+
+def test_visible_pixels_are_mixed_with_the_colour_of_their_eye(monkeypatch):
+    """The field has four pixels. The second is hidden from the eye, and the third from the camera, because a surface is
+    as near as the plane. Eyes are drawn after the fields.
+    """
+    eyes = SimpleNamespace(azimuths=lambda: np.array([0.25]), fov_deg=90)
+    fields = overlay.FieldsOfView.__new__(overlay.FieldsOfView)
+    visible = np.array([True, False, True, True])
+    asked = []
+    field = SimpleNamespace(
+        visible=lambda reach: asked.append(reach) or visible,
+        pixels=np.array([0, 1, 3, 5]),
+        depth=np.array([2.0, 2.0, 4.0, 8.0]),
+        opacity=np.array([0.25, 0.5, 0.5, 0.75]),
+    )
+    fields.eyes, fields._fields, fields._dots = eyes, [field], ["dot"]
+    monkeypatch.setattr(overlay, "_reach", lambda azimuths, eye, *of: (azimuths, eye, of))
+    drawn = []
+    monkeypatch.setattr(overlay, "_draw_dot", lambda shown, dot, *_: drawn.append((shown.copy(), dot)))
+    model = "model"
+    qpos = np.array([1.0, 2.0])
+    data = SimpleNamespace(joint=lambda name: SimpleNamespace(qpos=[0.5]), qpos=qpos)
+    picture = np.full((2, 3, 3), 100, np.uint8)
+    nearness = dict(enumerate([0.49, 0.1, 0.1, 0.25, 0.1, 0.1]))
+    shown = fields.draw(picture, lambda pixels: np.array([nearness[int(pixel)] for pixel in pixels]), model, data)
+    ((azimuths, eye, of),) = asked
+    np.testing.assert_allclose(azimuths[[0, -1]], 0.75 + np.radians([-45, 45]))
+    np.testing.assert_allclose(eye, [1 + 0.2 * math.cos(0.75), 2 + 0.2 * math.sin(0.75)])
+    assert of == (model, data)
+    expected = np.full((6, 3), 100.0)
+    for pixel, opacity in ((0, 0.25), (5, 0.75)):
+        expected[pixel] += opacity * (overlay.COLORS[0] - 100)
+    np.testing.assert_array_equal(shown, np.rint(expected).reshape(2, 3, 3))
+    np.testing.assert_array_equal(drawn[0][0].reshape(2, 3, 3), shown)
+    assert drawn[0][1] == "dot"
+    assert (picture == 100).all()

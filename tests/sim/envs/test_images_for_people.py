@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sim.envs import world_pictures
+from sim.envs import follow_camera, world_pictures
 from sim.envs.follow_camera import WAVELENGTHS, FollowCamera, _behind, _follow, _sampler, check_render_mode
-from sim.envs.hexagon_images import _margin
+from sim.envs.hexagon_images import _margin, _numbers
 from sim.envs.retina_images import hues_of, one_above_another, shares_of, side_by_side
 from sim.envs.world_pictures import WorldPictures, _ModelCameras, _overview
 from sim.scene.color import encode_srgb
@@ -166,3 +166,77 @@ def test_cameras_are_shared_by_equal_worlds(monkeypatch, varied):
         setattr(models[0], name, getattr(models[0], name) + 1)
         assert cameras._camera_of(0, physics) == len(built)
     assert len(built) == (6 if varied else 4)
+
+
+@pytest.mark.parametrize("slow", [False, True])
+def test_images_of_a_following_camera(monkeypatch, slow):
+    """A size is height and width. Fields of view are prepared once for each size."""
+    calls, prepared = [], []
+    monkeypatch.setattr(follow_camera, "pose", lambda *arguments: calls.append(arguments))
+    state = SimpleNamespace(position=np.zeros((3, 2)), heading=np.array([0.0, 0.0, 0.5]))
+    picture, nearness = np.zeros((4, 6, 3), np.uint8), object()
+
+    def quick(data, view, width, height):
+        calls.append((data, view.fovy_deg, width, height))
+        return SimpleNamespace(picture=picture, inverse_distance=nearness)
+
+    class Fields:
+        def __init__(self, eyes, view, size):
+            prepared.append((eyes, size))
+            np.testing.assert_allclose(view.position, [-4, 0, 5])
+
+        def draw(self, *arguments):
+            return arguments
+
+    monkeypatch.setattr(follow_camera, "FieldsOfView", Fields)
+    camera = FollowCamera.__new__(FollowCamera)
+    camera.world, camera._data = SimpleNamespace(model="model"), "data"
+    camera.eyes, camera._fields, camera._mirror = None, {}, "mirror" if slow else None
+    camera._quick = SimpleNamespace(render=quick)
+    camera._slow_image = lambda scene, view, size: calls.append((scene, size)) or (picture, nearness)
+    assert camera.picture(state, 2, (4, 6)) is picture
+    looked = ("mirror", (4, 6)) if slow else ("data", 50, 6, 4)
+    assert calls == [("data", camera.world, state, 2), looked]
+    camera.eyes = "eyes"
+    for size in ((4, 6), (4, 6), (2, 3)):
+        assert camera.picture(state, 2, size) == (picture, nearness, "model", "data")
+    assert prepared == [("eyes", (4, 6)), ("eyes", (2, 3))]
+
+
+class Ommatidia:
+    """Seven ommatidia: one ahead, and six around it, above and below the horizon alike."""
+
+    directions = np.array(
+        [
+            [1.0, 0, 0],
+            *([math.cos(0.2), 0.2 * math.cos(k * math.pi / 3), 0.2 * math.sin(k * math.pi / 3)] for k in range(6)),
+        ]
+    )
+
+    def __len__(self):
+        return 7
+
+
+def test_hexagons_are_in_the_middle_of_their_image():
+    """The image of a symmetric pattern is symmetric: each ommatidium and its mirror image have the same pixels."""
+    eye = Ommatidia()
+    eye.directions = eye.directions / np.linalg.norm(eye.directions, axis=1)[:, None]
+    numbers = _numbers.__wrapped__(eye)
+    assert set(numbers.ravel()) == set(range(8))
+    upside_down, mirrored = np.array([0, 1, 6, 5, 4, 3, 2, 7]), np.array([0, 4, 3, 2, 1, 6, 5, 7])
+    np.testing.assert_array_equal(upside_down[numbers[::-1]], numbers)
+    assert (mirrored[numbers[:, ::-1]] != numbers).mean() < 5e-3, "its width is rounded to whole pixels"
+    left, up = (numbers == 1).nonzero()[1].mean(), (numbers == 2).nonzero()[0].mean()
+    assert left < numbers.shape[1] / 2
+    assert up < numbers.shape[0] / 2
+
+
+@pytest.mark.parametrize("samples", [None, 1, 2.0])
+def test_good_numbers_of_samples(monkeypatch, samples):
+    """Without samples, images are fast; with them, Mitsuba renders a mirror of the model."""
+    monkeypatch.setattr(follow_camera.mujoco, "MjData", lambda model: f"data of {model}")
+    monkeypatch.setattr(follow_camera, "QuickCamera", lambda model, spectra: ("quick", model, spectra))
+    monkeypatch.setattr(follow_camera, "mirror", lambda model, spectra: ("mirror", model, spectra))
+    camera = FollowCamera(SimpleNamespace(model="model", spectra="spectra"), samples=samples)
+    assert camera._quick == (("quick", "model", "spectra") if samples is None else None)
+    assert camera._mirror == (None if samples is None else ("mirror", "model", "spectra"))

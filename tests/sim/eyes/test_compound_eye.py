@@ -149,3 +149,10 @@ def test_a_radius_that_is_far_too_small_is_refused_without_a_list_of_all_pairs(m
 def test_bad_eyes_name_the_argument(options, message):
     with pytest.raises(ValueError, match=message):
         sim.CompoundEye(**{"directions": AHEAD, "ommatidium": SMALL, **options})
+
+
+def test_the_short_description_names_facets_and_receptors_but_no_directions():
+    eye = sim.CompoundEye(AHEAD, SMALL)
+    assert repr(eye) == f"<CompoundEye of 1 ommatidium, 0° wide, facet 16 µm, {eye.receptors!r}>"
+    mixed = sim.CompoundEye([[0.0, 0.0], [40.0, 0.0]], [LARGE, SMALL])
+    assert repr(mixed) == f"<CompoundEye of 2 ommatidia, 80° wide, first facet 32 µm, {eye.receptors!r}>"

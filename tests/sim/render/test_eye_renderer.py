@@ -2,12 +2,15 @@
 tracer.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import optics
 import sim
 from sim.render.eye_renderer import EyeRenderer
+from sim.render.pending_frame import settled
 from sim.render.receptor_noise import FEW
 from sim.render.world_scene import WorldScene
 from sim.tasks.registry import task_of
@@ -100,3 +103,26 @@ def test_what_receptors_look_at_in_built_in_worlds():
     assert {model.geom(g).name for g in np.unique(ids) if g >= 0} >= {"floor", "wall_east"}
     assert (np.isfinite(depth) == (ids >= 0)).all()
     assert renderer.flow(poses, poses)[np.repeat((ids >= 0)[:, :, None], 2, axis=2)] == pytest.approx(0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("worlds", "n_envs"), [(FEW, FEW + 1), (FEW + 1, FEW + 2), (1, FEW), (1, FEW + 1)])
+@pytest.mark.parametrize("lit", [True, False])
+def test_few_worlds_are_rendered_apart(worlds, n_envs, lit):
+    """A frame of all worlds may then be pending. The separate renderer always has FEW worlds."""
+    renderer = EyeRenderer.__new__(EyeRenderer)
+    renderer.n_envs = n_envs
+    frames = settled(10 * np.arange(n_envs))
+    renderer.launch = lambda poses, light: frames
+    renderer.scene = SimpleNamespace(placed=lambda poses: SimpleNamespace(take=lambda few: few))
+    light = np.arange(n_envs) if lit else None
+
+    def few(poses, given):
+        assert len(poses) == FEW
+        assert given is None if light is None else (given == poses).all()
+        return settled(-poses)
+
+    vars(renderer)["_few"] = SimpleNamespace(launch=few)
+    chosen = np.arange(worlds)[::-1]
+    found = renderer.launch_some("poses", chosen, light).wait()
+    apart = worlds <= FEW < n_envs
+    np.testing.assert_array_equal(found, -chosen if apart else 10 * chosen)

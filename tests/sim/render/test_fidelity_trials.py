@@ -100,6 +100,8 @@ class Counted:
         (None, 4, {1: 16, 2: 16, 3: 64, 300: 4096, 1e5: 4**9}),
         ("pupil", 4, {1: 256, 20: 256, 40: 1024, 1e5: 4**9}),
         (None, 2**20, {1: 4, 3: 16}),
+        (None, 2**15, {1: 16}),
+        ("pupil", 2**15, {1: 4}),
     ],
 )
 def test_references_have_several_times_as_many_rays_and_are_computed_once(pupil, bands, references):
