@@ -177,6 +177,7 @@ def test_code_imports_the_packages_from_rhabdom():
 SHORT = {
     "08_tolerancing": ("--trials", "1"),
     "09_hologram": ("--steps", "8"),
+    "10_extended_depth": ("--steps", "2"),
     "11_lens_through_an_eye": ("--steps", "4"),
 }
 

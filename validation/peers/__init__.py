@@ -5,7 +5,8 @@ functions and propagators that a code can prepare once are prepared before timin
 
 work_precision    proof: error against time of these codes and ours
 population_speed  proof: PSFs per CPU second of whole populations
-design_speed      its table of single PSFs and gradients, for the design of pupils
+optimisation_costs  proof: CPU times of PSFs with gradients, for the design of pupils
+design_cases      pupils of that proof, with a matrix Fourier transform in PyTorch
 peer_claims       proof: claims of other codes' tests and of textbooks
 claims            those claims
 problem           cases for all codes

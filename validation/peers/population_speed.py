@@ -12,11 +12,7 @@ heights and of all matrices that an eye needs. The error of a PSF is its relativ
 nodes, which is accurate to 1e-5. The table states the median and the largest error over every fifth eye.
 
 **Table.** `psf_batch` runs with five tolerances and `psf` with three. The peers run with 32 to 256 samples across the
-pupil. The second table is for the design of lenses. The pupils have a radius of 1 mm, a focal length of 10 mm, and a
-map of heights or Zernike modes. A map of heights is a smooth map plus random deviations with the stated standard
-deviation ("noise"). The table states CPU times of single PSFs, without and with the gradient with respect to all
-heights or coefficients, and the predicted and the actual error of the PSF. The last two columns state the time and the
-error of a matrix Fourier transform in NumPy. Unlike `optics`, it does not predict its error.
+pupil. [Costs of optimisation](optimisation_costs.md) reports PSFs with gradients.
 
 **Limits.** The other codes cannot share a plan between the eyes of a population. Unlike `optics.psf`, they also have no
 exact propagator whose output grid can be chosen freely. Their matrix Fourier transform from the pupil to the focal
@@ -42,7 +38,6 @@ import numpy as np
 import optics
 from optics.numerics.interpolation import cubic_bsplines
 from validation.pages.page import Page, parser
-from validation.peers.design_speed import design_rows, design_table
 from validation.reference import relative_l2
 
 WAVE, Z, N, DX = 550e-9, 240e-6, 65, 0.25e-6
@@ -259,9 +254,7 @@ def main() -> int:
             better = max((r.rate for r in rows if r.code == "psf_batch" and r.median <= row.median), default=0.0)
             if better < row.rate:
                 broken.append(f"{row.code}, {row.asked}: {row.rate:.0f} PSFs per CPU second, psf_batch {better:.0f}")
-    return Page("population_speed", __doc__, f"{table(rows)}\n\n{design_table(design_rows())}", broken).publish(
-        chosen, lambda path: draw(path, rows)
-    )
+    return Page("population_speed", __doc__, table(rows), broken).publish(chosen, lambda path: draw(path, rows))
 
 
 if __name__ == "__main__":
