@@ -18,7 +18,6 @@ SHARING = {
         *("tests/test_architecture.py", "tests/test_conventions.py", "tests/rhabdom/test_dependencies.py"),
         *("tests/test_docs.py::test_paths", "tests/test_docs.py::test_names"),
     ),
-    "the built site": tuple(f"tests/test_docs.py::test_{name}" for name in ("site", "menus", "reference")),
 }
 # Files of which any worker may run any test.
 DIVIDED = (
