@@ -22,7 +22,7 @@ from evolve.store.atomic_files import write_whole
 from evolve.store.evaluation import Evaluation
 from experiments.glass import paraboloid
 from experiments.page import Page, exit_code, parser
-from experiments.store import Origin, read_rows, write_rows
+from experiments.store import Origin, read_rows, rounded, write_rows
 
 __all__ = ["Design", "Experiment", "HeldOut", "Trained", "crossed", "evaluate_and_test", "main", "train_all"]
 
@@ -42,6 +42,9 @@ class Design:
     own: settings of this design alone, "section.name=value" separated by spaces
     facet_diameter_um: width of the facets of compound eyes; 0: camera eyes
     rhabdom_diameter_um, f_number: of the ommatidia of compound eyes
+
+    Raises:
+        ValueError: a number has more digits than a CSV file stores, so that its stored run would not be recognised.
     """
 
     task: str
@@ -62,6 +65,12 @@ class Design:
     facet_diameter_um: float = 0.0
     rhabdom_diameter_um: float = 0.0
     f_number: float = 0.0
+
+    def __post_init__(self) -> None:
+        for f in fields(Design):
+            value = getattr(self, f.name)
+            if isinstance(value, float) and value != rounded(value):
+                raise ValueError(f"Design: {f.name} = {value!r}: must be a stored number, such as {rounded(value)!r}")
 
     @property
     def animal(self) -> Phenotype:

@@ -18,7 +18,7 @@ from experiments import designed
 from experiments.designed import Design, Experiment, Trained
 from experiments.means import Interval, mean_of
 from experiments.page import Figure, Page, markdown_table, new_figure, save
-from experiments.store import Origin
+from experiments.store import Origin, rounded
 
 __all__ = ["best_octave", "complete", "designs", "eye_parameter", "page", "shift"]
 
@@ -55,7 +55,7 @@ def designs() -> list[Design]:
         Design(
             "detection", EYES, across, across, RANGE_DEG, 0.002, seed, FOV_DEG, 4,
             own=f"eye.illuminance={light:g}",
-            facet_diameter_um=1e6 * facet_diameter(across),
+            facet_diameter_um=rounded(1e6 * facet_diameter(across)),
             rhabdom_diameter_um=FACETS[across][0],
             f_number=FACETS[across][1],
         )

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, get_type_hints
 from evolve.store.atomic_files import write_whole
 from evolve.store.versions import machine, machines, present, recorded
 
-__all__ = ["DATA", "RECORDS", "Origin", "read_rows", "write_rows"]
+__all__ = ["DATA", "RECORDS", "Origin", "read_rows", "rounded", "write_rows"]
 
 DATA = Path("docs/results/data")
 RECORDS = Path(__file__).parent / "records"  # settings of runs, and a line per candidate
@@ -31,6 +31,11 @@ def read_rows(kind: type[Row], path: Path) -> list[Row]:
     types = get_type_hints(kind)
     with path.open(encoding="utf-8", newline="") as file:
         return [kind(**{name: types[name](text) for name, text in line.items()}) for line in csv.DictReader(file)]
+
+
+def rounded(value: float) -> float:
+    """Return a number as `write_rows` stores it, with six significant digits."""
+    return float(f"{value:.6g}")
 
 
 def write_rows(rows: Iterable[Any], path: Path) -> None:

@@ -219,12 +219,10 @@ def save_policy(policy: EyePolicy, path: Path | str) -> None:
 def load_policy(path: Path | str) -> EyePolicy:
     """Build the policy in a file; nothing in the file is executed.
 
-    Torch is set to one thread, as in learning. With several threads, the order of sums would vary, so that episodes
-    would not be reproducible.
+    Torch is set to one thread, as in learning: several threads would vary the order of sums, and thereby episodes.
 
     Raises:
-        ValueError: the file was not written by `save_policy`; for example, it is a pickle, or truncated. The message is
-            one line and names the file.
+        ValueError: the file was not written by `save_policy`; for example, it is a pickle, or truncated.
         StrangeFileError: the path is a link, FIFO or directory.
     """
     try:

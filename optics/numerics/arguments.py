@@ -257,11 +257,7 @@ def is_sized(value: Any) -> bool:
 
 
 def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
-    """Return `values` as a tuple of instances of `kind`.
-
-    Raises:
-        ValueError: a value has another type, or `values` is no sequence. The message shows `example`.
-    """
+    """Return `values` as a tuple of instances of `kind`, or raise a ValueError that shows `example`."""
     try:
         found = tuple(values)
     except TypeError:

@@ -278,3 +278,8 @@ def test_the_figure_says_whether_less_light_turns_the_answer(effect, message):
         for sigma in (BRIGHT, 0.05)
     }
     assert message in light_message(lights)
+
+
+def test_numbers_that_a_stored_run_would_not_match_are_refused():
+    with pytest.raises(ValueError, match=r"fov_deg = 33\.3333333: must be a stored number, such as 33\.3333$"):
+        replace(ASKED[0], fov_deg=33.3333333)
