@@ -20,7 +20,7 @@ from experiments.means import Interval, mean_of
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import Origin, rounded
 
-__all__ = ["best_octave", "complete", "designs", "eye_parameter", "page", "shift"]
+__all__ = ["best_octave", "complete", "designs", "eye_parameter", "page", "shift", "slope"]
 
 NAME = "facets_and_light"
 SURFACE = 2e-8  # area of all facets of an animal [m²]
@@ -36,7 +36,8 @@ SETTINGS = (
     "learning.total_steps=131072",
     "learning.eval_interval=65536",
 )
-COLORS = ("#56B4E9", "#0072B2", "#000000")  # from bright to dim
+TICKS = (0.5, 1, 2, 4)  # eye parameters
+COLORS = ("#E69F00", "#0072B2", "#000000")  # from bright to dim
 
 
 def facet_diameter(across: int) -> float:
@@ -145,6 +146,13 @@ def _fitness_table(rows: Sequence[Trained]) -> str:
     )
 
 
+def slope(rows: Sequence[Trained], seed: int, light: float) -> float:
+    """Return the change of fitness when the eye parameter doubles, by least squares over the eyes of one seed."""
+    mine = [row for row in rows if (row.seed, _light(row)) == (seed, light)]
+    octaves = np.log2([eye_parameter(row.width) for row in mine])
+    return float(np.polyfit(octaves, [row.fitness for row in mine], 1)[0])
+
+
 def _shift_table(rows: Sequence[Trained]) -> str:
     lines = []
     for light in LIGHTS:
@@ -152,8 +160,16 @@ def _shift_table(rows: Sequence[Trained]) -> str:
         change, chance = shift(rows, light)
         shown = (f"{2**x:.2f}" for x in (best.mean, best.low, best.high))
         cells = ("-", "-") if light == LIGHTS[0] else (str(change), f"{chance:.2g}")
-        lines.append([f"{light:g}", "{} [{}, {}]".format(*shown), *cells])
-    return markdown_table(["light [lx]", "best p [λ]", "shift against bright light [octaves]", "p value"], lines)
+        doubled = mean_of(np.array([slope(rows, seed, light) for seed in complete(rows)]))
+        lines.append([f"{light:g}", str(doubled), "{} [{}, {}]".format(*shown), *cells])
+    header = [
+        "light [lx]",
+        "change of fitness when p doubles",
+        "best p [λ]",
+        "shift against bright light [octaves]",
+        "p value",
+    ]
+    return markdown_table(header, lines)
 
 
 def _cell(rows: Sequence[Trained], light: float, across: int) -> np.ndarray:
@@ -173,16 +189,21 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
         cells = [_cell(rows, light, across) for across in FACETS]
         left.semilogx(parameters, [cell.mean() for cell in cells], color=color, lw=1.8, label=f"{light:g} lx")
         for parameter, cell in zip(parameters, cells, strict=True):
-            left.semilogx([parameter] * cell.size, cell, "o", color=color, ms=3.5, alpha=0.6, mec="none")
+            aside = 0.96 + 0.04 * LIGHTS.index(light)  # dots of different lights would hide each other
+            left.semilogx([aside * parameter] * cell.size, cell, "o", color=color, ms=3.5, alpha=0.7, mec="none")
     left.axvline(1 / math.sqrt(3), color="#777777", lw=1)
     left.text(1 / math.sqrt(3), left.get_ylim()[1], " λ/√3", color="#777777", va="top")
     left.set(xlabel="eye parameter DΔφ / λ", ylabel="fitness")
+    left.set_xticks(TICKS, labels=[f"{tick:g}" for tick in TICKS])
+    left.minorticks_off()
     left.legend(frameon=False, title="light")
     best = np.array([[2 ** best_octave(rows, seed, light) for light in LIGHTS] for seed in complete(rows)])
     right.loglog(LIGHTS, best.T, color="#BBBBBB", lw=1)
     right.loglog(LIGHTS, np.exp(np.log(best).mean(axis=0)), "o-", color="#222222", lw=2)
     right.axhline(1 / math.sqrt(3), color="#777777", lw=1)
     right.set(xlabel="illuminance [lx]", ylabel="best eye parameter DΔφ / λ", ylim=(0.4, 6))
+    right.set_yticks(TICKS, labels=[f"{tick:g}" for tick in TICKS])
+    right.minorticks_off()
     save(figure, path)
 
 

@@ -16,6 +16,7 @@ from experiments.facets_and_light import (
     designs,
     eye_parameter,
     shift,
+    slope,
 )
 
 
@@ -69,3 +70,11 @@ def test_seeds_without_all_their_runs_are_left_out():
     first = rows[0].seed
     assert complete(rows[1:]) == [seed for seed in complete(rows) if seed != first]
     assert np.isfinite(shift(rows[1:], 30.0)[0].mean)
+
+
+def test_the_slope_is_the_change_of_fitness_per_doubling():
+    rows = [
+        Trained(**asdict(design), fitness=7 + 3 * math.log2(eye_parameter(design.width)) * (design.seed == 2712))
+        for design in designs()
+    ]
+    assert [slope(rows, seed, 30.0) for seed in (2711, 2712)] == pytest.approx([0.0, 3.0])
