@@ -14,6 +14,7 @@ from optics.elements.beam import Beam
 from optics.elements.pupil_path import relief_height, wavefront_ahead
 from optics.elements.pupil_polynomials import power_sum, powers_of
 from optics.numerics.autodiff import number
+from optics.numerics.read_only import ReadOnlyArrays, read_only
 
 __all__ = ["LightStack", "StackSlopes"]
 
@@ -24,7 +25,7 @@ FEW, MANY = 21, 53  # choices: points across the pupil at which slopes are evalu
 
 
 @dataclass(frozen=True, eq=False)
-class StackSlopes:
+class StackSlopes(ReadOnlyArrays):
     """Gradients of the optical paths behind several pupils, at the same points of their disks.
 
     x, y: points in units of the radius, (point,).
@@ -40,7 +41,7 @@ class StackSlopes:
     def steepest(self) -> np.ndarray:
         """Largest slope over the disk, (beam,)."""
         found: np.ndarray = np.sqrt((np.square(self.along_x) + np.square(self.along_y)).max(axis=1))
-        return found
+        return read_only(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,18 +59,18 @@ class LightStack:
         chosen = set(map(int, places))
         coefficients, others = self._polynomials
         mine = [k for k, place in enumerate(places) if int(place) in chosen.intersection(others)]
-        found.__dict__["_polynomials"] = coefficients[np.asarray(places, int)], mine
+        found.__dict__["_polynomials"] = read_only(coefficients[np.asarray(places, int)]), mine
         return found
 
     @cached_property
     def radius(self) -> np.ndarray:
         """Radii of the pupils [m], (beam,)."""
-        return np.array([beam.pupil.radius for beam in self.beams])
+        return read_only(np.array([beam.pupil.radius for beam in self.beams]))
 
     @cached_property
     def distance(self) -> np.ndarray:
         """Distances of the window behind the pupils [m], (beam,)."""
-        return np.array([number(beam.distance) for beam in self.beams])
+        return read_only(np.array([number(beam.distance) for beam in self.beams]))
 
     @property
     def index(self) -> np.ndarray:
@@ -92,12 +93,12 @@ class LightStack:
                 step = number(pupil.index_step(wavelength))
                 values = known[media] = beam.index, pupil.index_before(wavelength), step
             found.append(values)
-        return np.array(found).reshape(-1, 3).T
+        return read_only(np.array(found).reshape(-1, 3).T)
 
     @cached_property
     def vacuum_wavelength(self) -> np.ndarray:
         """Wavelengths in vacuum [m], (beam,)."""
-        return np.array([beam.wavelength for beam in self.beams])
+        return read_only(np.array([beam.wavelength for beam in self.beams]))
 
     @property
     def wavelength(self) -> np.ndarray:
@@ -113,7 +114,7 @@ class LightStack:
         before = self._indices[1]
         sources = np.array([math.inf if self._tilted[k] else b.source.distance for k, b in enumerate(self.beams)])
         known = (-np.sign(lenses) * self.index, np.abs(lenses)), (before, sources)
-        return [(index, distance) for index, distance in known if np.isfinite(distance).any()]
+        return [(read_only(index), read_only(r)) for index, r in known if np.isfinite(r).any()]
 
     @cached_property
     def _tilted(self) -> list[bool]:
@@ -129,7 +130,12 @@ class LightStack:
         for place, one in enumerate(known):
             if one is not None:
                 found[place, : len(one), : len(one)] = one
-        return found, [place for place, one in enumerate(known) if one is None]
+        return read_only(found), [place for place, one in enumerate(known) if one is None]
+
+    @cached_property
+    def mapped(self) -> np.ndarray:
+        """True for beams whose relief or wavefront is no polynomial and may have fine detail, (beam,)."""
+        return read_only(np.isin(np.arange(len(self.beams)), self._polynomials[1]))
 
     @cached_property
     def smooth_points(self) -> int | None:
@@ -214,7 +220,7 @@ def _points(across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     grid = np.linspace(-1, 1, across)
     x, y = np.meshgrid(grid, grid)
     inside = np.hypot(x, y) <= 1
-    return grid, x[inside], y[inside]
+    return read_only(grid), read_only(x[inside]), read_only(y[inside])
 
 
 @lru_cache(maxsize=16)

@@ -36,6 +36,9 @@ NEGLECTED = 3e-4  # choice: light that is neglected, as a share of all light, at
 # Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
 # diffraction spreads the light of a ray.
 NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
+# Choices: the same spread for light behind maps, whose fine detail diffracts light away from its rays. Cycles at a
+# tolerance of 0.01, the same relative to those of the rays at the edge, and exponent of the tolerance.
+MAPPED_CYCLES, MAPPED_RIM_CYCLES, MAPPED_EXPONENT = 4.0, 3.0, -0.4
 # Choices: distance from the axis [radii] beyond which rays count as rays of the edge, and cycles of most of these rays,
 # relative to their median.
 RIM, RIM_CYCLES = 0.85, 1.2
@@ -82,20 +85,28 @@ class WindowEdges:
     @cached_property
     def edges(self) -> list[SoftAperture]:
         """Soft apertures of the samples, (beam,)."""
+        narrow = self._narrow(self.density, CARRIED_RIPPLES[0])
         if self.derivatives is not None:
-            return self._narrow(self.density, CARRIED_RIPPLES[0])
-        return self._wide(self._choice[1].passband, self._ripples(self.curvature)[0])
+            return narrow
+        return self._unless_mapped(self._wide(self._choice[1].passband, self._ripples(self.curvature)[0]), narrow)
 
     @cached_property
     def finer_edges(self) -> list[SoftAperture]:
         """Soft apertures that are as sharp as the finer samples allow, (beam,)."""
+        narrow = self._narrow(FINER * self.density, CARRIED_RIPPLES[1])
         if self.derivatives is not None:
-            return self._narrow(FINER * self.density, CARRIED_RIPPLES[1])
+            return narrow
         bands = self._choice[1]
         passband = np.maximum(
             FINER * self.density - bands.around - _transitions(self._ripples(self.curvature)[1]), bands.passband
         )
-        return self._wide(np.minimum(passband, SHARPER * bands.passband), self._ripples(self.curvature)[1])
+        wide = self._wide(np.minimum(passband, SHARPER * bands.passband), self._ripples(self.curvature)[1])
+        return self._unless_mapped(wide, narrow)
+
+    def _unless_mapped(self, wide: list[SoftAperture], narrow: list[SoftAperture]) -> list[SoftAperture]:
+        """Return wide soft edges, and narrow ones for maps: their fine detail sends light from the edge anywhere."""
+        choices = zip(self.stack.mapped.tolist(), narrow, wide, strict=True)
+        return [one if mapped else other for mapped, one, other in choices]
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, _Bands]:
@@ -104,7 +115,8 @@ class WindowEdges:
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
             return none, flat
-        curvature = np.where(self._round & (np.abs(self._rim_curvature) >= LEAST_CURVATURE), self._rim_curvature, 0)
+        able = self._round & ~self.stack.mapped
+        curvature = np.where(able & (np.abs(self._rim_curvature) >= LEAST_CURVATURE), self._rim_curvature, 0)
         if not curvature.any():
             return none, flat
         curved = self._bands(curvature)
@@ -140,7 +152,9 @@ class WindowEdges:
         passband = np.maximum(passband, seen)
         stopband = passband + _transitions(self._ripples(curvature)[0])
         reach = self._reach(np.where(np.abs(bend) * r > stopband[:, None], 0, along))
-        return _Bands(self._masks + np.maximum(cycles + reach + SPREAD_CYCLES, near + stopband), passband, near)
+        detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * np.median(along[:, r > RIM], axis=1)
+        spread = np.where(self.stack.mapped, detail * (self.tolerance / 0.01) ** MAPPED_EXPONENT, SPREAD_CYCLES)
+        return _Bands(self._masks + np.maximum(cycles + reach + spread, near + stopband), passband, near)
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> _Bands:
         """Return the bands of light that carries derivatives.

@@ -83,3 +83,17 @@ def test_the_check_rejects_an_unsuitable_wave(monkeypatch, wrong):
     found = list(errors())
     sine_stack._profile.cache_clear()
     assert max(right) < 1e-2 < min(found)
+
+
+def test_a_wrapped_lens_as_a_map_has_enough_samples_at_each_tolerance():
+    """The jumps between samples of the map diffract light far from its rays, and the edge sends it anywhere."""
+    x = (np.arange(128) + 0.5) / 64 - 1
+    wrapped = (-(60e-6**2) * (x**2 + x[:, None] ** 2) / 480e-6) % 1.1e-6
+    found = [
+        optics.psf(optics.Pupil(60e-6, wrapped), sensor_distance=480e-6, shape=(65, 65), tolerance=tolerance)
+        for tolerance in (1e-2, 3e-3, 1e-3)
+    ]
+    errors = [result.plan.predicted_error for result in found]
+    assert relative_l2(found[0].psf, found[2].psf) <= errors[0] + errors[2]
+    assert relative_l2(found[1].psf, found[2].psf) <= errors[1] + errors[2]
+    assert {result.plan.method for result in found} == {"low_rank"}
