@@ -13,7 +13,8 @@ vector_focus   vector_focus: beyond scalar theory
 converging     VectorFocus: a polarised field behind a pupil
 disk_sum       sum of the light on a round receptor
 microvilli     Microvilli: receptors with polarisation sensitivity
-coarse_batch   PSFs of many beams at coarse tolerances, as stacks of matrix products
+population     PSFs of many pupils with one plan
+population_members  parameters of each pupil for the common plan
 batch          psf_batch: PSFs of many eyes at once
 modulation_transfer  MTF: contrast at any frequency
 arriving       fraction of the light that is not evanescent
