@@ -103,7 +103,7 @@ def no_shadows_of_movers(monkeypatch):
 
 
 def normals_of_another_frame(monkeypatch):
-    monkeypatch.setattr(movers._Frame, "given", lambda self, v: v)
+    monkeypatch.setattr(movers._Frame, "to_world", lambda self, v: v)
 
 
 @pytest.mark.parametrize("mutant", [no_shadows, no_shadows_of_movers, normals_of_another_frame])
