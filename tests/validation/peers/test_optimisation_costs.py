@@ -24,7 +24,7 @@ def test_matrix_transform_agrees_with_the_direct_sum(name, few_samples):
     exact = direct_sum(design, numbers, np.inf)
     found = matrix_transform(design, 96)(torch.tensor(numbers))[0].numpy()
     assert relative_l2(found[:, ::EVERY, ::EVERY], exact) < 0.01
-    assert relative_l2(found[:, ::-EVERY, ::EVERY], exact) > 0.1, "the PSF is not symmetric"
+    assert relative_l2(found[:, ::EVERY, ::-EVERY], exact) > 0.04, "the PSF is not symmetric"
 
 
 def test_page_of_a_design(few_samples, tmp_path, monkeypatch, capsys):
