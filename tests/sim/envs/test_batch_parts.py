@@ -143,7 +143,7 @@ def test_names_of_parts_of_states():
 
 def test_auxiliary_entries_of_new_episodes_replace_only_theirs():
     found = Senses.__new__(Senses)
-    frames = iter([{"depth": np.array([1, 2, 3])}, {"depth": np.array([4, 5, 6])}, {"depth": np.array([7, 8, 9])}])
+    frames = iter([{"depth": np.arange(first, first + 3)} for first in (1, 4, 7)])
     found._auxiliary = [SimpleNamespace(render=lambda poses, fresh: next(frames))]
     found._last_auxiliary = {}
     assert found.has_auxiliary
@@ -153,8 +153,7 @@ def test_auxiliary_entries_of_new_episodes_replace_only_theirs():
     assert found._last_auxiliary["depth"].tolist() == [4, 2, 6]
     found.update_auxiliary(None, np.array([], int))
     assert found._last_auxiliary["depth"].tolist() == [7, 8, 9]
-    found._auxiliary = []
-    assert not found.has_auxiliary
+    assert not Senses.has_auxiliary.fget(SimpleNamespace(_auxiliary=[]))
 
 
 class Agents(Animals):
@@ -163,11 +162,10 @@ class Agents(Animals):
     def __init__(self, early):
         self.log = []
         agents = [SimpleNamespace(n_actions=k, first_action=k) for k in (1, 2, 3, 4)]
-        task = SimpleNamespace(renders_early=early)
         self.simulation = SimpleNamespace(
             n=2,
             agents=agents,
-            task=task,
+            task=SimpleNamespace(renders_early=early),
             taken=np.tile(np.arange(10.0), (2, 1)),
             poses=lambda: "poses",
             move=lambda actions: self.log.append(actions) or "failed",
