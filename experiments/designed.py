@@ -28,7 +28,7 @@ __all__ = ["Design", "Experiment", "HeldOut", "Trained", "crossed", "evaluate_an
 
 
 INDEX = 1.9  # refractive index of glass; strong lenses then stay within the maximum height of reliefs
-RHABDOM_LENGTH_UM = 200.0
+RHABDOM_LENGTH_UM = 200.0  # choice: rhabdoms of compound eyes, as in the preset
 
 
 @dataclass(frozen=True)

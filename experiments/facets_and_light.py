@@ -26,7 +26,7 @@ NAME = "facets_and_light"
 SURFACE = 2e-8  # area of all facets of an animal [m²]
 EYES, FOV_DEG, RANGE_DEG = 2, 60.0, 45.0
 WAVELENGTH = 500e-9  # unit of eye parameters [m]
-# Facets across an eye, and the rhabdom [µm] and the F-number with which the acceptance angle d/f is about Δφ.
+# Facets across an eye, and the rhabdom [µm] and the F-number with which the geometrical angle d/f is about Δφ.
 FACETS = {21: (1.0, 4.0), 15: (1.6, 3.0), 10: (3.0, 2.5), 7: (4.0, 2.0)}
 LIGHTS = (1e4, 30.0, 1.0)  # [lx]
 SEEDS = range(2711, 2717)
