@@ -23,7 +23,7 @@ retinal_image: test_retinal_image.py, test_receptor_density.py
 sensor_pixels: test_torch.py
 camera: test_camera.py
 receptor_density: test_receptor_density.py
-receptor_lattice: test_receptor_density.py
+receptor_lattice: test_receptor_lattice.py, test_receptor_density.py
 patch: test_receptor_density.py
-summary: test_eye_parts.py, test_summary.py
+summary: test_eye_parts.py, test_summary_parts.py, test_summary.py
 """
