@@ -16,7 +16,7 @@ photoreceptor: test_photoreceptor.py
 polarization: test_eye_parts.py, test_polarization.py
 signals: test_eye.py, test_polarization.py
 receptive_field: test_window_parts.py, test_eye_parts.py, test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py
-guided_field: test_guided_field.py, test_axes.py
+guided_field: test_guide_parts.py, test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retina: test_window_parts.py, test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
 retinal_image: test_retinal_image.py, test_receptor_density.py
