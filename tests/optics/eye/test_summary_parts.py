@@ -88,7 +88,7 @@ def test_the_lowest_known_limit_binds():
     assert Description.__dataclass_fields__["white_signal"].default is math.nan
 
 
-@pytest.mark.parametrize("half", [1.0, 2.5])
+@pytest.mark.parametrize("half", [0.5, 1.0, 2.5])
 def test_integrals_around_places(half):
     """A spline through samples of 3 + 2x is exact. Nothing lies beyond the first and the last sample."""
     x = np.arange(-4.0, 7.0)
