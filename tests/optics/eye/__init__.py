@@ -3,7 +3,7 @@
 acuity: test_acuity.py
 band_choice: spectra/test_bands.py, test_sight_tolerance.py
 cell_integrals: test_cell_integrals.py
-eye: test_eye.py, test_kept_kernels.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
+eye: test_eye_calls.py, test_eye.py, test_kept_kernels.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
 eye_spec: test_spec_parts.py, test_eye.py, test_patches.py, test_axes.py, test_receptor_density.py, test_vertical_field.py
 geometry: test_spec_parts.py, test_patches.py, test_vertical_field.py
 immersion: test_spec_parts.py, elements/test_turbid_medium.py
@@ -17,7 +17,7 @@ polarization: test_eye_parts.py, test_polarization.py
 signals: test_eye.py, test_polarization.py
 receptive_field: test_window_parts.py, test_eye_parts.py, test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py
 guided_field: test_guide_parts.py, test_guided_field.py, test_axes.py
-receptor_kernel: test_guided_field.py, test_eye.py
+receptor_kernel: test_eye_calls.py, test_guided_field.py, test_eye.py
 retina: test_window_parts.py, test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
 retinal_image: test_retinal_image.py, test_receptor_density.py
 sensor_pixels: test_torch.py
