@@ -10,16 +10,16 @@ immersion: test_spec_parts.py, elements/test_turbid_medium.py
 depth_range: test_depth_range.py, test_occlusion.py, test_kernel_bank.py
 kernel_bank: test_eye_parts.py, test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py
 kernel_interpolation: test_eye_parts.py, test_kernel_interpolation.py, test_kernel_bank.py, test_sight_tolerance.py
-layered_image: test_occlusion.py
-occlusion: test_eye_parts.py, test_occlusion.py
-photoreceptor: test_photoreceptor.py
+layered_image: test_image_parts.py, test_occlusion.py
+occlusion: test_image_parts.py, test_eye_parts.py, test_occlusion.py
+photoreceptor: test_image_parts.py, test_photoreceptor.py
 polarization: test_eye_parts.py, test_polarization.py
-signals: test_eye.py, test_polarization.py
+signals: test_image_parts.py, test_eye.py, test_polarization.py
 receptive_field: test_window_parts.py, test_eye_parts.py, test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py
 guided_field: test_guide_parts.py, test_guided_field.py, test_axes.py
 receptor_kernel: test_eye_calls.py, test_guided_field.py, test_eye.py
 retina: test_window_parts.py, test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
-retinal_image: test_retinal_image.py, test_receptor_density.py
+retinal_image: test_image_parts.py, test_retinal_image.py, test_receptor_density.py
 sensor_pixels: test_torch.py
 camera: test_camera_parts.py, test_camera.py
 receptor_density: test_receptor_density.py
