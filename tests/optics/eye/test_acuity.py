@@ -102,7 +102,7 @@ def test_acuity_in_closed_form():
     assert anatomical_acuity(1 / 4e-12, 1e-2, "square") == pytest.approx(1 / (2 * degrees))
     hexagons = 2 / math.sqrt(3) / 4e-12
     assert anatomical_acuity(hexagons, 1e-2) == pytest.approx(1 / (math.sqrt(3) * degrees))
-    with pytest.raises(ValueError, match="interommatidial_deg = 180.1"):
+    with pytest.raises(ValueError, match=r"interommatidial_deg = 180.1"):
         eye_parameter(30e-6, 180.1)
     for call in (least_eye_parameter, lambda at, lattice: anatomical_acuity(at, 1.0, lattice)):
         with pytest.raises(ValueError, match="lattice = 'triangle'"):

@@ -47,7 +47,7 @@ def test_electrons_with_derivatives():
     assert isinstance(found, TensorXf64)
     np.testing.assert_allclose(found.numpy(), _read(SIGNALS, SENSOR, PIXELS, np.random.default_rng(4)), rtol=1e-6)
     np.testing.assert_allclose(_read(signals, SENSOR, PIXELS, None).numpy(), np.minimum(MEAN, 40))
-    with pytest.raises(ValueError, match="^bits = 4 and the pupil carries derivatives: must be None"):
+    with pytest.raises(ValueError, match=r"^bits = 4 and the pupil carries derivatives: must be None"):
         _read(signals, replace(SENSOR, bits=4), PIXELS, None)
 
 
@@ -75,7 +75,7 @@ def test_spectral_scenes_stay_as_they_are():
         with pytest.raises(ValueError, match=r"^scene has shape .* with 4 bands"):
             _radiance(np.ones(shape), EYE, 2)
     scene[0, 0, 0] = np.inf
-    with pytest.raises(ValueError, match="^scene holds NaN or infinity"):
+    with pytest.raises(ValueError, match=r"^scene holds NaN or infinity"):
         _radiance(scene, EYE, 2)
 
 
@@ -93,7 +93,7 @@ def test_scenes_that_surround_the_sensor(samples, shape):
 
 def test_samples_per_pixel():
     for wrong in (0, 65, 1.5):
-        with pytest.raises(ValueError, match="^samples_per_pixel = "):
+        with pytest.raises(ValueError, match=r"^samples_per_pixel = "):
             _radiance(np.ones((4, 2, 4)), EYE, wrong)
 
 
@@ -105,7 +105,7 @@ def test_distances_of_scenes():
     depth = np.array([[1.0, 2, math.inf], [4, 5, 6]])
     np.testing.assert_array_equal(_distances(depth, (2, 3)), depth)
     for wrong in (0.0, -1.0, Float64(-1.0), np.full((2, 3), -1.0)):
-        with pytest.raises(ValueError, match="^depth = "):
+        with pytest.raises(ValueError, match=r"^depth = "):
             _distances(wrong, (2, 3))
     with pytest.raises(ValueError, match=r"^depth has shape \(2, 3\): .* \(3, 2\)"):
         _distances(depth, (3, 2))
@@ -126,9 +126,9 @@ def test_the_eye_of_a_camera(between):
     assert eye.photon_budget is budget
     assert camera_eye(pupil, sensor).tolerance == 1e-2
     for wrong in (1e-7, 0.6):
-        with pytest.raises(ValueError, match="^tolerance = "):
+        with pytest.raises(ValueError, match=r"^tolerance = "):
             camera_eye(pupil, sensor, 6e-3, wrong)
-    with pytest.raises(ValueError, match="^sensor_distance = 0"):
+    with pytest.raises(ValueError, match=r"^sensor_distance = 0"):
         camera_eye(pupil, sensor, 0)
 
 
@@ -156,7 +156,7 @@ def test_field_zones_of_images(monkeypatch, zones):
     np.testing.assert_array_equal(radiance, scene)
     assert (samples, noise, z, sight) == (2, rng, 3.0, None if zones == 1 else "sight")
     for given in ({"sensor": SENSOR}, {"sensor_distance": 1.0}):
-        with pytest.raises(ValueError, match="^lens is an Eye, and sensor or sensor_distance is given"):
+        with pytest.raises(ValueError, match=r"^lens is an Eye, and sensor or sensor_distance is given"):
             optics.camera_image(scene, eye, **given)
     sensor = Sensor((2, 4), 1e-6, bands=4)
     optics.camera_image(scene, Pupil(1e-3, thin_lens_focal_length=5e-3), sensor, samples_per_pixel=2, rng=rng)

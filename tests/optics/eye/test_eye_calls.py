@@ -35,7 +35,9 @@ def prepared(monkeypatch, eye, samples, *given, **named):
         return bank
 
     monkeypatch.setattr(module, "prepare", prepare)
-    monkeypatch.setattr(module, "receptor_kernel", lambda *args: found.kernels.append(args) or TENSOR(np.ones((2, 4, 3))))
+    monkeypatch.setattr(
+        module, "receptor_kernel", lambda *args: found.kernels.append(args) or TENSOR(np.ones((2, 4, 3)))
+    )
     found.bank = eye.sight(samples, *given, **named)
     return found
 
@@ -64,7 +66,7 @@ def test_defaults_of_a_sight(monkeypatch):
         with pytest.raises(ValueError, match=f"^{next(iter(wrong))} = "):
             prepared(monkeypatch, Eye(**FIELD), 4, **wrong)
     for wrong in (0, 65):
-        with pytest.raises(ValueError, match="^samples_per_receptor = "):
+        with pytest.raises(ValueError, match=r"^samples_per_receptor = "):
             prepared(monkeypatch, Eye(**FIELD), wrong)
 
 
@@ -94,6 +96,7 @@ def test_white_behind_a_mask_and_with_waveguides(monkeypatch):
     found = prepared(monkeypatch, guided, 2)
     assert found.white() == pytest.approx(0.4)
     assert guided.white_signal == pytest.approx(0.4 * 0.2**2)
+    assert found.kernels[-1][1].samples == 1
     assert guided.throughput == pytest.approx(0.2**2)
 
 
@@ -115,9 +118,9 @@ def test_the_retina_of_a_kernel(monkeypatch):
     Eye(LENS, **FIELD, waveguide=optics.Waveguide(2e-6)).kernel(1)
     assert asked[-1][-1] is True
     for wrong in (0, 65):
-        with pytest.raises(ValueError, match="^samples_per_receptor = "):
+        with pytest.raises(ValueError, match=r"^samples_per_receptor = "):
             eye.kernel(wrong)
-    with pytest.raises(ValueError, match="^direction_deg = "):
+    with pytest.raises(ValueError, match=r"^direction_deg = "):
         eye.kernel(4, direction_deg=(81.0, 0.0))
 
 
@@ -132,7 +135,7 @@ def test_psfs_of_eyes(monkeypatch):
     assert perfect.psf.shape == (2, 1, 1)
     assert (perfect.dx, perfect.pupil.radius) == (pytest.approx(2e-5), pytest.approx(1e-4))
     for call in (eye.psf, lambda z: eye.kernel(2, z)):
-        with pytest.raises(ValueError, match="^z = 0"):
+        with pytest.raises(ValueError, match=r"^z = 0"):
             call(0)
 
 

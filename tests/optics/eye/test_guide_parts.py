@@ -54,7 +54,7 @@ def test_grids_with_margins_for_splines():
     many = np.array([0.0, 2039.0])
     for x, y in ((many, many[:1]), (many[:1], many)):
         assert max(_grid_around(x, y, 0.5).shape) == 4095
-        with pytest.raises(AccuracyError, match="needs 4097 samples .*; the limit is 4096"):
+        with pytest.raises(AccuracyError, match=r"needs 4097 samples .*; the limit is 4096"):
             _grid_around(x * (1 + 1e-6), y * (1 + 1e-6), 0.5)
 
 
@@ -134,7 +134,8 @@ def test_the_first_window_holds_rays_diffraction_and_the_mode(monkeypatch, cells
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(
-    ("direction", "mirrored", "even"), [((0.0, 0.0), (1, 1), True), ((0.1, 0.0), (1, 1), False), ((0.0, 0.0), (1, 0), False)]
+    ("direction", "mirrored", "even"),
+    [((0.0, 0.0), (1, 1), True), ((0.1, 0.0), (1, 1), False), ((0.0, 0.0), (1, 0), False)],
 )
 def test_kernels_of_all_bands_have_one_size(monkeypatch, turned, direction, mirrored, even):
     """Bands are centred in the largest window and rotated by 180°, except on the axis of a symmetric pupil."""

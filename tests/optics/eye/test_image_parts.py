@@ -78,12 +78,14 @@ def test_kernels_of_one_cell():
 
 
 def hidden_and_cells(*rows):
-    return [Layer(np.array([source]), np.array([cells], bool), np.array([hiding], bool)) for source, cells, hiding in rows]
+    return [
+        Layer(np.array([source]), np.array([cells], bool), np.array([hiding], bool)) for source, cells, hiding in rows
+    ]
 
 
 @pytest.mark.parametrize("last", [True, False])
 def test_layers_are_composited(monkeypatch, last):
-    """Layers that hide nothing are collected until the next one that does. Each hiding layer passes half of the light."""
+    """Layers that hide nothing are collected until the next one that does, which passes half of the light."""
     layers = hidden_and_cells(
         ([0, 1, 2], [1, 0, 0], [0, 0, 0]),
         ([0, 0, 2], [0, 1, 0], [0, 1, 0]),
@@ -178,7 +180,12 @@ def test_own_types_and_their_weights():
 
 def test_noise_is_the_sum_of_both_kinds():
     clean = np.array([[[0.5, -0.2]], [[1.0, 2.0]]])
-    for photons in (None, np.array([100.0, 400.0])[:, None, None], np.array([100.0, 400.0]), np.full(clean.shape, 50.0)):
+    for photons in (
+        None,
+        np.array([100.0, 400.0])[:, None, None],
+        np.array([100.0, 400.0]),
+        np.full(clean.shape, 50.0),
+    ):
         rng, same = np.random.default_rng(1), np.random.default_rng(1)
         found = photoreceptor.noise_on(clean, photons, 0.25, rng)
         counted = clean
@@ -219,7 +226,9 @@ def test_signals_of_weighted_parts():
     means = (part.reshape(2, 2, 2, 3, 2).mean(axis=(2, 4)) for part in (light, other))
     one, two = (np.einsum("cb,byx->cyx", eye.spectral_bands.weights, mean) for mean in means)
     np.testing.assert_allclose(found, one + weight * two)
-    mosaic = Eye(None, (2, 3), bands=2, dtype="float64", receptors=optics.receptors_of("rgb").arranged(((0, 1), (1, 2))))
+    mosaic = Eye(
+        None, (2, 3), bands=2, dtype="float64", receptors=optics.receptors_of("rgb").arranged(((0, 1), (1, 2)))
+    )
     own = signals(mosaic, [(light, 1.0)], bank, 2, math.inf).numpy()
     np.testing.assert_allclose(own, np.take_along_axis(one, mosaic.mosaic[None], axis=0))
     noisy = with_noise(eye, TYPES.Tensor(one), np.random.default_rng(1)).numpy()

@@ -63,6 +63,14 @@ def test_places_of_counting_coordinates(counted, place):
     np.testing.assert_allclose(LATTICE.counted(np.array([[place]])), [[counted]], atol=1e-12)
 
 
+@pytest.mark.parametrize("columns", [[-1.5, -1.4, -1.2, 1.5], [-1.5, 1.2, 1.4, 1.5]])
+def test_places_near_the_rim(columns):
+    lattice = ReceptorLattice(np.array([-1.0, -0.8, 1.0]), np.array([columns, COLUMNS[0]]))
+    middles = np.array([[[-1.0, -0.5], [0.0, -0.5], [1.0, -0.5]], [[-1.0, 0.5], [0.0, 0.5], [1.0, 0.5]]])
+    np.testing.assert_allclose(lattice.counted(lattice.middles), middles, atol=1e-12)
+    np.testing.assert_allclose(lattice.places(middles.reshape(6, 2)), lattice.middles.reshape(6, 2), atol=1e-12)
+
+
 def test_receptors_at_the_middles_of_cells():
     """Cells of 1/4 of an average receptor: rows 0 to 5 belong to the upper row of receptors."""
     found = LATTICE.receptors_at((8, 12))
@@ -114,5 +122,7 @@ def test_the_narrowest_receptor():
 
     for axis in (0, 1):
         assert narrowest(197, axis) == pytest.approx(396 / 200 / 197)
-        with pytest.raises(ValueError, match=r"narrowest receptor 0\.0099 times the average: must be at least 0\.01, so"):
+        with pytest.raises(
+            ValueError, match=r"narrowest receptor 0\.0099 times the average: must be at least 0\.01, so"
+        ):
             narrowest(203, axis)

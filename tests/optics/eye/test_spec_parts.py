@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import optics
-from optics import Eye, Pupil, PhotonBudget
+from optics import Eye, PhotonBudget, Pupil
 from optics.eye import geometry
 from optics.eye.eye_spec import EyeSpec
 from optics.eye.receptor_lattice import even_lattice
@@ -58,7 +58,9 @@ def test_the_widest_pupil_fits_exactly():
 
 
 def test_lengths_of_an_eye():
-    eye = EyeSpec(resolution=(4, 10), fov_deg=90.0, sensor_width=2e-4, vertical_fov_deg=2 * math.degrees(math.atan(0.6)))
+    eye = EyeSpec(
+        resolution=(4, 10), fov_deg=90.0, sensor_width=2e-4, vertical_fov_deg=2 * math.degrees(math.atan(0.6))
+    )
     assert eye.sensor_distance == pytest.approx(1e-4)
     assert eye.retina_distance == eye.sensor_distance
     assert eye.receptor_pitch == pytest.approx(2e-5)
@@ -68,7 +70,7 @@ def test_lengths_of_an_eye():
     assert eye.fovy_deg == pytest.approx(eye.vertical_fov_deg)
     assert (eye.relative_aperture, eye.throughput, eye.parallax, eye.widest_pupil) == (1.0, 1.0, 0.0, 2e-4)
     assert eye.lattice is eye.photons is eye.receptor_photons is eye.mosaic is None
-    down, across = eye.receptor_angles_deg
+    _, across = eye.receptor_angles_deg
     np.testing.assert_allclose(across[0, 5], math.degrees(math.atan(0.2 / math.hypot(1, 0.45))), rtol=1e-9)
     right, up = eye.receptor_directions_deg
     np.testing.assert_allclose(np.tan(np.radians(right[2])), (np.arange(10) - 4.5) / 5)
@@ -135,7 +137,7 @@ def test_focal_lengths_of_fields_of_view():
         assert geometry.focal_length(3.0, degrees) == pytest.approx(exact)
         assert float(geometry.focal_length(3.0, Float64(degrees))[0]) == pytest.approx(exact)
     geometry.check_vertical(None, Float64(1.0))
-    with pytest.raises(ValueError, match="^vertical_fov_deg is given and fov_deg is a Dr.Jit array"):
+    with pytest.raises(ValueError, match=r"^vertical_fov_deg is given and fov_deg is a Dr.Jit array"):
         geometry.check_vertical(10.0, Float64(1.0))
 
 
@@ -154,7 +156,7 @@ def test_distances_behind_a_pupil():
 def test_a_lens_that_is_no_pupil():
     """The message says so if the object has a pupil."""
     for given, its in ((SimpleNamespace(pupil=Pupil(1e-5)), True), (SimpleNamespace(pupil=3), False)):
-        with pytest.raises(ValueError, match="^pupil = ") as refused:
+        with pytest.raises(ValueError, match=r"^pupil = ") as refused:
             geometry.check_pupil(given, 1.0, None)
         assert ("(it has one, its `pupil`)" in str(refused.value)) == its
 

@@ -122,6 +122,15 @@ def test_the_width_of_a_receptor_s_sensitivity():
     assert summary._acceptance(SimpleNamespace(pupil=None, receptor_pitch=7.0), white, None) == 7
 
 
+@pytest.mark.parametrize("middle", [-17.0, 17.0])
+def test_the_width_of_a_sensitivity_at_the_rim_of_the_window(middle):
+    """A narrow PSF is 5 wide behind a receptor of this width, although it lies within 3 of the rim."""
+    x = 0.5 * (np.arange(81) - 40)
+    white = SimpleNamespace(x=x, y=x, dx=0.5, psf=gaussian(x, middle, 1.0)[None, :, None] * gaussian(x, middle, 1.0))
+    eye = SimpleNamespace(pupil=1, waveguide=None, receptor_size=(5.0, 5.0), receptor_pitch=7.0)
+    assert summary._acceptance(eye, white, None) == pytest.approx(5.0, rel=0.01)
+
+
 @pytest.mark.parametrize(("diameter", "cells"), [(1.0, 56), (2.0, 28), (2.01, 28), (0.5, 64), (20.0, 4)])
 def test_the_width_of_a_waveguide_s_sensitivity(diameter, cells):
     """The kernel has 8 cells across the waveguide, at least 4 and at most 64 across the receptor, which is 7 wide."""

@@ -46,7 +46,9 @@ def test_samples_for_cells():
     pitch = 1 / 2.25
     for cell, samples in (((2.0, 2.5), 1.75), ((3.0, 1.0), 2.0), ((0.9, 3.0), 2.25)):
         assert _pitch_for_cells(pitch, a_retina(cell=cell)) == pytest.approx(1 / samples)
-        assert _pitch_for_cells(2 * pitch, a_retina(cell=tuple(2 * side for side in cell))) == pytest.approx(2 / samples)
+        assert _pitch_for_cells(2 * pitch, a_retina(cell=tuple(2 * side for side in cell))) == pytest.approx(
+            2 / samples
+        )
 
 
 def a_beam(angle=(0.0, 0.0), **pupil):
@@ -143,7 +145,7 @@ def test_areas_that_are_tried_for_steep_reliefs(monkeypatch, failing, samples, s
     if failing < 3:
         assert receptive_field._on_spot(compute, [1, 2], retina) == f"result {tried[-1]}"
     else:
-        with pytest.raises(AccuracyError, match="^number 1$"):
+        with pytest.raises(AccuracyError, match=r"^number 1$"):
             receptive_field._on_spot(compute, [1, 2], retina)
     assert asked == tried
 
