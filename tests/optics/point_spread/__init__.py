@@ -1,6 +1,6 @@
 """Tests that fail when a module of optics/point_spread is broken.
 
-arriving: test_light_parts.py, test_measure_bounds.py
+arriving: test_arriving_parts.py, test_light_parts.py, test_arriving.py, test_measure_bounds.py
 batch: test_light_parts.py, test_batch.py
 lens_mtf: test_light_parts.py, test_lens_mtf.py
 circle_sums: test_circle_sums.py
