@@ -156,6 +156,9 @@ def test_surfaces_that_continue_behind_another_one_have_no_edge_there():
     cells, sources = layers_of([0.0, 0.4, 10.0, 10.0, 1.2, 1.2])
     assert cells == [([2, 3], [2, 3]), ([3, 4, 5], []), ([0, 1, 2], [])]
     assert sources[1] == sources[2] == [0, 1, 1, 4, 4, 5]
+    # The surface at 0.4 has a visible rim at 0.5, but this is no edge. Behind the plate, it meets a surface at 0.95.
+    cells, _ = layers_of([0.0, 0.4, 0.5, 0.4, 10.0, 10.0, 0.95])
+    assert cells == [([4, 5], [4, 5]), ([2, 5, 6], []), ([0, 1, 3, 4], [])]
 
 
 def test_surfaces_with_a_visible_edge_have_it_behind_another_one_too():

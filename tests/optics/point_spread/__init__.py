@@ -22,7 +22,7 @@ population_members: test_population_members.py
 psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
 request: test_check_parts.py, test_cost_formulas.py, test_request.py, test_psf.py
 psf_result: test_psf_result.py, test_psf.py, test_measure_errors.py
-spot_check: test_check_parts.py, test_spot_check.py
+spot_check: test_spot_parts.py, test_check_parts.py, test_spot_check.py
 through_focus: test_through_focus.py
 vector_focus: test_vector_focus.py, test_foci.py
 window_cost: test_cost_formulas.py, test_window_cost.py, test_predicted_cost.py

@@ -153,7 +153,9 @@ def test_sums_that_are_worth_their_time(monkeypatch, change, summed):
     aperture = SimpleNamespace(
         area=4.0,
         node_count=lambda phase, digits: asked.append((phase, digits)) or given["counted"],
-        nodes=lambda phase, digits: asked.append((phase, digits)) or SimpleNamespace(x=1, y=2, weight=range(given["nodes"])),
+        nodes=lambda phase, digits: (
+            asked.append((phase, digits)) or SimpleNamespace(x=1, y=2, weight=range(given["nodes"]))
+        ),
     )
     problem = SimpleNamespace(
         aperture=aperture, wavelength=1.0, **{name: given[name] for name in ("radius", "phase_band", "pixelated")}
@@ -212,5 +214,7 @@ def test_the_power_of_some_frequencies_and_its_derivatives(masked):
         assert found.numpy() == pytest.approx(exact)
         dr.backward(found)
         step = 1e-5
-        above, below = (exact_fraction(*(one + sign * step * (i == k) for i, one in enumerate(at)), masked) for sign in (1, -1))
+        above, below = (
+            exact_fraction(*(one + sign * step * (i == k) for i, one in enumerate(at)), masked) for sign in (1, -1)
+        )
         assert dr.grad(given[k]).numpy() == pytest.approx((above - below) / (2 * step), rel=1e-5)

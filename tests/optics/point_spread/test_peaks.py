@@ -220,3 +220,8 @@ def test_which_peak_is_searched(monkeypatch):
     asked.clear()
     with pytest.raises(AccuracyError, match="no peak was found within 2 windows of 9 samples"):
         peak(inner, **start)
+
+
+def test_a_flag_is_true_or_false():
+    with pytest.raises(ValueError, match=r"^with_error = 2"):
+        optics.strehl_ratio(None, with_error=2)
