@@ -1,6 +1,5 @@
 """Parts of the spot check, from given numbers."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -220,7 +219,7 @@ def test_exact_points(monkeypatch, symmetric):
 
 @pytest.mark.parametrize("shape", [(3, 5), (1, 6), (4, 1)])
 def test_nearness_to_sides_and_corners(shape):
-    """Half of the sides' weight is for the outermost samples alone. Sums over rows and over columns have equal weight."""
+    """Half of the sides' weight is for the outermost samples alone. Both pairs of sides have equal weight."""
     height, width = shape
     y, x = (np.linspace(-1, 1, n) if n > 1 else np.ones(1) for n in shape)
     sides, corners = np.zeros(shape), np.zeros(shape)
