@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from types import SimpleNamespace
 
+import drjit as dr
 import numpy as np
 import pytest
 
@@ -101,6 +102,7 @@ def test_distances_of_scenes():
     assert _distances(3, (2, 3)) == 3
     assert _distances(math.inf, (2, 3)) == math.inf
     z = Float64(2.0)
+    dr.enable_grad(z)
     assert _distances(z, (2, 3)) is z
     depth = np.array([[1.0, 2, math.inf], [4, 5, 6]])
     np.testing.assert_array_equal(_distances(depth, (2, 3)), depth)

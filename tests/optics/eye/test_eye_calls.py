@@ -213,3 +213,27 @@ def test_the_share_of_white_that_kernels_transmit():
     light = kernels_of.daylight(wavelengths) * [0.6, 0.3]
     expected = (1.2 * light[0] + 3.5 * light[1]) / 2
     assert kernels_of.white_share(kernels, bands) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("dense", [False, True])
+@pytest.mark.parametrize("direction", [None, (3.0, 4.0)])
+def test_tables_of_eyes(monkeypatch, dense, direction):
+    """The table is that of a single receptor if receptors differ, or if a direction is given."""
+    asked = []
+    calls = SimpleNamespace(white_signal=0.5, psf=lambda z: ("psf", z), kernel=lambda cells, z: ("kernel", cells, z))
+    eye = Eye(**FIELD, **TALL, density=HALVES if dense else None)
+
+    def described(own, light, result, kernel):
+        asked.append((own, light, result, kernel(4)))
+        return SimpleNamespace()
+
+    monkeypatch.setattr(module, "receptor_in", lambda own, toward: calls if (own, toward) == (eye, direction) else None)
+    monkeypatch.setattr(module, "describe", described)
+    monkeypatch.setattr(module, "spacing_range", lambda own: "range")
+    monkeypatch.setattr(module, "replace", lambda found, **given: given)
+    for name in ("psf", "kernel"):
+        monkeypatch.setattr(Eye, name, lambda self, *_, of=getattr(calls, name), **given: of(*_, **given))
+    found = eye.describe(2.0, direction)
+    own = eye if not dense and direction is None else calls
+    assert asked == [(own, 1.0 if own is eye else 0.5, ("psf", 2.0), ("kernel", 4, 2.0))]
+    assert (found == {"interommatidial_range_deg": "range"}) == dense
