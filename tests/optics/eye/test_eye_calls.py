@@ -231,8 +231,8 @@ def test_tables_of_eyes(monkeypatch, dense, direction):
     monkeypatch.setattr(module, "describe", described)
     monkeypatch.setattr(module, "spacing_range", lambda own: "range")
     monkeypatch.setattr(module, "replace", lambda found, **given: given)
-    for name in ("psf", "kernel"):
-        monkeypatch.setattr(Eye, name, lambda self, *_, of=getattr(calls, name), **given: of(*_, **given))
+    monkeypatch.setattr(Eye, "psf", lambda self, z: calls.psf(z))
+    monkeypatch.setattr(Eye, "kernel", lambda self, cells, z: calls.kernel(cells, z))
     found = eye.describe(2.0, direction)
     own = eye if not dense and direction is None else calls
     assert asked == [(own, 1.0 if own is eye else 0.5, ("psf", 2.0), ("kernel", 4, 2.0))]

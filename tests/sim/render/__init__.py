@@ -1,8 +1,8 @@
 """Tests of rendering: which test covers which module.
 
 one_ray: test_one_ray.py
-batched_renderer: test_signals.py, test_ray_parts.py, test_batched_renderer.py, test_reference_renderer.py, test_vertical_field.py
-eye_renderer: test_signals.py, test_renderer_parts.py, test_eye_renderer.py, test_batched_renderer.py, test_model_renderer.py
+batched_renderer: test_signals.py, test_ray_parts.py, test_batched_renderer.py, test_reference_renderer.py
+eye_renderer: test_signals.py, test_renderer_parts.py, test_eye_renderer.py, test_model_renderer.py
 ray_kernel: test_ray_parts.py, test_batched_renderer.py, test_one_ray.py
 eye_rays: test_ray_parts.py, test_batched_renderer.py, test_model_renderer.py
 area_kernel: test_area_kernel.py
