@@ -10,6 +10,7 @@ import pytest
 
 import optics
 from optics import Eye, Pupil, Sensor, camera_eye
+from optics.eye import camera
 from optics.eye.camera import _distances, _radiance, _read
 from tests.optics.device_types import Float64, TensorXf64
 
@@ -160,6 +161,16 @@ def test_field_zones_of_images(monkeypatch, zones):
     for given in ({"sensor": SENSOR}, {"sensor_distance": 1.0}):
         with pytest.raises(ValueError, match=r"^lens is an Eye, and sensor or sensor_distance is given"):
             optics.camera_image(scene, eye, **given)
+    asked.clear()
+    optics.camera_image(scene[:, 1:3, 2:6], eye)
+    assert asked[0][1:] == (1, None, math.inf, None)
     sensor = Sensor((2, 4), 1e-6, bands=4)
     optics.camera_image(scene, Pupil(1e-3, thin_lens_focal_length=5e-3), sensor, samples_per_pixel=2, rng=rng)
     assert asked[-1][2] is None
+    tolerances = []
+    monkeypatch.setattr(
+        camera, "camera_eye", lambda lens, sensor, distance, tolerance: tolerances.append(tolerance) or eye
+    )
+    monkeypatch.setattr(camera, "_read", lambda *given: "numbers")
+    assert optics.camera_image(scene[:, 1:3, 2:6], "lens", sensor) == "numbers"
+    assert tolerances == [1e-2]

@@ -90,6 +90,9 @@ def test_fewer_samples_for_looser_tolerances():
     wanted = [samples_per_cycle(tolerance) for tolerance in (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)]
     assert wanted == sorted(wanted, reverse=True)
     assert wanted[-1] > 2  # Nyquist
+    assert samples_per_cycle(1e-4) == 3.1
+    assert samples_per_cycle(1e-4 / 2**8) == pytest.approx(6.2)  # the error falls with the eighth power
+    assert samples_per_cycle(1e-4 * 10**0.5) == pytest.approx(3.1 - 0.425 / 2)
 
 
 def test_fewer_samples_for_larger_cells_where_tolerances_are_loose():

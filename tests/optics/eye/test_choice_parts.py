@@ -127,6 +127,32 @@ def test_bands_of_kernels(monkeypatch, white, scale):
         assert [len(wavelengths) for wavelengths in computed] == [comparisons[0], *(2 * n for n in comparisons)]
 
 
+def test_a_cell_for_each_receptor_is_the_default(monkeypatch):
+    """Bands are first chosen for colours; white is what the kernels transmit."""
+    asked = []
+    monkeypatch.setattr(band_choice, "_reflectance_error", lambda chosen, exact, range_nm: 0.0)
+    monkeypatch.setattr(band_choice, "worst_difference", lambda terms, samples: asked.append(samples) or 0.0)
+    assert len(choose_bands(0.1, kernels=lambda at: np.ones((len(at), 1, 1))).wavelengths) == 1
+    assert asked == [1]
+
+
+def test_numbers_of_nodes_to_try(monkeypatch):
+    """The field of 8 x 16 receptors has half as many intervals between rows as between columns."""
+    tried = {}
+
+    def made(stage, kernel_at, candidates, mean, white):
+        tried[stage] = candidates, mean, white()
+        return NodeChoice(stage, lambda at: np.ones((1, 1, 1)), candidates, mean)
+
+    monkeypatch.setattr(kernel_bank, "NodeChoice", made)
+    given = lambda z, right, down: np.ones((1, 1, 1))  # noqa: E731
+    kernel_bank.prepare(given, (8, 16), 3, np.array([1.0, 2.0]), ("auto", "auto"), 0.1)
+    assert tried["depth"] == ([(1,), (3,), (5,), (9,), (17,), (33,)], 3, 1.0)
+    assert tried["field"] == ([(1, 1), (2, 3), (3, 5), (5, 9)], 3, 1.0)
+    kernel_bank.prepare(given, (8, 16), 3, 1.0, ("auto", "auto"), 0.1, mean=2, white=lambda: 0.5)
+    assert tried["depth"][1:] == (2, 0.5)
+
+
 def test_errors_of_colours():
     """Half of the largest error of Σ w d exp(2πi λ/Λ), where Λ is the range of wavelengths, here 200 nm."""
     one = SimpleNamespace(weights=np.array([[0.5], [0.1]]), wavelengths=np.array([500e-9]))
@@ -266,4 +292,4 @@ def test_means_over_pixels(shape, cutoff):
         expected = np.sinc(0.5 * f) * np.cos(2 * math.pi * f * middles + 0.4)
         np.testing.assert_allclose(matrix @ np.cos(2 * math.pi * f * at + 0.4), expected, atol=1e-3)
         beyond = (abs(at - middles.mean()).max() - len(middles) * 0.25) / pixels.samples.dx
-        assert 8 <= beyond < 9.5
+        assert 8 - 1e-9 <= beyond < 9 - 1e-9

@@ -197,7 +197,11 @@ def test_steep_rays_change_polarised_signals(monkeypatch):
 
 @pytest.mark.parametrize(("floor", "limit"), [(0.25, 6.0), (0.0, 8.0), (-1.0, 8.0), (1.5, 0.0), (0.9, 0.8)])
 def test_contrast_falls_to_the_noise(monkeypatch, floor, limit):
-    monkeypatch.setattr(summary, "mtf", lambda white: SimpleNamespace(profile=lambda f: [1 - f / 8]))
+    def profile(f):
+        assert f.shape == (513,)
+        return [1 - f / 8]
+
+    monkeypatch.setattr(summary, "mtf", lambda white: SimpleNamespace(profile=profile))
     assert summary._noise_limit(None, 8.0, floor) == pytest.approx(limit)
     monkeypatch.setattr(summary, "mtf", lambda white: SimpleNamespace(profile=lambda f: [0 * f + 1]))
     assert summary._noise_limit(None, 8.0, 0.5) == 8.0

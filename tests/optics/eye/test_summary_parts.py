@@ -148,7 +148,10 @@ def test_the_width_of_a_waveguide_s_sensitivity(diameter, cells):
         pupil=1, waveguide=SimpleNamespace(diameter=diameter), receptor_pitch=7.0, spectral_bands=bands
     )
     width = 2 * math.sqrt(2 * math.log(2)) * 4.0
-    assert summary._acceptance(eye, None, kernel) == pytest.approx(width, abs=2 * 7.0 / cells / 15)
+    found, length = summary._acceptance(eye, None, kernel), 10 * cells
+    assert found == pytest.approx(width, abs=2 * 7.0 / cells / 15)
+    step = (length - 1) / (16 * length - 1) * 7.0 / cells  # 16 points for each cell
+    assert found / step == pytest.approx(round(found / step), abs=1e-6)
     assert asked == [cells]
 
 
