@@ -48,7 +48,7 @@ def test_the_estimate_for_oblique_rays(monkeypatch):
 
 
 def test_estimates_of_very_oblique_rays_are_limited(monkeypatch):
-    """At most half of the light is lost at the edge, and the doubt is at most one half as well."""
+    """The edge loses at most half of the light, and the doubt is at most one half as well."""
     found, unsure, _ = not_evanescent(monkeypatch, [1e3, 1e3, 2.0], [(0.0, 0.0)] * 3, [None] * 3)
     np.testing.assert_allclose(found, 0.25 * (1 - np.array([0.5, 0.5, 2 * EDGE[2]])), rtol=1e-4)
     np.testing.assert_allclose(unsure[:2], [0.25 * 0.75] * 2, rtol=1e-4)
@@ -147,7 +147,7 @@ def test_rays_beyond_grazing():
     ],
 )
 def test_sums_that_are_worth_their_time(monkeypatch, change, summed):
-    """At most 2e8 pairs of nodes and frequencies, here 100,000 frequencies."""
+    """A sum has at most 2e8 pairs of nodes and frequencies, here 100,000 frequencies."""
     given = {"radius": 10.0, "phase_band": 5.0, "nodes": 10, "counted": 10, "pixelated": None, "unsure": 1e-3} | change
     asked = []
     aperture = SimpleNamespace(
