@@ -15,7 +15,7 @@ fidelity_choice: test_sample_rules.py, test_fidelity_choice.py, test_fidelity.py
 world_fidelity: test_world_fidelity.py, test_fidelity.py, eyes/test_depth_layers.py
 fidelity_stages: test_model_rules.py, test_fidelity_levels.py, test_fidelity_choice.py, test_fidelity.py
 sample_choice: test_sample_rules.py, test_fidelity_levels.py, test_sample_choice.py, test_fidelity.py
-random_views: test_model_rules.py, test_fidelity_trials.py, test_fidelity.py
+random_views: test_trial_errors.py, test_model_rules.py, test_fidelity_trials.py, test_fidelity.py
 populations: test_trial_errors.py, test_model_rules.py, test_sample_choice.py, test_fidelity.py
 fidelity_trials: test_signals.py, test_trial_errors.py, test_trial_parts.py, test_model_rules.py, test_fidelity.py
 prepared_scene: test_scene_parts.py, test_trial_parts.py, test_renderer_parts.py, test_batched_renderer.py

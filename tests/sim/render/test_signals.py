@@ -231,6 +231,17 @@ def test_flow_needs_no_second_geom():
     np.testing.assert_allclose(found[0, 0, :, 0], [[0, np.nan], [0, np.nan]], atol=1e-6)
 
 
+def test_flow_in_receptors_that_are_not_square():
+    """A point at the depth 2 m moves by 0.4 m to the right and 0.6 m up, in receptors of the tangents 1 x 1.732."""
+    eye = optics.Eye(resolution=(2, 2), fov_deg=90, vertical_fov_deg=120)
+    turns = np.tile(np.eye(3), (1, 1, 1, 1))
+    moments = tuple(SimpleNamespace(geom_xpos=np.array([[at]]), geom_xmat=turns) for at in ([0.0, 0, 0], [0.4, 0.6, 0]))
+    frames = (np.zeros((1, 1, 3)), np.eye(3).reshape(1, 1, 3, 3))
+    found = flow_between(eye, np.full((1, 1, 2, 2), 2.0), np.zeros((1, 1, 2, 2), int), moments, (frames, frames))
+    np.testing.assert_allclose(found[0, 0, 0], np.full((2, 2), 0.2), rtol=1e-5)
+    np.testing.assert_allclose(found[0, 0, 1], np.full((2, 2), -0.3 / math.sqrt(3)), rtol=1e-5)
+
+
 def test_areas_of_views(monkeypatch):
     """Each area has the ray and the axis of its view's eye, and the bodies of its view."""
     eyes = sim.Eyes(n_eyes=2, resolution=(1, 2), placement_range_deg=90)

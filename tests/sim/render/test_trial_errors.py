@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sim
-from sim.render import populations
+from sim.render import populations, random_views
 from sim.render.fidelity_trials import FidelityTrials
 from sim.render.populations import Population, everywhere, near_objects
 from sim.render.random_views import RandomViews
@@ -194,3 +194,7 @@ def test_receptors_near_objects(monkeypatch):
     np.testing.assert_array_equal(all_.counted, np.ones((5, 2), bool))
     np.testing.assert_array_equal(asked[-1], np.ones(6))
     assert isinstance(all_, Population)
+
+
+def test_places_beside_the_middle_of_a_cell():
+    assert random_views._stray(SimpleNamespace(uniform=lambda *given: given)) == (-0.75, 0.75, 2)
