@@ -11,10 +11,8 @@ import sim
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.sampling import BoxSampling
 from sim.render import one_ray, prepared_scene, reference_renderer
-from sim.render.fidelity import Fidelity
 from sim.render.prepared_scene import PreparedScene
 from sim.render.reference_renderer import ReferenceRenderer
-from sim.render.renderable import check_renderable
 from sim.scene.moved_bodies import MovedBodies
 from sim.scene.poses import Poses
 
@@ -280,24 +278,3 @@ def test_poses_as_arrays(monkeypatch):
 def test_box_sampling_is_no_field_sampling():
     """Receptors with a perfect lens share no areas."""
     assert prepared().may_share(BoxSampling(sim.Eyes(n_eyes=1, resolution=(1, 2)).eye()), 0.25) is False
-
-
-@pytest.mark.parametrize(
-    ("given", "reason"),
-    [
-        ({}, None),
-        ({"samples": "areas"}, "samples = 'areas': must be 'rays' for a compound eye"),
-        ({"samples": "edges"}, "samples = 'edges': must be 'rays' for a compound eye"),
-        ({"depth": DepthLayers(20.0, 1.0, 2)}, "depth: 2 layers: must be one for a compound eye"),
-        ({"bands": 5}, "bands = 5: must be the scene's 4"),
-    ],
-)
-def test_a_fidelity_fits_compound_eyes(given, reason):
-    facet = optics.Ommatidium(optics.Pupil(12e-6, thin_lens_focal_length=60e-6), optics.Waveguide(2e-6))
-    eye = sim.CompoundEye([(0.0, 0.0), (5.0, 0.0)], facet, bands=4)
-    fidelity = Fidelity(**({"rays_per_receptor": 4, "bands": 4} | given))
-    if reason is None:
-        check_renderable(fidelity, eye)
-        return
-    with pytest.raises(ValueError, match=rf"^fidelity[.:] ?{reason}"):
-        check_renderable(fidelity, eye)
