@@ -10,7 +10,7 @@ window_loss: test_light_parts.py, test_measure_bounds.py
 light_batch: test_light_parts.py, test_torch.py
 coarse_stack: test_torch_stacks.py
 microvilli: test_microvilli.py
-converging: test_vector_focus.py, test_microvilli.py
+converging: test_converging_parts.py, test_vector_focus.py, test_microvilli.py
 disk_sum: test_check_parts.py, test_microvilli.py
 modulation_transfer: test_contrast_parts.py, test_modulation_transfer.py
 contrast: test_contrast_parts.py, test_measures.py, test_measure_errors.py, test_modulation_transfer.py
