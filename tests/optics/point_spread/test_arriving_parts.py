@@ -70,6 +70,9 @@ def test_certain_estimates_need_no_sum(monkeypatch):
     assert asked == []
     np.testing.assert_allclose(unsure, 1e-5, rtol=1e-3)
     np.testing.assert_allclose(1 - found, WAVES / (math.pi**2 * 1e-3), rtol=1e-5)
+    monkeypatch.setattr(arriving, "SURE", float(unsure.max()))
+    assert not_evanescent(monkeypatch, [1.0] * 3, [(0.0, 1e-5)] * 3, None, pupil=wide)[2] == []
+    monkeypatch.setattr(arriving, "SURE", 1e-4)
     _, unsure, asked = not_evanescent(
         monkeypatch, [1.0] * 3, [(0.0, 1e-5), (0.0, 2e-4), (0.0, 0.0)], [TYPES.Float(1.0)] * 3, pupil=wide
     )
