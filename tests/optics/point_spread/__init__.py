@@ -16,7 +16,7 @@ modulation_transfer: test_contrast_parts.py, test_modulation_transfer.py
 contrast: test_contrast_parts.py, test_measures.py, test_measure_errors.py, test_modulation_transfer.py
 mixture: test_mixture.py
 pictures: test_check_parts.py, test_pictures.py
-planner: test_cost_formulas.py, test_planner.py
+planner: test_planner_parts.py, test_cost_formulas.py, test_planner.py
 population: test_population_parts.py, test_population.py, test_population_members.py
 population_members: test_population_parts.py, test_population_members.py
 psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
