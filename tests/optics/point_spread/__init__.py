@@ -4,7 +4,7 @@ arriving: test_arriving_parts.py, test_light_parts.py, test_arriving.py, test_me
 batch: test_attempt_parts.py, test_light_parts.py, test_batch.py
 lens_mtf: test_light_parts.py, test_lens_mtf.py
 circle_sums: test_circle_sums.py
-concentration: test_attempt_parts.py, test_check_parts.py, test_measures.py, test_measure_errors.py, test_measure_bounds.py
+concentration: test_attempt_parts.py, test_check_parts.py, test_measures.py, test_measure_errors.py
 strehl: test_peaks.py, test_measures.py, test_measure_errors.py, test_measure_bounds.py
 window_loss: test_loss_parts.py, test_light_parts.py, test_measure_bounds.py
 light_batch: test_light_parts.py, test_torch.py
@@ -17,7 +17,7 @@ contrast: test_contrast_parts.py, test_measures.py, test_measure_errors.py, test
 mixture: test_mixture.py
 pictures: test_attempt_parts.py, test_check_parts.py, test_pictures.py
 planner: test_planner_parts.py, test_cost_formulas.py, test_planner.py
-population: test_population_parts.py, test_population.py, test_population_members.py
+population: test_common_plans.py, test_population_parts.py, test_population.py, test_population_members.py
 population_members: test_population_parts.py, test_population_members.py
 psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
 request: test_check_parts.py, test_cost_formulas.py, test_request.py, test_psf.py

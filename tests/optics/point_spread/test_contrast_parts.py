@@ -292,8 +292,7 @@ def test_causes_of_errors_are_relative_to_the_light_that_arrives(monkeypatch):
     np.testing.assert_allclose(found.lost, [(0.1 + 0.01) / 0.5, 0.02])
     np.testing.assert_allclose(found.light, [0.02, 0.02])
     np.testing.assert_allclose(found.rest, [0.04, 0.03])
-    largest = float(found.total.max())
-    contrast.mtf(given, tolerance=largest)
+    contrast.mtf(given, tolerance=float(found.total.max()))
     with pytest.raises(
         AccuracyError, match=r"tolerance = 0\.259: .* errors of up to 0\.26 \(PSF 0\.03, .* 0\.1, .* 0\.02\)"
     ):
