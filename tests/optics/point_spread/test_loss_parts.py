@@ -35,7 +35,7 @@ def test_totals_and_first_wavelengths_of_causes():
 
 @pytest.mark.parametrize(("n", "start"), [(8, 0.5), (5, 0.7), (1, 0.5)])
 def test_fades_towards_the_ends_of_a_row(n, start):
-    """From the start on, a fade is cos² of a quarter of a turn; ends of rows are half their length away."""
+    """A fade is cos² of a quarter of a turn from its start on. Ends of rows are half their length away."""
     expected = []
     for k in range(n):
         away = abs(k - n // 2) / max(n / 2, 1)
