@@ -23,7 +23,7 @@ memory_budget: test_fidelity_levels.py, test_memory_budget.py, test_sample_choic
 receptors_in_time: test_renderer_parts.py, test_receptors_in_time.py
 receptor_noise: test_signals.py, test_renderer_parts.py, test_receptor_noise.py
 pending_frame: test_renderer_parts.py, test_pending_frame.py, envs/test_eyes_of_kind.py
-model_renderer: test_model_renderer.py, test_pupil_axes.py
+model_renderer: test_renderable.py, test_model_renderer.py, test_pupil_axes.py
 renderable: test_renderable.py, test_fidelity_levels.py, test_model_renderer.py, test_edge_rays.py
 model_fidelity: test_model_rules.py, test_model_fidelity.py, test_needed_light.py, test_model_light.py
 edge_rays: test_model_rules.py, test_edge_rays.py
