@@ -174,6 +174,9 @@ def test_degrees_of_polarisation(degree):
         polarization.taken_by(tile, (3, 4), radiance, (good, 0.0))
     with pytest.raises(ValueError, match="polarization's degree"):
         polarization.taken_by(tile, (3, 4), radiance, (degree, 0.0))
+    for name, wrong in (("degree", ([0.5, np.nan], 0.0)), ("angle", (0.5, [np.inf, 0.0]))):
+        with pytest.raises(ValueError, match=f"polarization's {name} holds NaN or infinity"):
+            polarization.taken_by(tile, (3, 4), radiance, wrong)
     with pytest.raises(ValueError, match=r"polarization's angle has shape \(3,\)"):
         polarization.taken_by(tile, (3, 4), radiance, (0.5, [1, 2, 3]))
     for wrong in (0.5, (1, 2, 3)):
