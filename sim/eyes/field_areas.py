@@ -26,8 +26,8 @@ BEYOND = 0.015
 class FieldAreas:
     """A lattice of rectangles of the visual field, numbered row by row.
 
-    edges: y of the edges between rows (down), and x of the edges between columns, relative to the eye's axis [receptor
-        pitches]
+    edges: y of the edges of the rows (downwards) [receptor heights], (rows + 1,), and x of the edges of the columns
+        [receptor widths], (columns + 1,), both relative to the eye's axis
     """
 
     edges: tuple[np.ndarray, np.ndarray]
@@ -39,7 +39,7 @@ class FieldAreas:
         At most the fraction `beyond` of the receptors' light comes from outside the rim on each side. With half a row
         per receptor, each row covers two receptors, and the outermost rows may extend beyond the outermost receptors.
 
-        parts: numbers of rows and of columns per receptor
+        parts: numbers of rows and of columns per receptor, which may be smaller than 1
         """
         found = []
         for axis, (n, per_receptor) in enumerate(zip(fields.resolution, parts, strict=True)):
@@ -113,6 +113,8 @@ def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarr
     """Return the fraction of each cell of a field that lies between successive edges, (rectangle, cell).
 
     centre: centre of the field, in the same coordinate as the edges
+    size: number of cells along the field
+    cells: number of cells along a receptor's side
     """
     places = (edges - centre) * cells + size / 2
     return np.diff(np.clip(places[:, None] - np.arange(size), 0, 1), axis=0)

@@ -7,7 +7,7 @@ import numpy as np
 
 _TYPES = mujoco.mjtGeom
 # Unit vectors in all directions, spaced by the golden angle so that few of them hit edges of meshes. At least one of
-# them passes through any opening in a mesh with an angular diameter of 20 degrees or more.
+# them passes through any round opening in a mesh with an angular diameter of 40 degrees or more.
 _N_WAYS = 64
 _HEIGHTS, _AROUND = 1 - (2 * np.arange(_N_WAYS) + 1) / _N_WAYS, np.arange(_N_WAYS) * np.pi * (3 - np.sqrt(5))
 _WAYS = np.column_stack([np.sqrt(1 - _HEIGHTS**2) * f(_AROUND) for f in (np.cos, np.sin)] + [_HEIGHTS])
@@ -18,8 +18,10 @@ _BEYOND = 1e-9
 def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
     """Return the depth of a point below the surface of a primitive or a closed mesh [m].
 
-    The depth is 0 for points outside the geom, and for geoms of all other types. For ellipsoids and meshes the depth
-    is approximate.
+    The depth is 0 for points outside the geom, and for geoms of all other types. For ellipsoids and meshes the depth is
+    approximate.
+
+    point: position in world coordinates [m], (3,)
     """
     p = data.geom_xmat[geom].reshape(3, 3).T @ (point - data.geom_xpos[geom])
     size, kind = model.geom_size[geom], model.geom_type[geom]

@@ -39,7 +39,7 @@ class Mount:
         kinds with an object of this name
 
     Raises:
-        ValueError: `on` is not a name, an angle or offset is not finite, or the kind is unknown.
+        ValueError: `on` is not a nonempty string, an angle or offset is not finite, or the kind is unknown.
     """
 
     on: str
@@ -85,6 +85,8 @@ class Mount:
 
         Both are given in the frame of the object that carries the eye. The columns of the eye's frame are (right, up,
         ahead).
+
+        kind: kind of the object, "site", "camera" or "body"
         """
         ahead, left, up = _AXES[kind]
         azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
@@ -112,7 +114,11 @@ def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
 
 
 def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
-    """Return each mount followed by its mirror image on the other side of the body."""
+    """Return each mount followed by its mirror image on the other side of the body.
+
+    Raises:
+        ValueError: `mounts` does not contain only mounts.
+    """
     return tuple(one for mount in items("mounts", mounts, Mount, EXAMPLE) for one in (mount, mount.mirrored()))
 
 
@@ -121,11 +127,14 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
 
     `Eyes` uses the same arrangement on the built-in agent.
 
-    The placement range is the angle from the first to the last eye. With a range of 360 (n - 1) / n degrees, n eyes are
-    evenly spaced around the whole circle.
+    on: name of a body, site or camera
+    n_eyes: number of eyes, 1 to 10,000
+    placement_range_deg: angle from the first to the last eye [degrees]. With 360 (n - 1) / n degrees, n eyes are evenly
+        spaced around the whole circle.
+    radius: radius of the circle [m]
 
     Raises:
-        ValueError: `n_eyes` is less than 1, or another argument is invalid.
+        ValueError: an argument is invalid.
     """
     return fan(Mount(on, offset=(finite("radius", radius), 0.0, 0.0)), n_eyes, placement_range_deg)
 
@@ -133,11 +142,15 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:
     """Return mounts from left to right, evenly spaced over a range of azimuths.
 
-    Each eye is a copy of `mount`, including its offset, rotated about the upward axis of the object that carries it,
-    and then rotated upwards by `elevation_deg`. A single eye keeps the azimuth of `mount`.
+    The azimuth of `mount` is the middle of the range. Offsets are rotated with the azimuth, about the upward axis of
+    the object that carries the eyes. A single eye keeps the azimuth of `mount`.
+
+    n_eyes: number of eyes, 1 to 10,000
+    placement_range_deg: angle from the first to the last eye [degrees]
+    elevation_deg: angle that is added to the elevation of `mount` [degrees]
 
     Raises:
-        ValueError: `n_eyes` is less than 1, or another argument is invalid.
+        ValueError: an argument is invalid.
     """
     of_kind("mount", mount, Mount, EXAMPLE)
     n_eyes = whole("n_eyes", n_eyes, 1, MOST_EYES)

@@ -63,7 +63,7 @@ class ReceptiveFields:
 
     @classmethod
     def from_eye(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
-        """Tabulate the receptive fields of an eye.
+        """Tabulate the receptive fields of an eye, with this number of cells along a receptor's side.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -79,9 +79,9 @@ class ReceptiveFields:
 
     @property
     def power(self) -> np.ndarray:
-        """Fraction of the power from the pupil that falls inside a field, (plane,).
+        """Fraction of the pupil's power that falls inside a field, (plane,).
 
-        If receptors are waveguides, this is multiplied by the fraction of the power that a waveguide accepts.
+        If receptors are waveguides, it is multiplied by the fraction of the power that a waveguide accepts.
         """
         power: np.ndarray = self.field.sum(axis=(1, 2))
         return power
@@ -179,7 +179,7 @@ def receptive_fields_of(
 ) -> ReceptiveFields:
     """Return the receptive fields of an eye, tabulated on the finest cells on which its PSF can be computed.
 
-    kind: class of the table; `sim.eyes.varied_fields` for receptors with a `density`
+    kind: class of the table; `sim.eyes.varied_fields.VariedFields` for receptors with a `density`
 
     Raises:
         optics.AccuracyError: the pupil spreads light too far even for the coarsest cells.

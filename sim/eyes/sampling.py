@@ -144,7 +144,7 @@ class FieldSampling:
     If the requested number leaves a receptor without a ray, more rays are drawn until every receptor has one.
 
     tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. White light from beyond each side of the lattice
-        of areas contributes at most this amount to a signal.
+        of areas contributes at most this amount to a signal, on average over the receptors.
     """
 
     eye: optics.Eye
@@ -287,6 +287,7 @@ def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers =
 def negligible_share(eye: optics.Eye) -> float:
     """Return the fraction of a receptor's weights that can be omitted.
 
-    Omitting a fraction s changes a signal by at most s times the throughput of the aperture.
+    Omitting a fraction s changes a signal by at most s times the throughput of the aperture, in scenes nowhere brighter
+    than white in full daylight.
     """
     return min(NEGLIGIBLE * eye.noise_sigma / eye.aperture_throughput, eye.tolerance)

@@ -53,8 +53,8 @@ def tangent_size(eye: optics.Eye) -> tuple[float, float]:
 def parts_of(count: int, in_rows: bool, aspect: float = 1.0) -> tuple[int, int]:
     """Return the rows and columns of a receptor that is divided into this number of parts.
 
-    With `in_rows`, the parts are as nearly square as possible. If two numbers of rows are equally good, the smaller one
-    is used.
+    With `in_rows`, the parts are as nearly square as possible; if two numbers of rows are equally good, the result is
+    the smaller one. Without `in_rows`, there is a single row.
 
     aspect: height of a receptor divided by its width
     """

@@ -76,7 +76,7 @@ def facet_frames(directions: np.ndarray) -> np.ndarray:
 def hexagonal_patch(
     rings: int, interommatidial_deg: float, azimuth_deg: float = 0.0, elevation_deg: float = 0.0
 ) -> np.ndarray:
-    """Return viewing directions in hexagonal rings around a direction, unit vectors (n, 3).
+    """Return viewing directions in hexagonal rings around a direction, unit vectors (n, 3) of (ahead, left, up).
 
     15 rings have 721 ommatidia, like an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere by Lambert's
     equal-area projection, so every ommatidium has the same solid angle.
@@ -106,9 +106,9 @@ def hexagonal_patch(
 def whole_head(interommatidial_deg: float) -> np.ndarray:
     """Return viewing directions all around a head, unit vectors (n, 3).
 
-    They are the 10 f² + 2 nodes of an icosahedron whose edges are divided into f parts. All but twelve of them have six
-    neighbours. The number f is the smallest for which the mean angle between neighbours is at most the given one; 5.8
-    degrees give 1442 ommatidia.
+    The vectors are (ahead, left, up), in no particular order. They are the 10 f² + 2 nodes of an icosahedron whose
+    edges are divided into f parts. All but twelve of them have six neighbours. The number f is the smallest for which
+    the mean angle between neighbours is at most `interommatidial_deg`; 5.8 degrees give 1442 ommatidia.
 
     interommatidial_deg: largest mean angle between neighbours [degrees]
 

@@ -59,8 +59,8 @@ class Fidelity:
     levels: chosen level of each stage, with its reason
 
     Raises:
-        ValueError: bands, rays_per_receptor or tolerance is not a number or is out of range, light or samples is
-            unknown, or light = "all" is combined with another kind of samples than areas.
+        ValueError: bands, rays_per_receptor, tolerance or frames is not a number or is out of range, light or samples
+            is unknown, or light = "all" is combined with another kind of samples than areas.
     """
 
     rays_per_receptor: float
@@ -115,7 +115,7 @@ class Fidelity:
 
 
 def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
-    """Return the fidelity with this number of rays in direct light, or None for "auto", which is chosen later.
+    """Return the fidelity with this number of rays, direct light and the eyes' own bands; None for "auto".
 
     Raises:
         ValueError: the value is neither a positive number nor "auto".

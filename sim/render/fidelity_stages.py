@@ -28,7 +28,10 @@ NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the 
 
 
 def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = None) -> tuple[int, Level]:
-    """Return the smallest number of bands that `optics.Eye` needs for scenes of any colour, and for the medium."""
+    """Return the smallest number of bands that `optics.Eye` needs for any colours and the medium, and its level.
+
+    If no number is accurate enough for scenes of any colour, return the eye's own number.
+    """
     within = min(max(allowed / eye.throughput, 1e-6), 0.5)  # the tolerances that an Eye accepts
     try:
         bands = int(replace(eye, bands="auto", tolerance=within).bands)
@@ -97,7 +100,9 @@ def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Leve
     """Return direct light if a second reflection adds little, otherwise light after one and two reflections.
 
     In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
-    further reflection to the one before is assumed to be the ratio of the second reflection to direct light.
+    further reflection to the one before is assumed to be the ratio of the second reflection to direct light. If the
+    tracer cannot follow a second reflection, the result is direct light with an unknown error. If the
+    tracer cannot follow a second reflection, the result is direct light with an unknown error.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

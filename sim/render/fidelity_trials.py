@@ -167,7 +167,7 @@ class FidelityTrials:
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Return root mean square differences to the signals with the finest layers, for the same rays.
 
-        The nodes of each count must be among the nodes of the finest layers.
+        The layers of each number in `counts` must be among the finest layers.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -186,7 +186,7 @@ class FidelityTrials:
         return found
 
     def distances(self) -> np.ndarray:
-        """Return the distances of hit points along the eyes' axes [m], sorted; infinite without a hit."""
+        """Return distances of hit points along the eyes' axes in all views [m], (ray,), sorted; infinite without a hit."""
         _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
         return np.sort(np.array(z))
 

@@ -16,7 +16,7 @@ Frames = tuple[np.ndarray, np.ndarray]  # pupils [m] (world, eye, 3), eyes' fram
 
 
 def receptor_centres(eye: optics.Eye) -> np.ndarray:
-    """Return the receptors' centres, x to the right and y down, in receptors from the middle, (receptor, 2)."""
+    """Return the receptors' centres, x to the right and y down, counted in receptors from the middle, (receptor, 2)."""
     height, width = eye.resolution
     row, column = (index.ravel() for index in np.indices((height, width)))
     return np.stack([column + 0.5 - width / 2, row + 0.5 - height / 2], axis=-1)

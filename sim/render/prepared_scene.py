@@ -44,8 +44,8 @@ class PreparedScene:
     varied: see `sim.ModelRenderer`
     tracer: method of tracing rays, see `sim.BatchedRenderer`
     stand: the body that carries the eyes, if all eyes stand upright on one body; None: derived from the mounts
-    medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the
-        facets of a compound eye keep the index in front of them. None: clear air
+    medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the facets of a compound
+        eye keep the index in front of them. None: clear air
 
     Raises:
         ValueError: the model lacks the part on which an eye is mounted, an eye is inside a geom in the model's

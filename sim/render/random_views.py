@@ -23,7 +23,7 @@ class RandomViews:
     """Views of single eyes; the first axis is the view.
 
     position: position of the agent [m], (n, 2)
-    heading: [rad], (n,)
+    heading: azimuth to which the agent looks [rad], (n,)
     objects: centres [m], (n, k, 3)
     eye: index of the eye to which the view belongs, (n,)
     """
@@ -99,7 +99,11 @@ def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def on_objects(views: RandomViews, origins: np.ndarray, directions: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return which of the directions (n, r, 3) hit an object's ball, (n, r)."""
+    """Return which of the directions (n, r, 3) hit the ball of an object, (n, r).
+
+    origins: positions of the eyes [m], (n, 3)
+    radii: radius of each object's ball [m], (k,)
+    """
     found = np.zeros(directions.shape[:2], bool)
     for k, radius in enumerate(radii):
         way = views.objects[:, k] - origins

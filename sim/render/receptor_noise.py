@@ -33,7 +33,7 @@ FEW = 8  # number of worlds of a second, narrower kernel
 class Normals:
     """Standard normal numbers, an array of shape `shape` per world and frame.
 
-    keys: one per world, (n,) uint64
+    keys: Philox key of each world, (n,) uint64
     shape: shape of one world's receptors
     """
 
@@ -141,9 +141,10 @@ class NoiseModel:
     def in_frames(self, share: float) -> tuple[NoiseModel | None, NoiseModel | None]:
         """Return the shot noise of a frame that lasts a part of the integration time, and the remaining noise.
 
-        share: duration of the frame, as a fraction of the integration time
+        Each is None if it is 0. Receptors with dynamics sum the photons of their frames. Only the shot noise passes
+        their filters.
 
-        Receptors with dynamics sum the photons of their frames. Only the shot noise passes their filters.
+        share: duration of the frame, as a fraction of the integration time
         """
         shot = None if self.photons is None else NoiseModel(0.0, (self.photons * share).astype(np.float32))
         return shot, NoiseModel(self.sigma) if self.sigma > 0 else None

@@ -19,8 +19,12 @@ class ReceptorsInTime:
     """Receptors of `n` worlds.
 
     dynamics: their temporal properties
+    n: number of worlds
+    n: number of worlds
     shape: shape of one world's signals, (eye, channel, height, width)
     seconds: duration of a frame [s]
+    state: attribute, the state of all filters, (world, filter, *shape) float32
+    state: attribute, the state of all filters, (world, filter, *shape) float32
 
     Raises:
         ValueError: the latency is longer than MOST_DELAYED frames.
@@ -35,9 +39,9 @@ class ReceptorsInTime:
             )
         low = dynamics.order
         self._low, self._delayed = slice(0, low), slice(low, low + self._delay)
-        self._others = (
-            low + self._delay
-        )  # first the adaptation's mean, or the events' reference and count; then the mean of the motion detectors
+        # The remaining rows are the adaptation's mean, or the events' reference and count, and then the mean of the
+        # motion detectors.
+        self._others = low + self._delay
         self._moved = self._others + (2 if dynamics.event_threshold else int(dynamics.adaptation != "none"))
         self.state = np.zeros((n, self._moved + int(dynamics.motion != "none"), *shape), np.float32)
         self._before = self.state.copy()
@@ -58,7 +62,7 @@ class ReceptorsInTime:
         self.state[worlds] = rows
 
     def store(self, worlds: np.ndarray) -> None:
-        """Store the state of these worlds before their last frame, see `undo`."""
+        """Store the state of these worlds, to which `undo` returns."""
         self._before[worlds] = self.state[worlds]
 
     def undo(self, worlds: np.ndarray) -> None:
@@ -66,7 +70,10 @@ class ReceptorsInTime:
         self.state[worlds] = self._before[worlds]
 
     def step(self, signals: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Advance these worlds by a frame with these signals, and return their responses, (len(worlds), *shape)."""
+        """Advance these worlds by a frame with these signals (len(worlds), *shape), and return their responses.
+
+        The responses are (len(worlds), eye, channel, height, width). Motion detectors double the number of channels.
+        """
         rows = self.state[worlds]
         found = self._filtered(rows, signals)
         if self.dynamics.event_threshold:
