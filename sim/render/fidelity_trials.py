@@ -186,7 +186,7 @@ class FidelityTrials:
         return found
 
     def distances(self) -> np.ndarray:
-        """Return distances of hit points along the eyes' axes in all views [m], (ray,), sorted; infinite without a hit."""
+        """Return distances of hit points along the eyes' axes in all views [m], sorted; infinite without a hit."""
         _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
         return np.sort(np.array(z))
 

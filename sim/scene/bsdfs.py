@@ -52,8 +52,12 @@ def bsdf(
 
     It is two-sided for planes and meshes, which may be open, and transparent according to the alpha of the geom's rgba.
 
+    to_uv: matrix from the shape's texture coordinates to MuJoCo's, (3, 3); None: they are equal
     measured: a reflectance that replaces the geom's colour
     mirrors: True if the material's mirror reflection is included
+
+    Raises:
+        ValueError: the geom has a measured reflectance and a texture that is not grey.
     """
     if measured is None:
         description = _matter(model, geom, surfaces.reflectance_texture(model, geom, to_uv))
@@ -74,7 +78,7 @@ def bsdf(
 def matt(
     model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None, measured: Spectrum | None = None
 ) -> MitsubaObject:
-    """Return the Lambertian, opaque part of a geom's BSDF, two-sided."""
+    """Return the Lambertian, opaque part of a geom's BSDF, two-sided; see `bsdf` for arguments and errors."""
     if measured is None:
         color = surfaces.reflectance_texture(model, geom, to_uv)
         description: Description = {"type": "diffuse", "reflectance": color}

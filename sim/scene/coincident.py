@@ -29,7 +29,7 @@ ALIGNED = 0.999  # smallest cosine between the normals of coincident surfaces
 class Coincidences:
     """Geoms whose surfaces coincide.
 
-    pairs: ids of two geoms; the geom that is defined later comes second
+    pairs: ids of the two geoms of each pair; the geom that is defined later comes second
     lifts: distances by which surfaces are moved outwards [m], by geom; others are not moved
     """
 

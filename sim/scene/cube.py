@@ -41,6 +41,8 @@ def padded(pixels: np.ndarray) -> np.ndarray:
 def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uniform: bool) -> np.ndarray:
     """Return the directions of MuJoCo's cube texture lookups, (n, 3), for points (n, 3) in a geom's frame.
 
+    kind: type of the geom
+    uniform: True if the material has `texuniform`
     size: half sizes (3,) along x, y, z; for a capsule, those of its cylindrical side. On a capsule's caps, the distance
         beyond the end of the side is divided by the radius.
     """

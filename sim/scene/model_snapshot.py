@@ -1,7 +1,4 @@
-"""Snapshot of a model when its renderer is built.
-
-It refuses worlds that differ in ways that the renderer cannot show.
-"""
+"""Snapshot of a renderer's model, which refuses worlds that differ in ways that the renderer cannot show."""
 
 from __future__ import annotations
 

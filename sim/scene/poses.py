@@ -43,7 +43,7 @@ HEADLIGHT = ("active", "diffuse")
 
 @dataclass(frozen=True)
 class Poses:
-    """Positions [m] (world, element, 3) and rotations (world, element, 3, 3), as in mjData after mj_forward.
+    """Positions [m], (world, element, 3), and rotations, (world, element, 3, 3), as in mjData after mj_forward.
 
     geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat: of geoms, sites and cameras
     xpos, xmat: of bodies
@@ -55,8 +55,11 @@ class Poses:
     geom_rgba: (world, geom, 4)
     geom_matid: (world, geom)
     mat_rgba, mat_emission, light_diffuse, light_active: as in mjModel, for each world
-    heights: a checksum of each height field's many heights, (world, hfield)
+    heights: a checksum of the heights of each height field, (world, hfield)
     others: a checksum of each field in OTHERS and in HEADLIGHT, (world, field)
+
+    Raises:
+        ValueError: an array has half precision or less.
     """
 
     geom_xpos: np.ndarray
@@ -123,7 +126,7 @@ class Poses:
         return self.geom_xmat[:, geoms]
 
     def take(self, worlds: np.ndarray) -> Poses:
-        """Return the poses of these worlds only."""
+        """Return the poses of the worlds with these indices."""
         arrays: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         taken: dict[str, Any] = {name: None if array is None else array[worlds] for name, array in arrays.items()}
         return Poses(**taken)

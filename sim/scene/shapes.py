@@ -66,6 +66,7 @@ class Part:
         return as_floats(self.triangles.vertices @ pose[:3, :3].T + pose[:3, 3])
 
     def normals(self, pose: np.ndarray) -> np.ndarray:
+        """Return the vertex normals in the world, flat float32."""
         assert self.triangles is not None
         assert self.triangles.normals is not None
         return as_floats(self.triangles.normals @ pose[:3, :3].T)
@@ -86,6 +87,7 @@ def has_shape(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def is_textured(model: mujoco.MjModel, geom: int) -> bool:
+    """Return whether a texture is visible on a geom."""
     texture = surfaces.texture_id(model, geom)
     return texture >= 0 and surfaces.is_mirrored(model, geom, texture)
 
@@ -97,7 +99,7 @@ def _is_cubic(model: mujoco.MjModel, geom: int) -> bool:
 def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
     """Return the matrix (3, 3) from a shape's Mitsuba texture coordinates to MuJoCo's, including repeats.
 
-    None if the triangles already have MuJoCo's coordinates, or if no texture needs them.
+    Return None if the triangles already have MuJoCo's coordinates, or if no texture needs them.
     """
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if not is_textured(model, geom) or _is_cubic(model, geom):

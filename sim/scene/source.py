@@ -20,7 +20,7 @@ def load(source: Source) -> mujoco.MjModel:
     """Return the model of an MjModel, an MjSpec, a file (MJCF, URDF or MJB), or MJCF text (which starts with "<").
 
     Raises:
-        ValueError: the source does not give a model; one line names it.
+        ValueError: the source does not give a model; the message is one line that names the source and the reason.
     """
     if isinstance(source, mujoco.MjModel):
         return source
@@ -36,7 +36,7 @@ def specification(source: mujoco.MjSpec | str | Path) -> mujoco.MjSpec:
     It is a copy of an MjSpec, or is read from a file (MJCF or URDF) or from MJCF text.
 
     Raises:
-        ValueError: the source does not give a specification; one line names it.
+        ValueError: the source does not give a specification; the message is one line that names the source.
     """
     read, name = _specification(source)
     return _reported(read, name).copy()

@@ -88,10 +88,10 @@ _QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 def box(half_size: np.ndarray) -> Triangles:
     """Return a box around the origin.
 
-    half_size: half the lengths [m] along x, y and z, (3,)
-
     Faces ±x have (u, v) = (y, -z), faces ±y (x, -z), faces ±z (x, -y), each over [0, 1]. Opposite faces show mirror
     images of each other.
+
+    half_size: half the lengths [m] along x, y and z, (3,)
     """
     parts = []
     for axis, (u_axis, v_axis) in enumerate(((1, 2), (0, 2), (0, 1))):
@@ -165,10 +165,9 @@ def capsule(radius: float, half_length: float) -> Triangles:
 def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
     """Return a mesh asset with one vertex per corner of each face.
 
-    This is necessary because normals and texture coordinates have separate indices.
-
-    As in MuJoCo's renderer, a corner of a mesh without texture gets the normal of its face if its own normal deviates
-    from it.
+    Vertices are not shared, because normals and texture coordinates have separate indices. As in MuJoCo's renderer, a
+    corner of a mesh without texture coordinates gets the normal of its face if its own normal deviates from it by more
+    than 37°.
     """
     faces = slice(model.mesh_faceadr[mesh_id], model.mesh_faceadr[mesh_id] + model.mesh_facenum[mesh_id])
     vertices = model.mesh_vert[model.mesh_face[faces].ravel() + model.mesh_vertadr[mesh_id]].astype(float)

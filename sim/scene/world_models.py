@@ -31,15 +31,18 @@ _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 class WorldModels:
     """Models of `n` worlds.
 
-    given: source of the model
+    given: source of the model, see `sim.scene.source.load`; only needed if sizes differ
     model: the compiled model; worlds have copies of it
+    n: number of worlds
+    variation: ranges of the quantities that differ between worlds; None: nothing differs
     models: models of the worlds; a single one for all, unless `own` is True
     own: True if each world has its own model, because a quantity differs between worlds or a task changes the model
         (`separate`). Each episode then starts from the compiled model.
     varied: names of the geoms whose size, colour or material differs, with the materials that may be drawn
 
     Raises:
-        ValueError: the model has no such object, or one that cannot vary.
+        ValueError: `variation` names an object that the model lacks or that cannot vary, or sizes differ and the source
+            is a compiled model.
     """
 
     def __init__(self, given: Any, model: mujoco.MjModel, n: int, variation: Variation | None) -> None:
@@ -138,8 +141,8 @@ class WorldModels:
         model, self._spec = self.model, _specification(given)
         for geom, name in self._sizes.items():
             drawn = self._materials.get(geom, ("", {}))[1].values()
-            looks = [in_material(model, geom, material).model for material in drawn] or [model]
-            if not all(is_resizable(look, geom) for look in looks):
+            variants = [in_material(model, geom, material).model for material in drawn] or [model]
+            if not all(is_resizable(variant, geom) for variant in variants):
                 raise ValueError(
                     f"vary: {name}: must be a sphere, capsule, cylinder, ellipsoid or box without a texture"
                 )

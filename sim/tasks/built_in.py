@@ -75,7 +75,8 @@ class AgentTask(BatchTask):
     """A task in one of the built-in worlds, in which an agent slides over the floor between walls.
 
     world: the compiled world
-    mode: "training", "evaluation" or "test", which selects the weights of the reward
+    mode: "training", "evaluation" or "test", which selects the weights of the reward and the ends of episodes, see
+        `sim.tasks.reward`
     eyes: eyes on the agent's equator, or a dictionary of several kinds of eyes by name; None: no eyes
     fidelity: fidelity of the eyes, or "auto"
     """
@@ -154,7 +155,10 @@ class AgentTask(BatchTask):
         return worlds.state.objects, worlds.state.object_heading
 
     def proprioception(self, worlds: SlidingAgents) -> Mapping[str, np.ndarray]:
-        """Return 1 if the agent touched a wall during the last action, else 0; at the start of an episode, return 0."""
+        """Return the entry "contact", (n, 1): 1 if the agent touched a wall during the last action, else 0.
+
+        At the start of an episode, it is 0.
+        """
         touched = np.zeros(worlds.n, bool) if worlds.motion is None else worlds.motion.contact
         return {"contact": (touched & (worlds.state.steps > 0)).astype(np.float32)[:, None]}
 

@@ -36,7 +36,7 @@ class Frozen:
         not rendered.
 
     Raises:
-        ValueError: an argument has the wrong type.
+        ValueError: `task` is not a sim.Task, or `policy` is neither a function nor an object with `predict`.
     """
 
     task: Task
@@ -58,6 +58,7 @@ class Frozen:
     def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
         """Return the animal's actions in every world.
 
+        observation: the animal's observations in all worlds, by name, as in `sim.make_vec_env`
         shape: shape of the actions, (world, number)
 
         Raises:
@@ -86,7 +87,8 @@ class Encounter:
         eyes. The `name` of a task is the name of its animal.
 
     Raises:
-        ValueError: there are no animals, two animals have the same name, or two tasks have different models.
+        ValueError: there are no animals, two animals have the same name, two tasks have different models or settings
+            of the world, an animal has its own `others`, or an argument is not a sim.Task.
     """
 
     def __init__(self, *animals: Task) -> None:

@@ -21,6 +21,9 @@ class RewardTerms:
     come first, then those of the second agent. Terms are stored in one array (term, row), and, if the rows have
     different terms (`of_rows`), also in a dictionary for each row.
 
+    names: names of the terms
+    terms: values of the terms, (term, row)
+
     Raises:
         ValueError: the number of terms differs from the number of names.
     """
@@ -41,7 +44,7 @@ class RewardTerms:
 
     @property
     def total(self) -> np.ndarray:
-        """Reward of each row."""
+        """Reward of each row, (row,)."""
         if self._rows is not None:
             return np.array([float(sum(row.values())) for row in self._rows])
         return np.asarray(self.terms.sum(axis=0))
@@ -55,13 +58,13 @@ class RewardTerms:
         return list(map(dict, map(zip, repeat(self.names), self.terms.T.tolist())))
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return the values of one term, (row,)."""
+        """Return the values of one term, (row,); ValueError if there is no term of this name."""
         return np.asarray(self.terms[self.names.index(name)])
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one action in all worlds, which a task returns.
+    """The outcome of one action in all worlds, which a task returns. Rows are those of `RewardTerms`.
 
     terms: terms of the reward
     terminated: True if the task ends the episode, (row,) bool

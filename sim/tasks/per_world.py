@@ -43,6 +43,7 @@ class _OfWorld:
 class PerWorld(BatchTask):
     """Batch task for all animals of a `sim.Encounter`, or for the animal of a `sim.Task` and the task's `others`.
 
+    task: the task or the encounter
     learners: tasks of the learning animals
     frozen: animals that do not learn
     animals: tasks of all animals, learners first

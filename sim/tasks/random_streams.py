@@ -47,9 +47,13 @@ class RandomStreams(Protocol):
 class StreamsByPurpose:
     """One generator for each world and purpose. The built-in tasks use this scheme.
 
-    Its seed depends only on the common seed, the index of the world and the purpose.
+    The seed of a generator depends only on the seed of the batch, the index of the world and the purpose. With a tuple
+    of seeds, it depends only on the seed of the world and the purpose.
 
-    motion: random numbers for objects that move at random
+    seed: one seed for all worlds, None, or a tuple with a seed for each world
+    n: number of worlds
+    kinds: number of kinds of eyes of the agent, as the only entry
+    motion: attribute, random numbers for objects that move at random
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
@@ -84,6 +88,7 @@ class StreamsByPurpose:
 class StreamsByWorld:
     """One generator for each world, which draws all random numbers of its episodes. User tasks use this scheme.
 
+    seed, n: see `StreamsByPurpose`
     kinds: number of kinds of eyes of each agent
     """
 

@@ -54,8 +54,9 @@ class TaskSettings:
         world then has a copy. Each world also has a copy of the model if the first `reset` changes `data.model`.
         Otherwise all worlds share one model.
     auxiliary: any of "depth", "ids" and "flow", which an observation then contains for each receptor in addition to its
-        signal. They describe the surface seen at the centre of the receptor: its distance, its geom, and its motion
-        since the last observation; see docs/tasks.md. Evolving eyes have no auxiliary entries.
+        signal. They describe the surface seen at the centre of the receptor: its depth along the eye's axis [m], the id
+        of its geom, and its motion on the retina since the last observation [receptors]; see docs/tasks.md. Evolving
+        eyes have no auxiliary entries.
     camera: name of the camera for images of the task; None: a camera that shows the whole model
     actuators: names of the actuators that an action drives; None: all actuators
     name: name of the animal, if there are several; None: the name of the class
@@ -100,6 +101,9 @@ class TaskSettings:
 
         The default spreads the eyes in a fan around the first of `mounts`, see `sim.fan`. A run with this default
         needs a single mount.
+
+        n_eyes: number of eyes
+        placement_range_deg, elevation_deg: angles that evolve [degrees], see `sim.fan`
         """
         assert not isinstance(self.mounts, Mapping)
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)

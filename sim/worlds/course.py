@@ -29,7 +29,7 @@ _WALL, _FREE, _START, _TRAINING_START = "#.Ss"
 
 @dataclass(frozen=True)
 class Course:
-    """Walls and starting positions, given as a drawing. Each line is a row of cells, with north at the top.
+    """Walls and starting positions, given as a drawing. Each line is a row of cells of 2 m, with north at the top.
 
     drawing: "#": wall; ".": free cell; "S": free cell in which episodes may start; "s": free cell in which episodes may
         start in training only

@@ -23,7 +23,7 @@ def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rngs: Sequence[np.
 
     walls: cells that are walls, boolean (row, column)
     rngs: random number generators. The rows of the grid are divided into one equal part for each generator, which draws
-    the stripes of this part
+        the stripes of this part
     """
     materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
     for i, period in enumerate(STRIPE_PERIODS):
