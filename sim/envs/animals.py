@@ -69,8 +69,8 @@ class Animals:
         actions: one array (world, n_actions) for each learning agent
         """
         simulation = self.simulation
-        everyones = self._everyones(actions)
-        failed = simulation.move(np.concatenate(everyones, axis=1) if len(everyones) > 1 else everyones[0])
+        commanded = self._all_actions(actions)
+        failed = simulation.move(np.concatenate(commanded, axis=1) if len(commanded) > 1 else commanded[0])
         first = 0
         for agent, senses in zip(simulation.agents, self._of_agents, strict=True):
             if senses is not None:
@@ -147,7 +147,7 @@ class Animals:
         poses = self.simulation.poses()
         return [senses.launch(poses, worlds) for senses in self.seeing]
 
-    def _everyones(self, actions: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def _all_actions(self, actions: Sequence[np.ndarray]) -> list[np.ndarray]:
         found = list(actions)
         for agent, (other, senses) in zip(self.simulation.agents[len(actions) :], self._frozen, strict=True):
             shape = self.simulation.n, agent.n_actions

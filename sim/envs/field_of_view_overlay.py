@@ -111,6 +111,7 @@ class FieldsOfView:
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """Return the image (y, x, 3) uint8 with the visible part of every eye's field of view drawn into it.
 
+        nearness: function that returns 1 / depth of the surfaces in the image, see `Nearness`
         data: MuJoCo's data with the current poses
         """
         shown = picture.reshape(-1, 3).copy()

@@ -71,8 +71,8 @@ def require_frames(simulation: Simulation, frames: int) -> None:
     """Set the number of frames per action of the simulation's physics.
 
     Raises:
-        ValueError: it is not a divisor of the number of physics steps, differs from that of other eyes, or exceeds 1
-            for a physics without frames.
+        ValueError: the number is not a divisor of the number of physics steps per action, differs from that of other
+            eyes, or exceeds 1 for a physics that has no poses within an action.
     """
     physics = simulation.physics
     if not hasattr(physics, "passed"):

@@ -15,6 +15,9 @@ class Memory:
 
     In a world that starts a new episode, the first frame fills the whole memory, as if the agent had seen the same
     frame before. A memory that started with zeros would look as if the agent had come out of darkness.
+
+    Raises:
+        ValueError: `frames` is below 1.
     """
 
     def __init__(self, frames: int) -> None:
@@ -24,10 +27,11 @@ class Memory:
         self._past: list[np.ndarray] = []
 
     def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        """Add a frame (env, ...); `fresh`: indices of the worlds whose episode has just started.
+        """Add a frame (env, ...), and return the memory (env, memory, ...), which the caller may modify.
 
-        Returns an array (env, memory, ...), which the caller may modify. `frame` itself must not be modified
-        afterwards.
+        The caller must not modify `frame` afterwards.
+
+        fresh: indices of the worlds whose episode has just started
         """
         if self.frames == 1:
             self._past = [frame.copy()]

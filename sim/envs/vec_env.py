@@ -93,7 +93,7 @@ class EyesVecEnv(OneEnvironment):
         return self._learners[0].renderer
 
     def reset(self) -> Arrays:
-        """Start all episodes; return their first observations.
+        """Start an episode in every world; return the first observations.
 
         Raises:
             RuntimeError: the environment is closed, or an action is pending after `step_async`.
@@ -154,7 +154,7 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations), step.reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[Arrays, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Take the actions of `step_async`.
+        """Take the actions of `step_async`; return the observations, rewards, ends of episodes and infos of all rows.
 
         Raises:
             RuntimeError: no action is pending after `step_async`, or the environment is closed.
@@ -181,7 +181,7 @@ class EyesVecEnv(OneEnvironment):
         The state does not contain such values.
 
         Raises:
-            RuntimeError: the worlds are not reset or are closed, or the model enables MuJoCo's sleeping bodies.
+            RuntimeError: there has been no reset, `close` has been called, or the model enables MuJoCo's flag "sleep".
         """
         self._calls.require_begun()
         return self.animals.get_state()
@@ -191,7 +191,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
-            RuntimeError: the worlds are not reset or are closed, or the model enables MuJoCo's sleeping bodies.
+            RuntimeError: there has been no reset, `close` has been called, or the model enables MuJoCo's flag "sleep".
         """
         held_state.checked(state, self.get_state())
         chosen = held_state.chosen_worlds(worlds, len(self._everyone))

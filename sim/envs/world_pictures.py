@@ -87,12 +87,12 @@ class _ModelCameras:
         """
         bodies = physics.bodies
         model = bodies.models[world]
-        looks = model.geom_size.tobytes() + model.geom_rgba.tobytes() + model.geom_matid.tobytes()
+        appearance = model.geom_size.tobytes() + model.geom_rgba.tobytes() + model.geom_matid.tobytes()
         place = world if bodies.varied else 0
         known, camera = self._cameras.get(place, (b"", None))
-        if camera is None or looks != known:
+        if camera is None or appearance != known:
             camera = QuickCamera(model, self._animals.learners[0].renderer.spectra)
-            self._cameras[place] = looks, camera
+            self._cameras[place] = appearance, camera
         return camera
 
     def _picture(self, camera: QuickCamera, data: mujoco.MjData) -> np.ndarray:

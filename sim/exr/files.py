@@ -55,6 +55,7 @@ class ExrError(ValueError):
 def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect: float = 1.0) -> None:
     """Write views to an OpenEXR file, completely or not at all; an existing file is replaced.
 
+    views: views with different names, one or more
     pixel_aspect: width of a pixel divided by its height, with which viewers display the file
 
     Raises:

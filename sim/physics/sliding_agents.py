@@ -26,10 +26,19 @@ UNSTABLE = "unstable physics"
 class SlidingAgents:
     """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
 
+    `sim.Physics` describes the methods that are not described here.
+
     world: layout, model and starting positions
-    before, state: all worlds before and after the last action
-    motion: motion of the agents during that action
-    chance: random streams of the worlds
+    n: number of worlds
+    threads: number of threads that may step them
+    variation: ranges of quantities that differ between episodes; None: there are none
+    before, state: attributes, all worlds before and after the last action
+    motion: attribute, motion of the agents during that action; None before the first
+    chance: attribute, random streams of the worlds
+
+    Raises:
+        ValueError: the model lacks a part of the agent, an object could collide, or `variation` names an object that
+            the model lacks or that cannot vary.
     """
 
     def __init__(self, world: World, n: int, threads: int = 1, variation: Variation | None = None) -> None:

@@ -21,7 +21,7 @@ def with_eyes(
     """Return an image (y, x, 3) uint8 of a model with marks of its eyes.
 
     eyes: pupils [m] (eye, 3) and frames (eye, 3, 3), columns (right, up, ahead)
-    fov_deg: horizontal field of view of the eyes
+    fov_deg: horizontal field of view of the eyes [degrees]
     reach: length of the borders that are drawn [m]
     """
     shown, half = picture.astype(np.float64), np.radians(fov_deg) / 2

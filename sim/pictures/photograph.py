@@ -97,7 +97,7 @@ def see_photograph(
     photograph: sRGB values in [0, 1], (y, x, 3), of a camera that maps straight lines to straight lines.
     animal: one of "blowfly", "dragonfly", "fruit_fly", "honeybee", "megalopta", "eagle", "goldfish", "human",
         "jumping_spider" and "mouse".
-    width_deg: angular width of the photograph, in [0.1, 120].
+    width_deg: angular width of the photograph [degrees], in [0.1, 120].
     uv: fraction of ultraviolet light, in [0, 1], that a white surface reflects. A photograph does not contain it. Below
         400 nm, the reflectances of `srgb_basis` are multiplied by it.
     depth: distance [m] of the scene along the axis, a number or one for each pixel (y, x). Eyes are focused at
@@ -108,7 +108,7 @@ def see_photograph(
     Raises:
         ValueError: an argument is outside its range, the image or `depth` has the wrong shape, the field has more than
             40,000 ommatidia, or `depth` is given for a compound eye.
-        AccuracyError: the depth varies too much for the kernels of one image; see `optics.Eye.see`.
+        optics.AccuracyError: the depth varies too much for the kernels of one image; see `optics.Eye.see`.
     """
     one_of("animal", animal, ANIMALS)
     width = in_range("width_deg", width_deg, 0.1, 120.0)
