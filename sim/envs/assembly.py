@@ -151,7 +151,8 @@ def make_parallel_env(
     Raises:
         ValueError: an argument is invalid.
         ImportError: PettingZoo is not installed.
-        optics.AccuracyError, RuntimeError: see `make_vec_env`.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        RuntimeError: a method of a user task fails at the start of a first episode.
     """
     if not isinstance(encounter, Encounter):
         raise ValueError(

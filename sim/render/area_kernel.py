@@ -106,13 +106,13 @@ class AreaKernel(RayKernel):
         width, height = (dr.gather(mi.Float, inputs.extent, i) for i in range(2))
         area = Area.from_extent(seen.ray, seen.axis.xy, (width, height))
         borders = inputs.borders
-        met = (
+        faces = (
             self._areas.border_faces(area, inputs.tables)
             if borders is None
             else self._shared_border_faces(frame, inputs, borders, lane)
         )
         bodies = self._areas.bodies(frame.things, lane.world, seen.body)
-        return self._areas.radiance(area, met, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
+        return self._areas.radiance(area, faces, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
         """Return the fractions of the lights that reach each point on the bodies of each world, flat (world, point)."""

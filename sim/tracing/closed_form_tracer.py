@@ -39,8 +39,10 @@ ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's colum
 class _Hit:
     """First hits of rays.
 
+    t: distance to the hit [m]; infinite without a hit
+    point, normal: hit point, and normal of the surface
     is_lit: True if a ray hits the front of a surface
-    reflectance: one array per component
+    reflectance: reflectance at the hit, one array per component
     """
 
     t: Array
@@ -87,9 +89,9 @@ class ClosedForm:
     sphere_textures: maps to the texels, and the texels' places
 
     Raises:
-        NoClosedForm: walls that lie on no grid. If light is reflected more than once, also: walls of several heights,
-            walls lower than a body, bodies that may change their height, and a texture on the body that carries the
-            eyes.
+        NoClosedForm: there are many walls, and they lie on no grid. If light is reflected more than once, also: walls
+            have several heights or are lower than a body, a body may change its height, or the body that carries the
+            eyes has a texture.
     """
 
     name = "closed_form"

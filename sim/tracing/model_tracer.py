@@ -126,7 +126,7 @@ class ModelTracer:
     """A tracer of rays through any model. Surfaces are Lambertian; lamps are sampled once per ray and reflection.
 
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: level of light, "direct" or "bounce"
+    light: level of light, "direct" or "bounce"; ValueError for "all"
     basis: (component, band): contribution of each component to each band; each component is one band
     """
 

@@ -37,7 +37,7 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray.
 
-    t, which: distance [m] (infinite without a hit), and number of the mover
+    t, which: distance [m], and number of the mover; without a hit, the largest distance, and the number of movers
     normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
     """
 
@@ -181,7 +181,7 @@ class Movers:
         return sizes, reach
 
     def nearest(self, ray: Array, farthest: Array, there: MoverRows) -> Hit:
-        """Return the first hit of a ray that is nearer than `farthest`."""
+        """Return the first hit of a ray at a distance less than `farthest` [m], see `Hit`."""
         none = farthest, mi.UInt32(len(self)), mi.Vector3f(0, 0, 1), mi.Point2f(0)
         if not len(self):
             return Hit(*none)
@@ -195,7 +195,7 @@ class Movers:
         return Hit(*found)
 
     def block(self, ray: Array, farthest: Array, there: MoverRows) -> Array:
-        """Return whether any mover blocks a ray at a distance less than `farthest`."""
+        """Return whether any mover blocks a ray at a distance less than `farthest` [m]."""
         if self.apart:
             computed(ray, farthest, there.fours, there.first)
             blocked = self._block(ray, farthest, there)

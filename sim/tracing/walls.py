@@ -57,9 +57,9 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
     eyes: heights of the pupils [m]
 
     Raises:
-        NoClosedForm: a geom that is neither a box nor a plane, not exactly one plane, or a plane that is tilted or
-            turned. Boxes must be aligned with the axes, stand on the floor, lie within it and end above the eyes. They
-            must not have a cube texture. Eyes must be above the floor.
+        NoClosedForm: a geom is neither a box nor a plane; there is not exactly one plane, or it is tilted or turned; or
+            the eyes are not above it. Other causes are that a box is not aligned with the axes, does not stand on the
+            floor, extends beyond it, ends below the eyes or has a cube texture.
     """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -91,16 +91,16 @@ class AreaTracer:
     def radiance(
         self,
         area: Area,
-        met: tuple[Array, Array],
+        faces: tuple[Array, Array],
         now: FrameState,
         depth: DepthLayers = ONE_PSF,
     ) -> list[Array]:
         """Return the mean radiance in each area, one array per component, for each depth layer.
 
-        met: faces at the area's left and right border, see `first_faces` and `border_faces`
+        faces: numbers of the walls' faces at the area's left and right border, see `border_faces`
         """
         nothing = [0.0] * (depth.count * len(self.basis))
-        pieces = self._columns.pieces(area, met, now.inputs.face_ends)
+        pieces = self._columns.pieces(area, faces, now.inputs.face_ends)
         seen = [
             only_where(piece.wall_share > 0, partial(self._wall, area, piece, now, depth), nothing) for piece in pieces
         ]

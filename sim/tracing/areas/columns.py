@@ -103,13 +103,13 @@ class Columns:
         self._rim = SIDES * len(walls)
         self.face_ends = floats(_face_ends(walls))
 
-    def pieces(self, area: Area, met: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
+    def pieces(self, area: Area, faces: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
         """Return the left and the right piece. If one wall fills all columns, the right piece is empty.
 
-        met: faces at the area's left and right border, see `first_faces`
+        faces: numbers of the faces at the area's left and right border, see `first_faces`
         """
         half = mi.Float(0.5)
-        left, right = (self._face(index, face_ends) for index in met)
+        left, right = (self._face(index, face_ends) for index in faces)
         edge = dr.select(left.index == right.index, half, self._edge(area, left, right))
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 

@@ -32,6 +32,8 @@ LANES = 2**21  # rays traced at once
 class Baking:
     """Computation of the tables of one world.
 
+    tracer: tracer of rays through the world
+    nodes: points of floor and walls at which the light is computed
     kinds: radius and height of the centre [m] of each kind of body
     """
 

@@ -148,7 +148,7 @@ class Stripes:
 def _least_side(largest: float) -> float:
     """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most ROUNDING.
 
-    It is at most one texel, because textures are linear between texels. A mean is a sum of four values of the second
+    It is at least one texel, because textures are linear between texels. A mean is a sum of four values of the second
     integral, divided by the product of the sides. Each value is rounded twice: in the table, and after the polynomial
     within a texel is added.
 
