@@ -42,7 +42,7 @@ class CallOrder:
         """Refuse a call before the first reset, after `close`, or while an action is pending.
 
         Raises:
-            RuntimeError: the call came too early or too late.
+            RuntimeError: there has been no reset yet, the environment is closed, or `step_wait` must come first.
         """
         self.require_open()
         if not self._begun:

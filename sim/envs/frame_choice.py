@@ -144,7 +144,7 @@ def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.nda
 
 
 def _responses(dynamics: ReceptorDynamics, signals: np.ndarray, frames: int, seconds: float) -> np.ndarray:
-    """Return the responses at the end of each action if `frames` evenly spaced frames of it are rendered.
+    """Return the responses at the end of each action if `frames` evenly spaced frames are rendered per action.
 
     signals: signals in all frames, (action, frame, world, ...)
     seconds: duration of an action [s]

@@ -64,9 +64,11 @@ def _numbers(eye: CompoundEye) -> np.ndarray:
 
 
 def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.ndarray) -> np.ndarray:
-    """Return each pixel's distance from the border between the two nearest ommatidia, relative to half their distance.
+    """Return the distance of each pixel from the border between the directions of the two nearest ommatidia.
 
-    The distance is 1 at the direction of the nearest ommatidium, and 0 on the border.
+    The unit is half of the distance between these two directions.
+
+    The result is 1 at the direction of the nearest ommatidium, and 0 on the border.
     """
     if len(directions) == 1:
         return np.ones(number.shape)

@@ -26,7 +26,7 @@ from sim.tasks.simulation import LEAST_RETURN, Simulation
 class EyesVecEnv(OneEnvironment):
     """Many worlds of one task.
 
-    In a `sim.Encounter`, all animals must be alike and learn a single policy. The rows of the first animal in all
+    In a `sim.Encounter`, all animals learn one policy, and have the same spaces. The rows of the first animal in all
     worlds come first, followed by the rows of the second animal. Observations, rewards, endings and `info` are
     documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
     observation is then the first observation of the new episode, and info["terminal_observation"] is the last

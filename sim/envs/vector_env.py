@@ -35,7 +35,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     Raises:
         ValueError: an argument is invalid, or is `seed` or `n_envs`.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
-        RuntimeError: a method of a user task fails at the start of a first episode.
+        RuntimeError: a method of a user task fails at the start of the first episode.
     """
 
     metadata = {  # noqa: RUF012 (Gymnasium's own declaration)

@@ -26,5 +26,5 @@ def allowed_error(eye: WorldEye, tolerance: float | None) -> float:
     if tolerance is None:
         return max(SHARE_OF_NOISE * float(eye.noise_sigma), LEAST_TOLERANCE * float(eye.throughput))
     if not 0 < tolerance < math.inf:
-        raise ValueError(f"tolerance = {tolerance!r}: must be positive")
+        raise ValueError(f"tolerance = {tolerance!r}: must be positive and finite")
     return tolerance

@@ -38,9 +38,9 @@ class CompoundEye:
     ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. Ommatidia that are
         the same object share an acceptance function, so zones with equal ommatidia are prepared faster.
     receptors: receptor types, see `optics.Eye`. Mosaics are not supported here; use `types`.
-    types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). One column gives one
-        receptor for each ommatidium, a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7 and R8
-        have different pigments in pale and yellow ommatidia. None: every ommatidium has receptors of all types.
+    types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). With one column, each
+        ommatidium has a single receptor, as in a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7
+        and R8 have different pigments in pale and yellow ommatidia. None: every ommatidium has receptors of all types.
     bands: number of spectral bands, 1 to 64
     noise_sigma: standard deviation of a receptor's Gaussian noise, in the unit of signals, 0 to 1e6
     photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised. A
@@ -51,8 +51,8 @@ class CompoundEye:
         None: all facets are at the mount, and may overlap
 
     Raises:
-        ValueError: an argument is invalid, the number of ommatidia is not in 1 to 1,000,000 or no multiple of `rows`,
-            two directions are equal, or facets overlap.
+        ValueError: an argument is invalid, there are no ommatidia or more than 1,000,000, their number is no multiple
+            of `rows`, two directions are equal, or facets overlap.
     """
 
     directions: Any

@@ -57,10 +57,10 @@ class Eyes:
         receptors. None: receptors are square.
     dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: receptors
         without memory
-    density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: all receptors are
-        alike
+    density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: all receptors have
+        the same size
     ommatidium: an optics.Ommatidium: the eyes are compound eyes. `resolution` is then the number of rows and of
-        ommatidia in a row of `sim.hexagonal_rows`, and fov_deg / width the angle between neighbours. Compound eyes
+        ommatidia in a row of `sim.hexagonal_rows`; fov_deg / width is the angle between neighbours. Compound eyes
         have neither optics, waveguide, vertical_fov_deg, dynamics nor density, and ignore sensor_width. None: the eyes
         are camera eyes.
     acute_zone: density of ommatidia in the middle of a compound eye, relative to the mean, see `sim.hexagonal_rows`
@@ -222,7 +222,7 @@ class Eyes:
     def column_azimuths(self) -> np.ndarray:
         """Return the azimuth of each column of receptors relative to the eye's axis [rad], (width,), left is positive.
 
-        A `density` is ignored. In a compound eye, rows are shifted to either side by a quarter of this spacing.
+        A `density` is ignored. In a compound eye, rows are shifted to either side by a quarter of the columns' spacing.
         """
         columns = self.resolution[1]
         if self.ommatidium is not None:

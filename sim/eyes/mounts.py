@@ -32,11 +32,11 @@ class Mount:
     on: name of a site, a camera or a body of the model
     azimuth_deg: rotation to the left, about the z axis of the object's frame (for a camera: about its upward axis)
     elevation_deg: rotation upwards, applied after the azimuth
-    roll_deg: rotation about the eye's optical axis, which turns its top towards its left; applied last
+    roll_deg: rotation about the optical axis, which turns the eye's top to the left; applied last
     offset: offset of the pupil from the origin of the object's frame [m], (ahead, left, up). The angles do not rotate
         the offset.
-    kind: "site", "camera" or "body", for use if objects of several kinds have the same name; None: the first of these
-        kinds with an object of this name
+    kind: "site", "camera" or "body", to distinguish objects of different kinds with the same name; None: the first of
+        these kinds with an object of this name
 
     Raises:
         ValueError: `on` is not a nonempty string, an angle or offset is not finite, or the kind is unknown.
@@ -123,7 +123,7 @@ def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
 
 
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
-    """Return mounts in a circle around a body's z axis, from left to right; they look outwards.
+    """Return mounts in a circle around the z axis of an object, from left to right. The eyes look outwards.
 
     `Eyes` uses the same arrangement on the built-in agent.
 

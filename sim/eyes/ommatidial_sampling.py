@@ -61,7 +61,7 @@ class OmmatidialSampling:
         )
 
     def _origins(self, frames: np.ndarray, rays: int) -> np.ndarray | None:
-        """Return the starting points of the rays in the eye's frame [m], (ray, 3); None if they all start at 0."""
+        """Return the starting points of the rays in the eye's frame [m], (ray, 3); None if all start at the origin."""
         if self.eye.radius is None:
             return None
         found: np.ndarray = np.repeat(frames[:, :, 2] * np.float32(self.eye.radius), rays, axis=0)

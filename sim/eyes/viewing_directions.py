@@ -24,8 +24,8 @@ def unit_directions(name: str, given: Any) -> np.ndarray:
     given: unit vectors (ahead, left, up), (n, 3), or angles [degrees] (azimuth to the left, elevation upwards), (n, 2)
 
     Raises:
-        ValueError: the shape is wrong, the number of directions is not in 1 to MOST_OMMATIDIA, or a value is not
-            finite. Elevations must be within ±90 degrees, and the length of a vector must be 1 to within OFF_UNIT.
+        ValueError: the shape is wrong, there are no directions or more than MOST_OMMATIDIA, or a value is not finite.
+            Elevations must be within ±90 degrees, and the length of a vector must be 1 to within OFF_UNIT.
     """
     if is_sized(given) and len(given) > MOST_OMMATIDIA:
         raise ValueError(f"{name}: {len(given)} ommatidia: must be at most {MOST_OMMATIDIA}")
@@ -78,8 +78,8 @@ def hexagonal_patch(
 ) -> np.ndarray:
     """Return viewing directions in hexagonal rings around a direction, unit vectors (n, 3) of (ahead, left, up).
 
-    15 rings have 721 ommatidia, like an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere by Lambert's
-    equal-area projection, so every ommatidium has the same solid angle.
+    15 rings have 721 ommatidia, about as many as an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere
+    by Lambert's equal-area projection, so every ommatidium has the same solid angle.
 
     rings: number of rings around the central ommatidium, 0 to 60
     interommatidial_deg: angle between neighbours at the centre [degrees]

@@ -32,7 +32,7 @@ class Motion:
     """Motion of the agents during one action.
 
     path: positions at the end of each substep [m], (n, substep, 2)
-    velocity: velocity at the last substep [m/s], (n, 2)
+    velocity: velocity after the last substep [m/s], (n, 2)
     contact: True if the agent touched something in any substep, (n,) bool
     unstable: True if the simulation broke down, (n,) bool; the agent then stays in place with velocity 0
     """

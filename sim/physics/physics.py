@@ -68,7 +68,7 @@ class Physics(Protocol):
         """
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:
-        """Advance all worlds except the skipped ones by one action; return the reason for each world that failed."""
+        """Advance all worlds except the skipped ones by one action; return the reason of each failure, by world."""
 
     def poses(self) -> Poses:
         """Return the current poses."""

@@ -115,7 +115,7 @@ class SlidingAgents:
         self._moved = objects, courses
 
     def put_objects(self, objects: np.ndarray) -> None:
-        """Move objects to new positions after an action, (n, k, 3) [m]."""
+        """Move objects to these positions after an action, (n, k, 3) [m]."""
         self._state = replace(self.state, objects=objects)
 
     def count(self, goals: np.ndarray, adversaries: np.ndarray) -> None:

@@ -53,8 +53,8 @@ class RayLight:
     """Light along rays, and the planes that they hit.
 
     linear: sRGB, not clipped, (3, ray)
-    plane: tangent plane at the hit point, as coefficients of its inverse depth: 1 / depth [1/m] = plane @ (across,
-        above, 1) for all rays of the image (`plane_coordinates`); 0 without a hit, (3, ray)
+    plane: coefficients of the tangent plane at each hit point, (3, ray); 0 without a hit. Any ray of the image meets
+        this plane at 1 / depth = plane @ (across, above, 1) [1/m], see `plane_coordinates`.
     """
 
     linear: np.ndarray

@@ -89,8 +89,9 @@ def see_photograph(
 ) -> ReceptorMosaic:
     """Return the signals of an animal's receptors for a photograph, which covers a part of its visual field.
 
-    Each colour becomes one of the many reflectances with this colour (`optics.spectra.spectrum.srgb_basis`), in
-    daylight. The light passes the optics of the animal's eye (`optics.animals`) and excites its receptors. A white
+    Each colour is converted to one of the many reflectances that have this colour
+    (`optics.spectra.spectrum.srgb_basis`). Daylight illuminates these reflectances. The reflected light passes the
+    optics of the animal's eye (`optics.animals`) and excites its receptors. A white
     surface gives a signal of 1. Receptors that are finer than the photograph are replaced by one for each pixel, at
     most 40,000 in all.
 
@@ -98,10 +99,10 @@ def see_photograph(
     animal: one of "blowfly", "dragonfly", "fruit_fly", "honeybee", "megalopta", "eagle", "goldfish", "human",
         "jumping_spider" and "mouse".
     width_deg: angular width of the photograph [degrees], in [0.1, 120].
-    uv: fraction of ultraviolet light, in [0, 1], that a white surface reflects. A photograph does not contain it. Below
-        400 nm, the reflectances of `srgb_basis` are multiplied by it.
-    depth: distance [m] of the scene along the axis, a number or one for each pixel (y, x). Eyes are focused at
-        infinity, so near surfaces are blurred, and they hide parts of far ones (`optics.Eye.see`). None: infinity.
+    uv: fraction of ultraviolet light, in [0, 1], that a white surface reflects. A photograph does not contain this
+        information. Below 400 nm, the reflectances of `srgb_basis` are multiplied by `uv`.
+    depth: distance [m] of the scene along the axis, a single number or an array (y, x). Eyes are focused at infinity,
+        so near surfaces are blurred, and they hide parts of far ones (`optics.Eye.see`). None: infinity.
         Compound eyes accept None only, because their small facets are in focus at all distances.
     progress: function that is called with the completed fraction. None: no calls.
 

@@ -185,7 +185,7 @@ class EyeRenderer:
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
         """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32.
 
-        A white surface has the radiance 1/π times its irradiance, in the unit of the lights' irradiance.
+        The unit is that of `sim.mirror`: white that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
         """
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())

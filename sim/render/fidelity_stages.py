@@ -101,7 +101,6 @@ def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Leve
 
     In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
     further reflection to the one before is assumed to be the ratio of the second reflection to direct light. If the
-    tracer cannot follow a second reflection, the result is direct light with an unknown error. If the
     tracer cannot follow a second reflection, the result is direct light with an unknown error.
     """
     try:

@@ -242,7 +242,7 @@ class FidelityTrials:
             return [np.array(c) for c in components]
 
     def _lit(self, tracer: AreaTracer, bodies: list[np.ndarray]) -> list[Array]:
-        """Return the tracer's table of illuminated bodies, for their centres (view, 3)."""
+        """Return the tracer's table of illuminated bodies, for bodies with these centres, (view, 3) each."""
         if not tracer.places:
             return []
         place = dr.arange(mi.UInt32, tracer.places * len(bodies[0])) % tracer.places

@@ -63,7 +63,7 @@ class Labels:
         return self._at_centres(self._distances, self._scenes, poses)
 
     def ids(self, poses: Placed) -> np.ndarray:
-        """Return the geom that each receptor's centre sees, (env, eye, height, width) int32; -1 without a hit."""
+        """Return the id of the geom at each receptor's centre, (env, eye, height, width) int32; -1 without a hit."""
         scene = self.scene.scene
         apart, geoms = scene.one_shape_per_geom
         found = self._at_centres(self._hits, Scenes(apart, self._scenes.meshes), poses).astype(int)

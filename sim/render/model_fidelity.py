@@ -73,7 +73,7 @@ def choose_model_fidelity(
     If there is none, a FidelityWarning states by how much the tolerance is exceeded. Bands are the eye's own.
 
     model, eye, mounts: see `ModelRenderer`
-    poses: poses that are typical of later use, one set per moment
+    poses: poses at several moments that are typical of later use, as a list of MjData or as `sim.Poses`
     tolerance: allowed error of a signal (root mean square), over receptors whose field is not uniform; None: half of
         the eye's `noise_sigma`, but at least 0.005 times the signal of a white surface
     groups, spectra, varied, medium: see `ModelRenderer`

@@ -46,8 +46,8 @@ class ModelRenderer(EyeRenderer):
     brightest: attribute, the signal of a white surface that faces all directional lights at once, or of veiling light
         if it is larger
 
-    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Others name lamps with spectral
-    lines for which the eye has too few bands.
+    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
+    with spectral lines for which the eye has too few bands.
 
     Raises:
         ValueError: an argument is invalid, the model lacks the part on which an eye is mounted, an eye has an

@@ -151,7 +151,7 @@ class PreparedScene:
         tolerance: allowed error of a signal, see `sim.eyes.allowed_error`
 
         Raises:
-            optics.AccuracyError: the light of a pupil spreads too far to be computed.
+            optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         """
         if depth not in self._samplings:
             self._samplings[depth] = eye_sampling(self.eye, depth)

@@ -55,7 +55,7 @@ class RandomViews:
         return self.agents + self._turned(eye_positions(azimuths)[self.eye]), self._turned(in_agent)
 
     def _turned(self, vectors: np.ndarray) -> np.ndarray:
-        """Return vectors (n, ..., 3) of the agents' frames in the world's frame, which is turned about z."""
+        """Rotate vectors (n, ..., 3) about z, from the agents' frames to the world's frame."""
         heading = self.heading.reshape(-1, *[1] * (vectors.ndim - 2))
         cos, sin, (x, y) = np.cos(heading), np.sin(heading), (vectors[..., 0], vectors[..., 1])
         turned: np.ndarray = vectors.copy()

@@ -85,8 +85,8 @@ class Moving:
 class RayKernel:
     """A kernel that traces rays. Its body is recorded once, so only arrays that are passed to it may change.
 
-    tracer: intersects rays
-    eyes: generate rays
+    tracer: tracer that intersects the rays and computes their light
+    eyes: eyes at which the rays start
     n_envs, n_eyes: numbers of worlds, and of eyes in each world
     depth: layers among which light is divided
     """

@@ -20,10 +20,8 @@ class ReceptorsInTime:
 
     dynamics: their temporal properties
     n: number of worlds
-    n: number of worlds
     shape: shape of one world's signals, (eye, channel, height, width)
     seconds: duration of a frame [s]
-    state: attribute, the state of all filters, (world, filter, *shape) float32
     state: attribute, the state of all filters, (world, filter, *shape) float32
 
     Raises:

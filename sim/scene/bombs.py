@@ -81,7 +81,7 @@ def require_finite(model: mujoco.MjModel, name: str) -> None:
     """Refuse a model with a position, size or colour that is not finite.
 
     Raises:
-        ValueError: an element is refused; the message names it.
+        ValueError: a value is not finite; the message names its element.
     """
     for key in PLACES:
         wrong = ~np.isfinite(getattr(model, key)).all(axis=1)

@@ -65,8 +65,8 @@ def counted(n: int) -> Array:
     """Return 0 ... n - 1 in separate memory, which sets the width of a frozen kernel that reads it lane by lane.
 
     If a kernel reads only tables, Dr.Jit 1.5 derives the kernel's width from one of them. Which table it uses depends
-    on the state of the process. In one case it replayed 126 of 128 lanes, and left the last receptors dark without a
-    message. tests/test_parameters.py repeats each training run and detects this error.
+    on the state of the process. In one case, Dr.Jit replayed 126 of 128 lanes, and left the last receptors dark without
+    a message. tests/test_parameters.py repeats each training run and detects this error.
     """
     found = dr.arange(mi.UInt32, n)
     dr.eval(found)

@@ -56,7 +56,7 @@ def mirror(
 
     Raises:
         ValueError: the model does not compile or has no visible geoms, a body is unknown, `sync` would refuse the data,
-            the variant has no spectra, or `spectra` has an unknown name or one of a material with a coloured texture.
+            the variant has no spectra, or `spectra` names an unknown material or one with a coloured texture.
     """
     return Mirror(
         source.load(model), data, bodies=bodies, groups=groups, variant=variant or default_variant(), spectra=spectra
@@ -188,7 +188,7 @@ class Mirror:
         return self._first_hits(camera, width, height)[0]
 
     def render_depth(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
-        """Return the depth along the camera's axis [m] at each pixel's centre, (y, x) float32, infinite for none."""
+        """Return the depth along the camera's axis [m] at each pixel's centre, (y, x) float32; infinite for no geom."""
         return self._first_hits(camera, width, height)[1]
 
     def _first_hits(self, camera: str | int | Viewpoint, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:

@@ -75,7 +75,7 @@ class ModelSnapshot:
         """Refuse worlds that differ from the model in a way that the renderer cannot show.
 
         Raises:
-            ValueError: there is such a difference.
+            ValueError: a world differs in such a way; the message names the element.
         """
         self._refuse_other_materials(poses)
         for what, name in (("size", "geom_size"), ("colour", "geom_rgba"), ("material", "geom_matid")):

@@ -32,7 +32,7 @@ _ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF, _TYPES.mjGEOM_HFIELD)
 
 
 # Half side of an infinite plane in units of the model's extent. An eye one extent above the plane sees its edge 1e-4
-# rad below the horizon, and float32 is accurate to 1e-3 of an extent for texture and shadows on it. (Hits on triangles
+# rad below the horizon, and float32 is accurate to 1e-3 of an extent for texture and shadows there. (Hits on triangles
 # of this size would be wrong; see also LONG.)
 INFINITY = 1e4
 # Largest ratio of a plane's sides for which it is a single rectangle. Embree's hit points on a rectangle have an error

@@ -23,9 +23,9 @@ _ROLES = mujoco.mjtTextureRole
 
 
 def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
-    """Return a geom's kind as an enum.
+    """Return a geom's kind as a member of the enum.
 
-    A comparison of NumPy's integer with the enum's members would work in one direction only.
+    NumPy's integer is converted, because comparing it with the enum's members works in one order only.
     """
     return mujoco.mjtGeom(int(model.geom_type[geom]))
 

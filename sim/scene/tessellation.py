@@ -149,8 +149,8 @@ def cylinder(radius: float, half_length: float) -> Triangles:
 def capsule(radius: float, half_length: float) -> Triangles:
     """Return a capsule.
 
-    Its side is as in a cylinder. Each cap has its own v = 0 ... 1: from the pole to the side at the top, and from the
-    side to the pole at the bottom.
+    Its side has the texture coordinates of a cylinder's side. On each cap, v runs from 0 to 1: from the pole to the
+    side at the top, and from the side to the pole at the bottom.
     """
     side = _revolved(
         np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])

@@ -136,7 +136,7 @@ class Variation:
         """Return the factors of `light` at all combinations of the ends of its ranges, (case, band).
 
         They include the largest factor over all bands. In a single band, values inside the ranges may give a larger
-        factor, by a third for ranges from warm to cold light.
+        factor, which is up to a third larger for ranges from warm to cold light.
         """
         names = self.of_light
         ends = [self.ranges[name] for name in names]

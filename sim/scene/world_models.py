@@ -109,7 +109,7 @@ class WorldModels:
         """Set a world's sizes, colours and materials, and reset all other fields of its model to the compiled values.
 
         Raises:
-            ValueError: a material is not one of the geom's.
+            ValueError: a drawn material is not one of the materials that may be drawn for the geom.
         """
         mine = self.models[world]
         if self.own and self.get_state(world) != self._compiled:

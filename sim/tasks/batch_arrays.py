@@ -57,7 +57,7 @@ def mapping(where: str, returned: Any) -> Mapping[str, Any]:
 
 
 def not_finite(where: str, terms: Mapping[str, np.ndarray]) -> dict[int, str]:
-    """Return an error message for each world in which a term is not finite, by world."""
+    """Return the error messages of all worlds in which a term is not finite, by world."""
     found: dict[int, str] = {}
     for name, term in terms.items():
         for world in np.flatnonzero(~np.isfinite(term)).tolist():

@@ -50,10 +50,11 @@ class Agent:
 class BatchTask(TaskSettings):
     """A task whose methods receive all worlds at once.
 
-    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task` and those listed below.
-    Arrays have one row for each world. The argument `worlds` of the methods is the object that `physics` returns. The
-    default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`, `worlds.xpos` ...) over worlds.
-    The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a task follows this description.
+    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task`, except for `others`,
+    and those listed below. Arrays have one row for each world. The argument `worlds` of the methods is the object that
+    `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`,
+    `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a
+    task follows this description.
 
     renders_early: if True, rendering may begin before an action is judged, which is faster. In this case, `rewards`,
         `terminated`, `succeeded` and `proprioception` must not move bodies in a world, unless `judge` returns an

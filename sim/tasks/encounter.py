@@ -138,7 +138,7 @@ def split_agents(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen
     """Return the tasks of the learning animals, and the animals that do not learn.
 
     Raises:
-        ValueError: they cannot share a world.
+        ValueError: the animals cannot share a world.
     """
     if isinstance(task, Encounter):
         return task.animals, ()
@@ -176,7 +176,7 @@ def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
     where: beginning of the error message
 
     Raises:
-        ValueError: they cannot share a world.
+        ValueError: the animals cannot share a world; the message states the reason.
     """
     if not animals:
         raise ValueError(f"{where}: no animals: must be one sim.Task at least")

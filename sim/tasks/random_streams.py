@@ -23,7 +23,7 @@ class RandomStreams(Protocol):
     """Protocol of the random number generators of all worlds.
 
     entropy: seed of all generators; a simulation with this seed repeats every episode
-    noise_keys: keys of the receptor noise for `sim.render.receptor_noise`, for each agent (kind of eyes, world) uint64
+    noise_keys: for each agent, keys of its receptors' noise (`sim.render.receptor_noise`), (kind of eyes, world) uint64
     """
 
     entropy: Any

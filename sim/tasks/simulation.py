@@ -48,7 +48,7 @@ class Simulation:
 
     Raises:
         ValueError: `n` is below 1, or `least_return` is not below 0 or is given although the mode is not training.
-        RuntimeError: a method of the task fails in a first episode, which the constructor starts.
+        RuntimeError: a method of the task fails in the first episode, which the constructor starts.
     """
 
     def __init__(

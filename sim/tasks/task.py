@@ -44,7 +44,7 @@ class Task(TaskSettings):
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
         """Change the state after mj_resetData at the start of an episode; by default, keep it.
 
-        A change of `data.model` applies to this episode.
+        A change of `data.model` applies to this episode only.
 
         rng: random number generator of the world
         """

@@ -86,7 +86,7 @@ class ClosedForm:
     world, walls, footprints, lights, components: the parts of the scene
     medium: water or air between surfaces and eyes; None: clear air
     faces: textures of walls and floor, see `face_rows`
-    sphere_textures: maps to the texels, and the texels' places
+    sphere_textures: for each visible sphere, the map from texture coordinates to texels, and the place of its texture
 
     Raises:
         NoClosedForm: there are many walls, and they lie on no grid. If light is reflected more than once, also: walls

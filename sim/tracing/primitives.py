@@ -18,8 +18,8 @@ from optics.numerics.autodiff import Array
 from sim.scene.primitive_geoms import PLANE
 
 TINY = 1e-20
-# A ray counts as parallel to a surface, and misses it, if its unit direction has a smaller component across the
-# surface.
+# A ray counts as parallel to a surface, and misses it, if the component of its unit direction across the surface is
+# smaller than this value.
 PARALLEL = 1e-9
 
 

@@ -70,7 +70,7 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     """Return the closed form of a model.
 
     Raises:
-        NoClosedForm: the model has another form.
+        NoClosedForm: the model has another form; the message names the geom, light or body that is the reason.
     """
     _refuse_what_shines(scene)
     model = scene.model

@@ -46,7 +46,7 @@ class LayoutFamily:
     episode_steps: number of actions after which an episode is truncated; None: the task's default
 
     Raises:
-        ValueError: a number is out of range, or the size or the width is even.
+        ValueError: a number is out of range, or `rows`, `columns` or `path_width` is even.
     """
 
     seed: int = 0
@@ -121,7 +121,7 @@ class LayoutSet:
 
     @property
     def courses(self) -> tuple[Course, ...]:
-        """The courses.
+        """The courses of this set.
 
         Raises:
             ValueError: two courses of the family are equal, or courses of this size could not be drawn.
