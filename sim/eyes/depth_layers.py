@@ -36,7 +36,8 @@ class DepthLayers:
             )
         if self.count < 1 or (self.count > 1 and self.nearest == self.farthest):
             raise ValueError(
-                f"depth: {self.count} layers from {self.nearest!r} to {self.farthest!r} m: must be 1 or more"
+                f"depth: {self.count} layers from {self.nearest!r} to {self.farthest!r} m: must be 1, or more if the "
+                "distances differ"
             )
 
     @property
