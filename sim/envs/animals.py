@@ -86,7 +86,7 @@ class Animals:
         return Advanced(step, pending)
 
     def seen(self, advanced: Advanced) -> list[Arrays]:
-        """Return the frames after the action, for each agent in `seeing`.
+        """Wait for the frames after an action, and return them for each agent in `seeing`.
 
         Worlds in which the task moved bodies after the action (`Step.changed`) are rendered again first.
         """

@@ -27,7 +27,7 @@ class Memory:
         self._past: list[np.ndarray] = []
 
     def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        """Add a frame (env, ...), and return the memory (env, memory, ...), which the caller may modify.
+        """Add a frame (world, ...), and return the memory (world, frames, ...), which the caller may modify.
 
         The caller must not modify `frame` afterwards.
 
@@ -64,7 +64,10 @@ class Memory:
         return self._past[-1]
 
     def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Return the memory of these worlds after a frame (len(worlds), ...), without storing the frame."""
+        """Return the memory of these worlds after a frame (len(worlds), ...), without storing the frame.
+
+        The result is (len(worlds), frames, ...).
+        """
         if self.frames == 1:
             return frame[:, None]
         return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)

@@ -110,12 +110,12 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations)
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
-        """Seed each world with its own number at the next reset; None: the world continues its random numbers.
+        """Seed each world with its own seed at the next reset; None: the world continues its random numbers.
 
         An episode is then the same as in a single environment with this seed.
 
         Raises:
-            ValueError: there is not one seed per world, or a seed is not a whole number above or equal to 0.
+            ValueError: there is not one seed per world, or a seed is neither a whole number of at least 0 nor None.
         """
         self._calls.require_open()
         own = self.simulation.streams.episodes

@@ -278,12 +278,12 @@ def _is_pupil(value: Any) -> bool:
 
 
 def eye_positions(azimuths: np.ndarray) -> np.ndarray:
-    """Return the pupil centres in the agent's frame [m], (n, 3), on the equator of its body."""
+    """Return the pupil centres (n, 3) at azimuths [rad], (n,), in the agent's frame [m], on the body's equator."""
     return BODY_RADIUS * np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths)], axis=-1)
 
 
 def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
-    """Return the eyes' frames in the agent's frame, (n, 3, 3).
+    """Return the frames (n, 3, 3) of eyes at azimuths [rad], (n,), in the agent's frame.
 
     Columns: x to the right, y up, z outwards along the optical axis (docs/architecture.md, "Coordinates").
     """
@@ -295,5 +295,5 @@ def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
 
 
 def camera_rotations(azimuths: np.ndarray) -> np.ndarray:
-    """Return eyes' frames as MuJoCo defines those of cameras, (n, 3, 3): x to the right, y up, view along -z."""
+    """Return `eye_rotations` as MuJoCo defines the frames of cameras: x to the right, y up, view along -z."""
     return eye_rotations(azimuths) * np.array([1.0, 1.0, -1.0])

@@ -46,6 +46,8 @@ def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
     """Return the distance to the nearest crossing [m] if the point is inside the mesh; otherwise 0.
 
     From a point inside a closed mesh, rays in all directions cross the mesh an odd number of times.
+
+    point: position in the world [m], (3,)
     """
     if np.linalg.norm(point - data.geom_xpos[geom]) > model.geom_rbound[geom]:
         return 0.0
@@ -61,7 +63,10 @@ def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
 def _crossings(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray, way: np.ndarray
 ) -> list[float]:
-    """Return the distances at which a ray from `point` in the direction `way` crosses a mesh [m], nearest first."""
+    """Return the distances [m] at which a ray crosses a mesh, nearest first.
+
+    point, way: start of the ray [m], and its direction, a unit vector, in the world's frame, (3,)
+    """
     found: list[float] = []
     so_far, beyond = 0.0, _BEYOND * model.geom_rbound[geom]
     while (further := mujoco.mj_rayMesh(model, data, geom, point + so_far * way, way)) >= 0:

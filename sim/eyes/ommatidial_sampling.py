@@ -117,7 +117,8 @@ def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray,
     All bands share the same rays. Without the correction, the rays would represent a wide acceptance function as too
     narrow.
 
-    at_rays, everywhere: test scenes at the rays and at the places of the table, (place, scene)
+    weights: weights before the correction, (ray, band)
+    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of the table, (place, scene)
     powers: acceptance function of each band at the places of the table, (band, place)
     """
     found = weights.copy()

@@ -102,7 +102,8 @@ def of_components(
 ) -> ReceptorSums:
     """Return the function that maps light along rays to signals by one matrix product per component and channel.
 
-    The factors of bands and channels are multiplied into the weights in advance.
+    The factors of bands and channels are multiplied into the weights in advance. The arguments are those of
+    `receptor_sums`.
     """
     products = [
         RowProduct.from_weights([_mixed(weights, channel * component) for channel in mixing], resolution)

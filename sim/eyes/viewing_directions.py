@@ -63,6 +63,8 @@ def facet_frames(directions: np.ndarray) -> np.ndarray:
     """Return the frames of facets in the eye's frame (right, up, ahead), (n, 3, 3), with columns (right, up, axis).
 
     A facet is turned like a `sim.Mount` with the same azimuth and elevation: its x axis is horizontal.
+
+    directions: axes of the facets, unit vectors (ahead, left, up), (n, 3)
     """
     ahead, left, up = directions.T
     level = np.hypot(ahead, left)

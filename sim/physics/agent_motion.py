@@ -43,7 +43,7 @@ class Motion:
     unstable: np.ndarray
 
     def put(self, worlds: np.ndarray, motion: Motion) -> None:
-        """Overwrite the motion of these worlds. Use this only while a result is being assembled."""
+        """Overwrite the motion of the worlds with these indices. Use this only while a result is being assembled."""
         for name, array in vars(self).items():
             array[worlds] = getattr(motion, name)
 
@@ -159,7 +159,10 @@ class AgentPhysics:
     def _untouched(
         self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's path and velocity with contacts disabled, for these speeds and commands (n, 2).
+        """Return MuJoCo's paths [m] and velocities [m/s] with contacts disabled, (n, substep, 2) each.
+
+        speed, command: initial and commanded velocities [m/s], (n, 2)
+        displacement: displacements of the starting points from the agent's initial position [m], (n, 2)
 
         See `sim.physics.free_motion.FreeSteps`.
         """
@@ -221,7 +224,7 @@ class _Columns:
 
 
 def _slow(velocity: np.ndarray) -> np.ndarray:
-    """Return a mask of the components of velocities [m/s] that are possible; False for NaN."""
+    """Return a mask of the components of velocities [m/s] below UNSTABLE_SPEED; False for NaN."""
     slow: np.ndarray = np.abs(velocity) < UNSTABLE_SPEED
     return slow
 

@@ -25,7 +25,7 @@ class ArrayWorlds(MujocoWorlds):
 
     The arguments are those of `sim.physics.mujoco_worlds.MujocoWorlds`, and `sim.Physics` describes the methods.
 
-    qpos, qvel, act, ctrl, userdata: arrays that tasks may write in `reset` and `act`, (n, number)
+    qpos, qvel, act, ctrl, userdata: arrays that tasks may write in `reset` and `act`, (n, value)
     mocap_pos, mocap_quat: further such arrays, (n, mocap body, 3) and (n, mocap body, 4)
     time: further such array [s], (n, 1)
 

@@ -202,7 +202,11 @@ class SlidingAgents:
 
 
 def _steered(heading: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return headings [rad] (n,) after turning, and commanded velocities [m/s] (n, 2)."""
+    """Return headings [rad] (n,) after turning, and commanded velocities [m/s] (n, 2).
+
+    heading: headings before turning [rad], (n,)
+    actions: forward speed and change of heading, each in [-1, 1], (n, 2)
+    """
     speed, turn = actions.astype(np.float64).T
     heading = wrap_angle(heading + MAX_TURN * turn)
     speed = MAX_SPEED * (speed + 1.0) / 2.0

@@ -1,6 +1,6 @@
 """The rays of an image as one frozen Dr.Jit kernel, and the direct light along them.
 
-A ray is specified by a whole number: 8 times the number of its pixel, plus the number of its sample within the pixel.
+A ray is specified by a whole number: 8 times the index of its pixel, plus the index of its sample within the pixel.
 Every light is sampled once per ray, whereas Mitsuba's `direct` draws one of them at random. Point lights and
 directional lights therefore cause no noise. Skies and glowing geoms cause noise, but the samples of a pixel are fixed,
 so the noise is the same in every frame.
@@ -108,7 +108,7 @@ class CameraRays:
     def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
         """Return the light along rays of an image of size (height, width).
 
-        codes: numbers of the rays, see the module's docstring, (ray,)
+        codes: whole numbers that specify the rays, see the module's docstring, (ray,)
         """
         traced = self._inside if self.mirror.surrounds(view.position) else self._outside
         suns = {k: self.mirror.towards(name, view) for k, name in self._suns.items()}

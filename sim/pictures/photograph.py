@@ -229,7 +229,7 @@ def _camera(
 
 
 def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the means of a photograph over the cells of a grid of this size, (y, x, 3)."""
+    """Return the means of a photograph (y, x, 3) over the cells of a grid of this size (rows, columns)."""
     from PIL import Image
 
     planes = [Image.fromarray(plane.astype(np.float32)) for plane in np.moveaxis(linear, -1, 0)]
@@ -237,7 +237,7 @@ def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def _nearest(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distance in the middle of each cell of a grid of this size, (y, x).
+    """Return the distance (y, x) in the middle of each cell of a grid of this size (rows, columns).
 
     Means over cells would lie between the distances of two surfaces.
     """

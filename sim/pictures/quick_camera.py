@@ -37,7 +37,7 @@ class QuickImage:
 
     picture: sRGB, (y, x, 3) uint8
     planes: planes that rays hit, see `RayLight`, (3, ray)
-    ray: for each pixel, the number of the ray through its middle, or through the nearest lattice pixel, (pixel,)
+    ray: for each pixel, the index of the ray through its middle, or through the nearest lattice pixel, (pixel,)
     fovy_deg: vertical field of view of the camera
     """
 

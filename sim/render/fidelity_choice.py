@@ -85,6 +85,8 @@ class Stages(Protocol):
     eye: its receptor noise determines the allowed error
     allowed: allowed error of a signal due to all stages (root mean square)
     shares: fractions of the allowed error; None: each stage may use all of it
+
+    In the methods, `allowed` is the largest error that the stage may cause.
     """
 
     eye: optics.Eye

@@ -92,7 +92,10 @@ class ReceptorsInTime:
             self.state[worlds, self._others + 1] = 0
 
     def _filtered(self, rows: np.ndarray, signals: np.ndarray) -> np.ndarray:
-        """Return the signals after low-pass filter and latency."""
+        """Return the signals (world, *shape) after low-pass filter and latency, and advance these filters.
+
+        rows: states of the filters of these worlds, (world, filter, *shape), changed in place
+        """
         x = self._ms / self.dynamics.time_constant_ms
         low, decay = rows[:, self._low], np.float32(math.exp(-x))
         away = low - signals[:, None]
@@ -108,7 +111,10 @@ class ReceptorsInTime:
         return out
 
     def _adapted(self, rows: np.ndarray, signals: np.ndarray) -> np.ndarray:
-        """Return the signals after gain control, and update the mean that determines the gain."""
+        """Return the signals (world, *shape) after gain control, and update the mean that determines the gain.
+
+        rows: see `_filtered`
+        """
         mean = rows[:, self._others]
         if self.dynamics.adaptation == "naka_rushton":
             light = np.maximum(signals, 0)
@@ -128,7 +134,9 @@ class ReceptorsInTime:
     def _motion(self, signals: np.ndarray, past: np.ndarray) -> np.ndarray:
         """Return the output of the motion detectors between each receptor and its right neighbour.
 
-        In the last column, it is 0.
+        In the last column, the output is 0.
+
+        signals, past: present signals (world, *shape), and the same signals after the detectors' low-pass filter
         """
         found = np.zeros_like(signals)
         a, b, past_a, past_b = signals[..., :-1], signals[..., 1:], past[..., :-1], past[..., 1:]
@@ -139,7 +147,7 @@ class ReceptorsInTime:
         return found
 
     def _steady(self, signals: np.ndarray) -> np.ndarray:
-        """Return the responses to constant signals, without motion."""
+        """Return the responses to constant signals (world, *shape), without motion detectors."""
         if self.dynamics.event_threshold or self.dynamics.adaptation == "logarithmic":
             return np.zeros_like(signals)
         if self.dynamics.adaptation == "none":

@@ -106,7 +106,11 @@ def _face_of(pieces: np.ndarray) -> np.ndarray:
 
 
 def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
-    """Return the triangles, cut into two or three if `side` (triangle, corner) changes its sign."""
+    """Return the triangles, cut into two or three if `side` changes its sign within a triangle.
+
+    pieces: values at the corners of each triangle, (triangle, corner, value), interpolated where a triangle is cut
+    side: linear function that is 0 on the seam and changes its sign there, at the corners, (triangle, corner)
+    """
     side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
     crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)
     whole, cut, side = pieces[~crossed], pieces[crossed], side[crossed]

@@ -147,7 +147,11 @@ def pose(data: mujoco.MjData, light: int) -> MitsubaObject:
 
 
 def aimed(origin: np.ndarray, direction: np.ndarray) -> MitsubaObject:
-    """Return a to_world with +z along `direction`; a rotation about this axis does not matter for a light."""
+    """Return a `to_world` for Mitsuba with +z along `direction`; the rotation about this axis is arbitrary.
+
+    origin: position of the light [m], (3,)
+    direction: direction in which the light shines, of any length, (3,)
+    """
     z = direction / np.linalg.norm(direction)
     x = np.cross([1.0, 0, 0] if abs(z[0]) < 0.9 else [0, 1.0, 0], z)
     x /= np.linalg.norm(x)

@@ -149,6 +149,7 @@ class Mirror:
         Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
 
         camera: name or id of a camera of the model, or a Viewpoint
+        width, height: size of the image [pixels]
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}.
             "direct" shows only emitters behind a transparent geom; a MirrorWarning names such geoms once.
         spp: samples per pixel

@@ -88,8 +88,9 @@ def texture_id(model: mujoco.MjModel, geom: int) -> int:
 def texture_repeat(model: mujoco.MjModel, geom: int, size: np.ndarray) -> np.ndarray:
     """Return the texture's repeats (u, v) over a geom.
 
-    They are the material's repeats, multiplied by the geom's size along x and y if the material's texture is
-    uniform.
+    They are the material's repeats, multiplied by the geom's size along x and y if the material has `texuniform`.
+
+    size: half sizes of the geom, see `sim.scene.shapes.half_sizes`
     """
     material = model.geom_matid[geom]
     repeat = model.mat_texrepeat[material].astype(float)
@@ -136,7 +137,10 @@ def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | No
 
 
 def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
-    """Return the repeating Mitsuba texture of an image (height, width, 1 or 3), row 0 at the top."""
+    """Return the repeating Mitsuba texture of a linear image (height, width, 1 or 3), row 0 at the top.
+
+    to_uv: matrix from the shape's texture coordinates to MuJoCo's, (3, 3); None: they are equal
+    """
     # A bitmap that is passed as an object has its first row at v = 0, as in MuJoCo. (Mitsuba would interpret a bitmap's
     # `data` as coefficients of spectra instead of RGB.)
     picture = mi.Bitmap(np.ascontiguousarray(values, dtype=np.float32))

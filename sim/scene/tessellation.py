@@ -111,6 +111,8 @@ def strip(half_sides: np.ndarray) -> Triangles:
     """Return a horizontal rectangle, divided into pieces along its longer side.
 
     Each piece is about as long as its distance from the middle. (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2).
+
+    half_sides: half lengths (sx, sy) of the sides [m], (2,)
     """
     short, long = np.sort(half_sides)
     ahead = np.geomspace(short, long, int(np.ceil(np.log2(long / short))) + 1)
@@ -124,12 +126,18 @@ def strip(half_sides: np.ndarray) -> Triangles:
 
 
 def ellipsoid(semi_axes: np.ndarray) -> Triangles:
-    """Return an ellipsoid: u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere before scaling."""
+    """Return an ellipsoid: u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere before scaling.
+
+    semi_axes: lengths of the semi-axes along x, y, z [m], (3,)
+    """
     return _revolved(*_arc(0, np.pi), scale=semi_axes, v=np.linspace(0, 1, STACKS + 1))
 
 
 def cylinder(radius: float, half_length: float) -> Triangles:
-    """Return a cylinder. Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2)."""
+    """Return a cylinder. Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2).
+
+    radius, half_length: radius r [m], and half of the length along z, h [m]
+    """
     side = _revolved(
         np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])
     )
@@ -151,6 +159,8 @@ def capsule(radius: float, half_length: float) -> Triangles:
 
     Its side has the texture coordinates of a cylinder's side. On each cap, v runs from 0 to 1: from the pole to the
     side at the top, and from the side to the pole at the bottom.
+
+    radius, half_length: radius [m], and half of the length of the cylindrical side along z [m]
     """
     side = _revolved(
         np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])
@@ -227,6 +237,10 @@ def _revolved(radius: np.ndarray, height: np.ndarray, scale: np.ndarray, v: np.n
     """Return the surface of revolution of the profile (radius, height), from top to bottom, scaled afterwards.
 
     The vertices of the seam are doubled, since u is 0 on one side of it and 1 on the other.
+
+    radius, height: profile of the unit shape, (n,)
+    scale: factors along x, y, z [m], (3,)
+    v: texture coordinate of each point of the profile, (n,)
     """
     azimuth = np.linspace(0, 2 * np.pi, SLICES + 1)
     circle = np.column_stack([np.cos(azimuth), np.sin(azimuth)])

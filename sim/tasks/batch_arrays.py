@@ -20,6 +20,7 @@ def rows(where: str, returned: Any, n: int, kind: type) -> np.ndarray:
     """Return the array `returned` if it has one number for each world, (n,).
 
     where: source of the array, for the error message
+    kind: type to which the entries are converted
 
     Raises:
         ValueError: the array has another shape, or its entries are not numbers.

@@ -203,7 +203,7 @@ class BatchTask(TaskSettings):
     def streams(self, seed: Any, n: int) -> RandomStreams:
         """Return the random streams of the worlds.
 
-        seed: one seed for all worlds, None, or a tuple with a seed for each world
+        seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
         """
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 

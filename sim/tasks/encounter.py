@@ -32,7 +32,7 @@ class Frozen:
         and the `others` of this task are not used
     policy: an object with the method `predict` of stable-baselines3 (a learner, or the return value of
         `evolve.load_policy`), or a function. The function receives the observations of all worlds, as in
-        `make_vec_env`, and returns the actions (world, number). None: the actions are zeros, and the animal's eyes are
+        `make_vec_env`, and returns the actions (world, value). None: the actions are zeros, and the animal's eyes are
         not rendered.
 
     Raises:
@@ -59,7 +59,7 @@ class Frozen:
         """Return the animal's actions in every world.
 
         observation: the animal's observations in all worlds, by name, as in `sim.make_vec_env`
-        shape: shape of the actions, (world, number)
+        shape: shape of the actions, (world, value)
 
         Raises:
             RuntimeError: the policy fails, or returns actions of another shape.

@@ -49,7 +49,7 @@ class FindGoal(AgentTask):
 
     @cached_property
     def _bounds(self) -> np.ndarray:
-        """Limits of the objects' motion: x_min, y_min, x_max, y_max [m]."""
+        """Limits of the objects' motion: x_min, y_min, x_max, y_max [m], (4,)."""
         spots = self.world.object_spawn
         return np.concatenate([spots.min(axis=0), spots.max(axis=0)])
 

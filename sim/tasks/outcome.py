@@ -74,8 +74,8 @@ class Outcome:
         learn, (world,) bool; None: False in all worlds
     changed: worlds in which the task moved bodies after the action
     info: additional entries of each row's `info`; None: no additions
-    proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, number);
-        a world whose numbers are NaN keeps its previous numbers. None: the task's method `all_proprioception` is
+    proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, value);
+        a world whose values are NaN keeps its previous values. None: the task's method `all_proprioception` is
         called.
     """
 

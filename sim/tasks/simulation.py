@@ -106,7 +106,7 @@ class Simulation:
         self.physics.state = state  # type: ignore[misc]
 
     def seed(self, seed: Any) -> None:
-        """Seed all random number generators again. The next call must be `reset`."""
+        """Seed all random number generators again, see `BatchTask.streams`. The next call must be `reset`."""
         self.streams = self.physics.chance = self.task.streams(seed, self.n)
         self.begun = False
 

@@ -265,6 +265,9 @@ def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     """Return a row of ROW numbers for each face, from which the texel at a point is computed.
 
     They are two affine functions of the point, which give the texel's column and row, the texture's place, and 0.
+
+    uv: matrices (2, 4) from points of each face to texture coordinates, (face, 2, 4)
+    place: index of each face's texture in the atlas, (face,)
     """
     rows = np.zeros((len(uv), ROW))
     for i, (affine, texture) in enumerate(zip(uv, place, strict=True)):

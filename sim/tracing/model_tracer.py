@@ -223,13 +223,13 @@ class ModelTracer:
         return _SurfaceHit(si, bsdf, colors, glow, which, seen, active, point, normal, hit.t, ray.d)
 
     def distance(self, ray: Array, there: Surroundings) -> Array:
-        """Return the distance to the first hit of each ray [m]."""
+        """Return the distance to the first hit of each ray [m]; infinite without a hit."""
         si = there.still.ray_intersect_preliminary(ray) if self._any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return the number of the surface that each ray hits first, in `ModelScene.one_shape_per_geom`.
+        """Return the index of the surface that each ray hits first, in `ModelScene.one_shape_per_geom`.
 
         It is a mover's number, or the number of movers plus the Mitsuba id of a static shape (0 for none).
         """

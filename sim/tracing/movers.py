@@ -37,7 +37,7 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray.
 
-    t, which: distance [m], and number of the mover; without a hit, the largest distance, and the number of movers
+    t, which: distance [m], and index of the mover; without a hit, the largest distance, and the number of movers
     normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
     """
 
@@ -82,7 +82,7 @@ class Movers:
     looks, geoms: appearance and geom id of each mover
     atlas: the movers that are meshes
     lifts: distances by which surfaces are moved outwards [m], by geom
-    ends: number of the first mover of each kind, for the kernel
+    ends: index of the first mover of each kind, for the kernel
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class Movers:
         self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
 
     def _of_kind(self, kind: str) -> slice:
-        """Return the numbers of the movers of a kind."""
+        """Return the indices of the movers of a kind."""
         i = [*PRIMITIVES, MESH].index(kind)
         return slice(int(self._ends[i]), int(self._ends[i + 1]))
 
@@ -228,7 +228,7 @@ class Movers:
         return blocked
 
     def _kinds(self) -> list[tuple[int, Callable[..., Array]]]:
-        """Return the kinds of movers that occur, as their numbers and intersections."""
+        """Return the kinds of movers that occur, as their indices and intersections."""
         hits = [*(_of_primitive(primitive) for primitive in PRIMITIVES.values()), self._mesh_hit]
         return [(i, hit) for i, hit in enumerate(hits) if self._ends[i] < self._ends[i + 1]]
 

@@ -108,7 +108,13 @@ def _floor_uv(corners: np.ndarray) -> np.ndarray:
 
 
 def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Return the lower and upper corner of a box, and the texture coordinates of its sides."""
+    """Return the lower and upper corner of a box [m], (3,), and the texture coordinates on its sides.
+
+    The coordinates are affine functions (2, 4) of the point, for the sides -x, +x, -y, +y.
+
+    Raises:
+        NoClosedForm: the box is not aligned with the axes, or has a cube texture.
+    """
     pose = shapes.pose(data, geom)
     if np.abs(np.abs(pose[:3, :3]).max(axis=0) - 1).max() > ALIGNED:
         raise NoClosedForm(f"box {model.geom(geom).name!r} is not aligned with the axes")

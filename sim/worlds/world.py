@@ -208,7 +208,7 @@ def _empty_world() -> mujoco.MjSpec:
 
 
 def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> None:
-    """Add the agent, with slide joints along the world's axes and a hinge for the heading.
+    """Add the agent at `start` (x, y) [m], with slide joints along the world's axes and a hinge for the heading.
 
     The hinge has no actuator; the simulation sets the heading. The contact is frictionless. Its damping and stiffness
     are chosen for discrete substeps of length dt. The damping 1/dt stops the approach in the substep in which the

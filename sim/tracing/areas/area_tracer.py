@@ -97,7 +97,7 @@ class AreaTracer:
     ) -> list[Array]:
         """Return the mean radiance in each area, one array per component, for each depth layer.
 
-        faces: numbers of the walls' faces at the area's left and right border, see `border_faces`
+        faces: indices of the walls' faces at the area's left and right border, see `border_faces`
         """
         nothing = [0.0] * (depth.count * len(self.basis))
         pieces = self._columns.pieces(area, faces, now.inputs.face_ends)
@@ -123,11 +123,11 @@ class AreaTracer:
         return [own + veil for own, veil in zip(found, self._medium.veil, strict=False)] + found[len(self.basis) :]
 
     def first_faces(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
-        """Return the number of the wall's face that a ray in a horizontal direction (Vector2f) hits."""
+        """Return the index of the wall's face that a ray in a horizontal direction (Vector2f) hits."""
         return self._columns.first_faces(origin, level, inputs.cells)
 
     def border_faces(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
-        """Return the numbers of the faces at an area's left and right border."""
+        """Return the indices of the faces at an area's left and right border."""
         left, right = (self.first_faces(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
 
@@ -284,7 +284,7 @@ def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) 
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
-    """Return eight numbers per face, from which the kernel finds the texture at a point, flat.
+    """Return eight numbers per face, flat, from which the kernel finds the texture at a point.
 
     They are the texel's column as an affine function of (x, y, z), the texture's first texel and its number of columns.
     """

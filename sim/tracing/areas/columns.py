@@ -31,7 +31,7 @@ RIM = 4  # number of sides of the floor; its rim counts as a wall in directions 
 class Face:
     """A face of a wall.
 
-    index: number of the face
+    index: index of the face
     left, right: ends of the face, as seen from the front (Point2f)
     """
 
@@ -106,7 +106,7 @@ class Columns:
     def pieces(self, area: Area, faces: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
         """Return the left and the right piece. If one wall fills all columns, the right piece is empty.
 
-        faces: numbers of the faces at the area's left and right border, see `first_faces`
+        faces: indices of the faces at the area's left and right border, see `first_faces`
         """
         half = mi.Float(0.5)
         left, right = (self._face(index, face_ends) for index in faces)
@@ -114,7 +114,7 @@ class Columns:
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
     def first_faces(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
-        """Return the number of the face that a ray in a horizontal direction (Vector2f) hits."""
+        """Return the index of the face that a ray in a horizontal direction (Vector2f) hits."""
         ray = mi.Ray3f(origin, mi.Vector3f(level.x, level.y, 0))
         t, face, _ = self._footprints.hit(ray, cells)
         return dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
@@ -125,7 +125,7 @@ class Columns:
         return Face(face, mi.Point2f(ends.x, ends.y), mi.Point2f(ends.z, ends.w))
 
     def _side_of_floor(self, ray: Array) -> Array:
-        """Return the number of the side through which a ray leaves the floor: -x, +x, -y, +y."""
+        """Return the index of the side through which a ray leaves the floor: -x, +x, -y, +y."""
         t = [
             (dr.select(d > 0, upper, lower) - o) / dr.select(dr.abs(d) < LEAST_NEARNESS, LEAST_NEARNESS, d)
             for o, d, lower, upper in zip(ray.o, ray.d, self._lower, self._upper, strict=False)

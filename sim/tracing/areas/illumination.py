@@ -25,7 +25,7 @@ from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.wall_intersection import CellTables
 
 REACH = 8  # [radii] more distant bodies are ignored, because they fill less than 1/64 of the view from a patch
-ITSELF_NONE = 2**16  # number for a patch that does not lie on a body
+ITSELF_NONE = 2**16  # index for a patch that does not lie on a body
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class FrameState:
 
     bodies: centres of the moving spheres; the agent is the last one
     inputs: tables that are the same in all worlds
-    world: number of the world of each area
+    world: index of the world of each area
     body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is neglected
     """
 
@@ -90,7 +90,7 @@ class Illumination:
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
         """Return the fraction of a patch that each light reaches.
 
-        itself: number of the body on which the patch lies
+        itself: index of the body on which the patch lies
         """
 
         def past(k: Array, lit: list[Array]) -> list[Array]:
@@ -202,6 +202,9 @@ class Illumination:
 
 
 def _mean_colour(rays: ClosedForm, place: np.ndarray) -> np.ndarray:
-    """Return the mean reflectance of the texture at this place, (component,), in the components of reflected light."""
+    """Return the mean reflectance of a texture, (component,), in the components of reflected light.
+
+    place: place of the texture in the atlas, see `Atlas.places`
+    """
     first, columns = map(int, place[:2])
     return rays.components.reflectance[first : first + columns].mean(axis=0)

@@ -78,7 +78,7 @@ class Baking:
         return {name: np.ascontiguousarray(table) for name, table in found.items()}
 
     def _between(self, found: dict[str, np.ndarray]) -> Irradiance:
-        """Return a function for the irradiance at any point, interpolated in these tables."""
+        """Return a function that interpolates these tables to the irradiance at any point."""
         light, count = NodeLight(self._nodes, len(self._tracer.basis)), range(len(self._tracer.basis))
         floor, walls = ([floats(found[f"bounced_{name}_{k}"]) for k in count] for name in ("floor", "walls"))
         tables = NodeTables(floats(self._nodes.cells), floor, walls)
@@ -147,8 +147,9 @@ class Baking:
     ) -> np.ndarray:
         """Return the irradiance at points (n, 3) due to light from walls and floor, (n, component).
 
+        normals: normals of the surface at the points, (n, 3)
         rays: number of rays from each point
-        shade: radius of a body that casts a shadow, and its centre for each point
+        shade: radius of a body that casts a shadow [m], and its centre for each point, (n, 3); None: no shadow
         """
         samples = mi.Point2f(*(floats(np.tile(c, max(LANES // rays, 1))) for c in low_discrepancy(rays).T))
         dr.eval(samples)
@@ -169,7 +170,7 @@ class Baking:
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
-    """Return the positions of nodes along a length, at least MARGIN away from its ends."""
+    """Return the positions of evenly spaced nodes along a length [m], at least MARGIN away from its ends, (nodes,)."""
     return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
 
 

@@ -71,7 +71,7 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Numbers of all cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
+        """Indices of all cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
         return self.grid.numbers.astype(np.float32).ravel()
 
 

@@ -63,7 +63,7 @@ def _digest(ingredients: list[np.ndarray]) -> str:
 
 
 def _checksum(tables: dict[str, np.ndarray], world: str) -> np.ndarray:
-    """Return the checksum of a world's tables, as bytes."""
+    """Return the SHA-256 checksum of a world's tables, (32,) uint8."""
     digest = hashlib.sha256(world.encode())
     for name in sorted(tables):
         digest.update(f"{name} {tables[name].size} ".encode())

@@ -59,8 +59,8 @@ class LightTable(NodeLight):
 
         All FOURS groups together are the coefficients for `sum_of`.
 
-        body: number of the body
-        four: number of the group of four harmonics
+        body: index of the body
+        four: index of the group of four harmonics
         centre: centre of the body
         """
         cell, x, y = self._nodes.grid.locate(centre, tables.cells)

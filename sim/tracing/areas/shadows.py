@@ -40,6 +40,9 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: A
 
     On small patches, the rim of the shadow is treated as one straight line, or as two. On large patches, the shadow is
     treated as a disk within the patch.
+
+    direction: unit vector towards the light
+    way: vector from the middle of the patch to the centre of the sphere
     """
     towards = mi.Vector3f(*direction)
     ahead = dr.dot(way, towards)

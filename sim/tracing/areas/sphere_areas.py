@@ -102,7 +102,7 @@ class SphereView:
         return self._between(mi.Float(0), mi.Float(1))
 
     def strip(self, number: Array) -> Strip:
-        """Return the strip with this number, counted from 0."""
+        """Return the strip with this index."""
         per = dr.rcp(mi.Float(self.sides))
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
@@ -120,7 +120,7 @@ class SphereView:
         return Strip(length * width, seen, *sides, self._patch(seen, *sides), dr.select(self._upright, *upright))
 
     def slice(self, strip: Strip, number: Array) -> Slice:
-        """Return the slice of a strip with this number, counted from 0."""
+        """Return the slice with this index of a strip."""
         per = dr.rcp(mi.Float(self.sides))
         seen = strip.seen + strip.along * ((mi.Float(number) + 0.5) * per - 0.5)
         sides = strip.along * per, strip.across

@@ -31,7 +31,7 @@ HALF_ULP = 2.0**-24  # largest relative error of a number that is rounded to flo
 class Texture:
     """The place of a texture in the kernel's tables.
 
-    first: number of the first texel
+    first: index of the first texel
     columns: number of columns
     least_side: shorter sides of parallelograms are treated as this long [texels], see `Stripes.texture`
     """
@@ -158,5 +158,5 @@ def _least_side(largest: float) -> float:
 
 
 def _integral_up_to(steps: np.ndarray) -> np.ndarray:
-    """Return the sum of all steps before each step."""
+    """Return the sum of all steps before each step, along the first axis."""
     return np.cumsum(steps, axis=0) - steps
