@@ -66,7 +66,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
         Raises:
             ValueError: the seed is neither a whole number of at least 0 nor None, or `options` are given.
-            RuntimeError: `close` has been called.
+            RuntimeError: `close` has been called, or a method of a user task fails.
         """
         seed = seed_of("seed", seed)
         super().reset(seed=seed)

@@ -83,7 +83,7 @@ def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.n
 
 
 def _projected(directions: np.ndarray) -> np.ndarray:
-    """Return Hammer's projection (right, up) of directions (ahead, left, up)."""
+    """Return Hammer's projection (right, up), (n, 2), of directions (ahead, left, up), unit vectors (n, 3)."""
     longitude = np.arctan2(-directions[:, 1], directions[:, 0])
     sine = np.clip(directions[:, 2], -1, 1)
     cosine = np.sqrt(1 - sine**2)

@@ -51,16 +51,16 @@ class Memory:
 
     @property
     def frames_held(self) -> np.ndarray:
-        """All stored frames, (env, memory, ...)."""
+        """All stored frames, (world, frames, ...)."""
         return np.stack(self._past, axis=1)
 
     def restore(self, frames: np.ndarray) -> None:
-        """Replace the stored frames by these, (env, memory, ...)."""
+        """Replace the stored frames by these, (world, frames, ...)."""
         self._past = [frames[:, k].copy() for k in range(self.frames)]
 
     @property
     def newest(self) -> np.ndarray:
-        """The last frame of every world, (env, ...)."""
+        """The last frame of every world, (world, ...)."""
         return self._past[-1]
 
     def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:

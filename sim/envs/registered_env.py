@@ -24,6 +24,8 @@ ENDLESS = -1  # Gymnasium's value for episodes without truncation
 class RegisteredEnv(EyesEnv):
     """An `EyesEnv` whose episodes are truncated by Gymnasium's wrapper `TimeLimit`.
 
+    Further errors are those of `EyesEnv`.
+
     Raises:
         ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """
@@ -35,7 +37,8 @@ class RegisteredEnv(EyesEnv):
 class RegisteredVectorEnv(EyesVectorEnv):
     """An `EyesVectorEnv` that truncates its episodes after `max_episode_steps` actions.
 
-    A course or a family of layouts with a smaller number of actions truncates them earlier.
+    A course or a family of layouts with a smaller number of actions truncates them earlier. Further errors are those of
+    `EyesVectorEnv`.
 
     Raises:
         ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.

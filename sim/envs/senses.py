@@ -97,7 +97,7 @@ class Senses:
     def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
         """Return the memory that these worlds would have after the new frames, which are not stored.
 
-        seen: new frames of all worlds
+        seen: new frames of all worlds, by kind of eyes
         """
         return {name: sight.memory.preview(seen[name][worlds], worlds) for name, sight in self.sights.items()}
 

@@ -33,8 +33,7 @@ class EyesVecEnv(OneEnvironment):
     observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
     episodes depend only on the seed and on the world's index, not on the number of worlds.
 
-    simulation: the worlds
-    renderers: renderers of every agent's eyes
+    simulation, renderers: the worlds, and renderers of every agent's eyes
     memory: number of frames in an observation
     render_mode: "rgb_array", "eyes" or None
     failures: number of episodes that ended because of a failure, by reason
@@ -96,7 +95,7 @@ class EyesVecEnv(OneEnvironment):
         """Start an episode in every world; return the first observations.
 
         Raises:
-            RuntimeError: the environment is closed, or an action is pending after `step_async`.
+            RuntimeError: the environment is closed, an action is pending, or a method of a user task fails.
         """
         self._calls.start_reset()
         if self._seeds[0] is not None:
@@ -116,6 +115,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: there is not one seed per world, or a seed is neither a whole number of at least 0 nor None.
+            RuntimeError: the environment is closed, or an action is pending.
         """
         self._calls.require_open()
         own = self.simulation.streams.episodes
@@ -143,7 +143,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the action is not finite, or `step_async` would refuse it.
-            RuntimeError: there has been no reset yet, or `close` has been called.
+            RuntimeError: there has been no reset yet, `close` has been called, or an action is pending.
         """
         self._calls.require_begun()
         self.step_async(one_worlds_action("action", action, self.action_space.shape)[None])
@@ -157,7 +157,7 @@ class EyesVecEnv(OneEnvironment):
         """Take the actions of `step_async`; return the observations, rewards, ends of episodes and infos of all rows.
 
         Raises:
-            RuntimeError: no action is pending after `step_async`, or the environment is closed.
+            RuntimeError: no action is pending, `close` has been called, or a method fails at the start of an episode.
         """
         advanced = self._advance()
         step = advanced.step
@@ -181,7 +181,7 @@ class EyesVecEnv(OneEnvironment):
         The state does not contain such values.
 
         Raises:
-            RuntimeError: there has been no reset, `close` has been called, or the model enables MuJoCo's flag "sleep".
+            RuntimeError: there was no reset, `close` was called, an action is pending, or MuJoCo's "sleep" is enabled.
         """
         self._calls.require_begun()
         return self.animals.get_state()
@@ -191,7 +191,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
-            RuntimeError: there has been no reset, `close` has been called, or the model enables MuJoCo's flag "sleep".
+            RuntimeError: there was no reset, `close` was called, an action is pending, or MuJoCo's "sleep" is enabled.
         """
         held_state.checked(state, self.get_state())
         chosen = held_state.chosen_worlds(worlds, len(self._everyone))

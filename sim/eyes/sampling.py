@@ -131,7 +131,7 @@ class BoxSampling:
         return directions_of(self.eye, from_receptors(self.eye, points.reshape(-1, 2)))
 
     def _corners(self) -> np.ndarray:
-        """Return the upper left corner of every receptor's square, (receptor, 1, 2)."""
+        """Return the upper left corner of every receptor's square, from the middle, in sides, (receptor, 1, 2)."""
         height, width = self.eye.resolution
         row, column = (index.ravel() for index in np.indices((height, width)))
         return np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]

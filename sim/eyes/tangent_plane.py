@@ -22,6 +22,8 @@ def to_receptors(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
     """Convert points of the tangent plane to coordinates in which every receptor has the size 1, (..., 2).
 
     This is the inverse of `from_receptors`.
+
+    plane: points (x right, y down) [average receptor widths and heights], (..., 2)
     """
     return plane if eye.lattice is None else eye.lattice.counted(plane)
 

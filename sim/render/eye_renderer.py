@@ -185,7 +185,7 @@ class EyeRenderer:
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
         """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32.
 
-        The unit is that of `sim.mirror`: white that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
+        The unit is that of `sim.mirror` (white facing a light of diffuse 1: D65, 1 at 560 nm). Errors: see `signals`.
         """
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())

@@ -18,10 +18,10 @@ class LightFactors:
 
     @classmethod
     def from_light(cls, light: np.ndarray, shape: tuple[int, int]) -> LightFactors:
-        """Return a copy of the factors `light`.
+        """Return a copy of the factors `light`, which must have this shape, (env, band).
 
         Raises:
-            ValueError: the shape is not (env, band).
+            ValueError: `light` has another shape.
         """
         if np.shape(light) != shape:
             raise ValueError(f"light has shape {np.shape(light)}: must be (env, band), {shape}")

@@ -120,7 +120,7 @@ class PreparedScene:
         """Return the tracer that uses area sampling.
 
         Raises:
-            ValueError: the world has no closed form.
+            ValueError: the world has no closed forms for areas, or the tracer is "mitsuba", which traces only rays.
         """
         return self.tracers.areas(light)
 

@@ -81,7 +81,11 @@ class Normals:
 
 
 class _Kernel:
-    """A kernel that is recorded once per width, with its own buffers of keys and of indices of frames."""
+    """A kernel that is recorded once per width, with its own buffers of keys and of indices of frames.
+
+    worlds: number of worlds
+    draws: number of draws in each world
+    """
 
     def __init__(self, worlds: int, draws: int) -> None:
         self._slot, self._variant = FrameSlot(), default_variant()

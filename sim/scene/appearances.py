@@ -99,6 +99,7 @@ def varied_geoms(
     A geom for which `varied` lists no materials has no ids.
 
     seen: ids of the visible geoms
+    varied: names of the geoms, or names of the materials of each geom by its name
 
     Raises:
         ValueError: no visible geom or no material has a name in `varied`, or a geom without listed materials has a

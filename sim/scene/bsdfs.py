@@ -33,7 +33,10 @@ def is_open(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def mirror_share(model: mujoco.MjModel, geom: int) -> float:
-    """Return the fraction of the light that a plane or the top of a box reflects as a mirror."""
+    """Return the fraction of the light that a plane or the top of a box reflects as a mirror.
+
+    The result is 0 for other geoms, and for geoms that are not opaque.
+    """
     material = model.geom_matid[geom]
     flat = surfaces.geom_type(model, geom) in (_TYPES.mjGEOM_PLANE, _TYPES.mjGEOM_BOX)
     if material < 0 or not flat or surfaces.rgba(model, geom)[3] < _OPAQUE:
@@ -136,7 +139,14 @@ def _measured(
     spectrum: Spectrum,
     matter: Callable[[mujoco.MjModel, int, Description], Description],
 ) -> Description:
-    """Return the Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one."""
+    """Return the Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one.
+
+    to_uv: see `bsdf`
+    matter: function that returns the BSDF of the geom's material with a given colour
+
+    Raises:
+        ValueError: the texture is not grey.
+    """
     whole = matter(model, geom, spectra.described(spectrum))
     texture = surfaces.texture_id(model, geom)
     if texture < 0 or not surfaces.is_mirrored(model, geom, texture):

@@ -36,6 +36,9 @@ class Viewpoint:
         """Return a viewpoint at `origin` that looks at `target` [m], with z up (y up if the direction is vertical).
 
         `origin` and `target` are points (3,), which must differ.
+
+        Raises:
+            ValueError: `origin` or `target` does not consist of real numbers.
         """
         origin, target = reals("origin", origin), reals("target", target)
         back = origin - target

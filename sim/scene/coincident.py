@@ -56,7 +56,7 @@ class Coincidences:
 
 
 def coincidences(data: mujoco.MjData, geoms: Sequence[int]) -> Coincidences:
-    """Return which of these geoms are in the same place in this pose."""
+    """Return which of these geoms have coinciding surfaces in the poses of `data`."""
     model, pairs, lifts = data.model, [], dict[int, float]()
     near = list(_near(data, sorted(int(geom) for geom in geoms)))
     samples = {geom: _points(data, geom) for geom in {geom for pair in near for geom in pair}}

@@ -19,10 +19,12 @@ from optics.numerics.precision import aligned
 class SharedBuffer:
     """NumPy memory that kernels read directly.
 
-    LLVM's kernels receive it once, because passing it at every launch would take longer than rendering a small world. A
-    GPU has its own memory and receives a copy at every access.
+    LLVM's kernels receive the memory once, because passing it at every launch would take longer than rendering a small
+    world. A GPU has its own memory and receives a copy at every access.
 
-    values: flat; must not be written to while a kernel reads them
+    n: number of values
+    kind: type of the array on the device (float32, uint32 or uint64); None: mi.Float
+    values: attribute, the values (n,), which must not be changed while a kernel reads them
     """
 
     def __init__(self, n: int, kind: Any = None) -> None:

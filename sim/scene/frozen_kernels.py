@@ -73,7 +73,8 @@ def _with_arrays(inputs: Any, arrays: Iterator[Array]) -> Any:
 class GarbageKept:
     """Context that suspends Python's garbage collection.
 
-    If it freed another renderer's kernels or scene during the recording of a kernel, Dr.Jit would abort the process.
+    If the collection freed another renderer's kernels or scene while a kernel is recorded, Dr.Jit would abort the
+    process.
     """
 
     def __enter__(self) -> None:

@@ -84,7 +84,9 @@ def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) ->
 def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: Spectrum | None) -> Description | None:
     """Return the radiance of a geom with an emissive material; None if the geom does not glow.
 
-    It is the material's emission times the radiance that the geom would have in full daylight.
+    The radiance is the material's emission times the radiance that the geom would have in full daylight.
+
+    to_uv, measured: see `sim.scene.bsdfs.bsdf`
     """
     material = model.geom_matid[geom]
     if material < 0 or model.mat_emission[material] <= 0:
@@ -141,7 +143,7 @@ def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tu
 
 
 def pose(data: mujoco.MjData, light: int) -> MitsubaObject:
-    """Return Mitsuba's to_world of a light: at its position, +z along its direction."""
+    """Return Mitsuba's `to_world` of a light: the origin is the light's position, and +z points along its direction."""
     origin, direction = data.light_xpos[light], data.light_xdir[light]
     return aimed(origin, direction)
 
@@ -197,7 +199,10 @@ def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: S
 
 
 def _profile(cutoff_deg: float, exponent: float) -> Description:
-    """Return the image that a spot projects over its cone: cos(θ)**exponent at the angle θ to its axis."""
+    """Return the image that a spot projects over its cone: cos(θ)**exponent at the angle θ to its axis.
+
+    cutoff_deg: angle between the cone's axis and its side [degrees]
+    """
     tangent = np.tan(np.radians(cutoff_deg)) * (2 * (np.arange(_PROFILE) + 0.5) / _PROFILE - 1)
     cosine = 1 / np.sqrt(1 + tangent[:, None] ** 2 + tangent[None, :] ** 2)
     bitmap = mi.Bitmap(np.ascontiguousarray(cosine**exponent, dtype=np.float32)[..., None])

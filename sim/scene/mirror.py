@@ -157,8 +157,8 @@ class Mirror:
         sampler: "independent", or "multijitter", which has less noise in images
 
         Raises:
-            ValueError: the camera or integrator is unknown, there is less than one pixel or sample, a wavelength is
-                outside 300 to 780 nm, or Mitsuba would apply the integrator or the sampler incorrectly.
+            ValueError: the camera is unknown or no plain perspective, the integrator is unknown, there is less than one
+                pixel or sample, a wavelength is outside 300 to 780 nm, or Mitsuba would apply an argument incorrectly.
             RuntimeError: Mitsuba has no such sampler.
         """
         view = self.viewpoint(camera)
@@ -181,7 +181,7 @@ class Mirror:
         self._has_warned_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
-        """Return the viewpoint of a camera of the model at the last `sync`; ValueError for an unknown camera."""
+        """Return the viewpoint of a camera of the model at the last `sync`; errors are those of `cameras.viewpoint`."""
         return cameras.viewpoint(self.model, self._places, camera)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
@@ -224,7 +224,7 @@ class Mirror:
         return mi.load_dict(description)
 
     def _glow(self, geom: int) -> Description | None:
-        """Return the emission of a geom with an emissive material."""
+        """Return the radiance of a geom with an emissive material; None if the geom does not glow."""
         to_uv = shapes.uv_transform(self.model, geom)
         return lights.glow(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
 
@@ -284,7 +284,7 @@ def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
 
 
 def _checked(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """Return the data if they belong to this model and all their poses are finite."""
+    """Return the data, after checking that they belong to this model and that all their poses are finite."""
     if data.geom_xpos.shape != (model.ngeom, 3) or data.xpos.shape != (model.nbody, 3):
         raise ValueError(
             f"mirror: data has {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies, but the model has "

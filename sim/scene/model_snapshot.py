@@ -25,11 +25,12 @@ _THINGS = (
 class ModelSnapshot:
     """The state of a model when its renderer was built. Arrays are copies, since tasks may change the model later.
 
-    geoms: visible geoms
-    hidden: geoms that are invisible only because their alpha is 0
-    moving: geoms that the renderer can show in any pose
-    resizable: geoms whose sizes may differ
-    varied: geoms that may differ, with the ids of the materials that each may have (`appearances.varied_geoms`)
+    geoms: ids of the visible geoms
+    hidden: ids of the geoms that are invisible only because their alpha is 0
+    moving: ids of the geoms that the renderer can show in any pose
+    resizable: ids of the geoms whose sizes may differ
+    varied: ids of the geoms that may differ, with the ids of the materials that each may have
+        (`appearances.varied_geoms`)
     """
 
     def __init__(

@@ -66,7 +66,11 @@ def with_compiled_color_spaces(source: Source) -> Source:
 
 
 def _specification(source: mujoco.MjSpec | str | Path) -> tuple[Callable[[], mujoco.MjSpec], str]:
-    """Return a function that reads a specification, and the source's name in messages."""
+    """Return a function that reads a specification, and the source's name in messages.
+
+    Raises:
+        ValueError: the source has another type, or the file does not exist, or the text or file is too large.
+    """
     if isinstance(source, mujoco.MjSpec):
         return lambda: source, f"MjSpec {source.modelname!r}"
     if isinstance(source, str) and source.lstrip().startswith("<"):
@@ -89,7 +93,10 @@ def _checked(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjMo
 
 
 def _reported(make: Callable[[], Made], name: str) -> Made:
-    """Return the result of `make`, and report MuJoCo's errors in one line."""
+    """Return the result of `make`; raise an error of MuJoCo as a ValueError with a message of one line.
+
+    name: the source's name in messages
+    """
     try:
         return make()
     except (ValueError, mujoco.FatalError) as error:

@@ -75,7 +75,7 @@ def require_geoms(model: mujoco.MjModel, geoms: Sequence[int], where: str = "") 
 
 
 def texture_id(model: mujoco.MjModel, geom: int) -> int:
-    """Return the colour texture of a geom's material, -1 for none."""
+    """Return the index of the colour texture of a geom's material, -1 for none."""
     material = model.geom_matid[geom]
     if material < 0:
         return -1
@@ -127,7 +127,7 @@ def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray
 def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> Description:
     """Return the Mitsuba texture of a geom's reflectance.
 
-    to_uv: map from the shape's texture coordinates to MuJoCo's, (3, 3)
+    to_uv: matrix from the shape's texture coordinates to MuJoCo's, (3, 3); None: they are equal
     """
     color = rgba(model, geom)[:3]
     texture = texture_id(model, geom)

@@ -216,7 +216,7 @@ def height_field(model: mujoco.MjModel, field: int) -> Triangles:
 
 
 def _wall(edge: np.ndarray, base: float) -> Triangles:
-    """Return the wall from an edge (n, 3) of the surface down to the base."""
+    """Return the wall from an edge (n, 3) of the surface down to the base, at z = -`base` [m]."""
     n = len(edge)
     foot = np.column_stack([edge[:, :2], np.full(n, -base)])
     i = np.arange(n - 1)

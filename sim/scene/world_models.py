@@ -71,7 +71,7 @@ class WorldModels:
         self._settings = [ModelSettings(model) for model in self.models]
 
     def get_state(self, world: int) -> bytes:
-        """Return the current settings of a world's model that physics uses."""
+        """Return the current settings of a world's model, see `ModelSettings`."""
         return self._settings[world].to_bytes()
 
     def set_state(self, world: int, held: bytes) -> None:
@@ -129,7 +129,11 @@ class WorldModels:
             getattr(data, where)[address] = drawn[name]
 
     def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
-        """Return the ids of the materials that may be drawn for a geom, by the names of the materials."""
+        """Return the ids of the materials that may be drawn for a geom, by the names of the materials.
+
+        Raises:
+            ValueError: the geom's colour is also varied or replaces that of its materials, or a material is unknown.
+        """
         assert variation is not None
         if geom in self._colors:
             raise ValueError(f"vary: {name} and {self._colors[geom]}: must be one of them; materials have colours")
@@ -177,7 +181,11 @@ def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
 
 
 def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
-    """Return the field of mjData that contains an object's place, and the indices in this field."""
+    """Return the field of mjData that contains an object's place, and the indices in this field.
+
+    Raises:
+        ValueError: the object is not one that can be placed between the ends of this range.
+    """
     assert variation is not None
     spatial = np.ndim(variation.ranges[name][0]) == 1
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, thing)
@@ -200,7 +208,11 @@ def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | 
 
 
 def _specification(given: Any) -> mujoco.MjSpec:
-    """Return a specification that can be compiled again."""
+    """Return a specification that can be compiled again.
+
+    Raises:
+        ValueError: the source is a compiled model.
+    """
     if source.is_compiled(given):
         kind = "an MjModel" if isinstance(given, mujoco.MjModel) else "a compiled file"
         raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled again")

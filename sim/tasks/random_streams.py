@@ -50,7 +50,7 @@ class StreamsByPurpose:
     The seed of a generator depends only on the seed of the batch, the index of the world and the purpose. With a tuple
     of seeds, it depends only on the seed of the world and the purpose.
 
-    seed: one seed for all worlds, None, or a tuple with a seed for each world
+    seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
     n: number of worlds
     kinds: number of kinds of eyes of the agent, as the only entry
     motion: attribute, random numbers for objects that move at random

@@ -132,7 +132,7 @@ class Simulation:
         return self.judge(self.move(actions))
 
     def move(self, actions: np.ndarray) -> dict[int, str]:
-        """Move all bodies, the first half of a step, and return the reason for each world that could not continue.
+        """Move all bodies (the first half of a `step`); return the reason for each world that could not continue.
 
         Raises:
             RuntimeError: there has been no reset yet.

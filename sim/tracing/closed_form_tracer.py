@@ -80,6 +80,7 @@ class ClosedFormSurroundings:
 class ClosedForm:
     """A tracer of rays through one scene of upright walls, a floor and spheres.
 
+    scene, wavelengths: the scene, and the centres of the eye's bands [m]
     name, why: name of the tracer, and the reason for its choice, for reports
     light: level of light, one of `lighting.LEVELS`
     basis: (component, band): contribution of each component to each band

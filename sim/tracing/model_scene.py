@@ -44,7 +44,7 @@ class ModelScene:
     model: the MuJoCo model
     eye: determines the spectral bands
     groups, spectra: see `sim.mirror`
-    medium: water or air, as an attribute in the eye's bands; None: clear air
+    medium: water or air; the attribute is the medium in the eye's bands; None: clear air
     variant: Mitsuba's variant
     geoms: ids of all visible geoms
     looks: appearances of these geoms

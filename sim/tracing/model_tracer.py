@@ -195,7 +195,7 @@ class ModelTracer:
         return [dr.select(hit.seen, spectrum, 0) for spectrum in found]
 
     def _first_hits(self, ray: Array, there: Surroundings, active: Array | None = None) -> _SurfaceHit:
-        """Return the first hits of rays."""
+        """Return the first hits of the rays that are `active` (None: all); the others hit nothing."""
         movers = self._scene.movers
         active = mi.Bool(True) if active is None else active
         ray.wavelengths = self._bands[0]
@@ -231,7 +231,7 @@ class ModelTracer:
     def which(self, ray: Array, there: Surroundings) -> Array:
         """Return the index of the surface that each ray hits first, in `ModelScene.one_shape_per_geom`.
 
-        It is a mover's number, or the number of movers plus the Mitsuba id of a static shape (0 for none).
+        It is a mover's index, or the number of movers plus the Mitsuba id of a static shape (0 for none).
         """
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()

@@ -24,7 +24,7 @@ class Atlas:
     """Reflectances of several textures in one table.
 
     texels: reflectance, (texel, band), of all textures in sequence, row by row
-    places: for each texture, its first texel and its numbers of columns and rows, (texture, 3)
+    places: for each texture, the index of its first texel, and its numbers of columns and rows, (texture, 3)
     to_texels: for each texture, the map (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres are at
         whole numbers
     """

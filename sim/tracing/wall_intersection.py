@@ -223,6 +223,8 @@ def _finished(t: Array, face: Array, through_x: Array, dx: Array, dy: Array) -> 
     """Return the distance [m], the index of the hit face, and its normal.
 
     face: index of the wall's first face. The faces of a wall are in the order -x, +x, -y, +y.
+    through_x: True if the ray enters through a face that is perpendicular to x
+    dx, dy: direction of the ray
     """
     x, y = dr.select(dx > 0, -1.0, 1.0), dr.select(dy > 0, -1.0, 1.0)
     side = dr.select(
@@ -240,6 +242,9 @@ def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
     """Return the coarsest square grid whose lines contain all faces of the walls.
 
     The result is the side of a cell [m], the lower corner (2,), and the numbers of rows and columns.
+
+    Raises:
+        NoClosedForm: there is no such grid, or it has more than CELLS cells.
     """
     faces = [np.unique(np.round(np.concatenate([walls.lower[:, a], walls.upper[:, a]]), 6)) for a in range(2)]
     origin = np.array([f[0] for f in faces])

@@ -94,7 +94,11 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
 
 
 def _rectangle(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
-    """Return the three points of a plane at which Mitsuba's (u, v) is (0, 0), (1, 0) and (0, 1), (3, 3) [m]."""
+    """Return the three points of a plane at which Mitsuba's (u, v) is (0, 0), (1, 0) and (0, 1), (3, 3) [m].
+
+    Raises:
+        NoClosedForm: the plane is tilted, or its sides are not parallel to the axes.
+    """
     corners = np.array([[-1, -1], [1, -1], [-1, 1]]) * shapes.plane_sides(model, geom)
     pose = shapes.pose(data, geom)
     points = corners @ pose[:3, :2].T + pose[:3, 3]

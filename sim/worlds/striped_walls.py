@@ -43,7 +43,7 @@ def merge_walls(walls: np.ndarray, longest: int) -> list[tuple[int, int, int, in
     """Return disjoint straight runs of at most `longest` cells that together cover all wall cells.
 
     Each run is (row, column, number of rows, number of columns). The algorithm is greedy: in the first uncovered cell,
-    a run along the row and a run along the column could start, and it uses the longer one.
+    a run along the row and a run along the column could start, and the algorithm uses the longer one.
     """
     left = walls.copy()
     runs = []

@@ -213,7 +213,7 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return fractions of the area in which a sphere hides left wall, right wall and floor, and the sphere's light.
+        """Return fractions of the area in which a sphere hides the walls (left, right) and the floor, and its light.
 
         The light is multiplied by the fraction of the area that the sphere fills, per component. Parts of the sphere
         that nearer spheres hide are omitted.

@@ -70,7 +70,7 @@ class Piece:
         return area.origin.xy + area.level(a) / self.inverse_distance_at(a)
 
     def patch(self, area: Area, floor: float, top: float) -> Patch:
-        """Return the visible patch of the wall."""
+        """Return the visible patch of the wall; floor, top: heights of the floor and of the wall's top [m]."""
         near = self.inverse_distance_at(self.middle)
         bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
         low = dr.maximum((floor - area.origin.z) * near, bottom)
@@ -114,7 +114,12 @@ class Columns:
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
     def first_faces(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
-        """Return the index of the face that a ray in a horizontal direction (Vector2f) hits."""
+        """Return the index of the face that a ray in the horizontal direction `level` (Vector2f) hits first.
+
+        A ray that hits no wall hits a side of the floor's rim.
+
+        cells: see `Footprints`
+        """
         ray = mi.Ray3f(origin, mi.Vector3f(level.x, level.y, 0))
         t, face, _ = self._footprints.hit(ray, cells)
         return dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
@@ -169,7 +174,7 @@ class Columns:
 
 
 def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
-    """Return the inverse distance of a face's line at a = 0, and its slope along a."""
+    """Return the inverse distance of a face's line at a = 0, and its slope along a [1/m]."""
     side = face.right - face.left
     scale = dr.rcp(_cross(face.left - area.origin.xy, side))
     return _cross(area.ahead, side) * scale, _cross(area.right, side) * scale

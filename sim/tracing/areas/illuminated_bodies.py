@@ -91,7 +91,10 @@ class IlluminatedBodies:
         return self._row((world * len(self._radii) + k) * PLACES + WHOLE, table)
 
     def on_side(self, k: Array, towards: Array, world: Array, table: list[Array]) -> list[Array]:
-        """Return the fraction of each light that reaches the k-th body on its side in a direction (unit vector)."""
+        """Return the fraction of each light that reaches the side of the k-th body in the direction `towards`.
+
+        towards: unit vector from the body's centre
+        """
         # In whole numbers, because with many worlds, float32 is not accurate enough.
         first = (world * len(self._radii) + k) * PLACES
         found = [mi.Float(0) for _ in self._directions]

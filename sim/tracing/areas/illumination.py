@@ -67,8 +67,10 @@ class FrameState:
 class Illumination:
     """Direct and reflected light on patches, without the light that walls and bodies block.
 
-    around: table of the walls around each cell, see `WallShadows`
-    bodies: the light on bodies
+    rays: tracer of rays through the world
+    radii: radii of the bodies [m], (body,)
+    around: attribute, table of the walls around each cell, see `WallShadows`
+    bodies: attribute, the light on bodies
 
     Raises:
         NoClosedForm: WallShadows has no closed form for the shadows.
@@ -116,6 +118,9 @@ class Illumination:
         """Return the reflected light on a patch, per component, corrected for bodies.
 
         Light that bodies hide is subtracted, and light that they reflect is added.
+
+        arriving: reflected light on the patch without bodies, per component
+        itself: index of the body on which the patch lies
         """
 
         def past(k: Array, arriving: list[Array]) -> list[Array]:

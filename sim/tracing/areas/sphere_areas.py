@@ -241,7 +241,7 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 
     The sphere's outline is approximated by a straight line in the slice.
 
-    way: vector to the sphere's centre
+    way: vector from the eye to the sphere's centre
     """
     seen, sides = slice_.seen, (slice_.along, slice_.across)
     length, moment = dr.norm(seen), dr.cross(way, seen)
@@ -280,7 +280,12 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
-    """Return the patch around the point at which a ray in the direction `seen` hits the sphere."""
+    """Return the patch around the point at which a ray in the direction `seen` hits the sphere.
+
+    way, tangent: see `_chord`
+    along, across: sides of the patch on the area's plane
+    origin, centre: the pupil, and the centre of the sphere
+    """
     length = dr.squared_norm(seen)
     ahead = dr.dot(way, seen)
     t = (ahead - dr.sqrt(dr.maximum(ahead * ahead - length * tangent, 0))) / length

@@ -58,7 +58,7 @@ class Stripes:
     """Averages of textures along one axis.
 
     reflectance: (texel, component)
-    places: first texel and number of columns of each texture, (texture, 2)
+    places: index of the first texel, and number of columns of each texture, (texture, 2)
 
     tables: the tables in the form in which the kernel receives them
     """
