@@ -167,7 +167,11 @@ class CameraRays:
 
 
 def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
-    """Return the first hits of rays that pass through the inner sides of closed shapes."""
+    """Return the first hits of rays that pass through the inner sides of closed shapes.
+
+    si: first hits of the rays, including inner sides
+    closed: see `CameraInputs`
+    """
 
     def leaving(si: Array, ray: Array, turn: Array) -> Array:
         out = si.is_valid() & (dr.dot(si.n, ray.d) > 0) & (turn < NESTED)

@@ -57,7 +57,7 @@ class Viewpoint:
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | PoseSnapshot, camera: str | int | Viewpoint) -> Viewpoint:
-    """Return the current viewpoint of a camera of the model.
+    """Return the current viewpoint of a camera of the model; a `Viewpoint` is returned unchanged.
 
     Raises:
         ValueError: the camera is unknown, or its projection is not a plain perspective.

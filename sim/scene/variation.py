@@ -183,8 +183,10 @@ def _check_names(name: str, given: Any) -> None:
 def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
     """Return the transmission (band,) of a filter that changes the colour temperature of daylight to `kelvins` [K].
 
-    It is the ratio of two Planck spectra, scaled to preserve the illuminance: that of a black body at `kelvins`, and
-    that of a black body at the temperature `DAYLIGHT`.
+    It is the Planck spectrum at `kelvins`, divided by the Planck spectrum at the temperature `DAYLIGHT`. The ratio is
+    scaled to preserve the illuminance.
+
+    wavelengths: centres of the bands [m], (band,)
     """
     seen = daylight(_VISIBLE) * cie_1931(_VISIBLE)[:, 1]
     scale = seen.sum() / (seen * _ratio(kelvins, _VISIBLE)).sum()
@@ -193,7 +195,7 @@ def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
-    """Return the ratio of the Planck spectra at `kelvins` and at DAYLIGHT, (band,)."""
+    """Return the ratio of the Planck spectra at the temperatures `kelvins` and DAYLIGHT [K], at wavelengths [m]."""
     x = h * c / (k * np.asarray(wavelengths))
     found: np.ndarray = np.expm1(x / DAYLIGHT) / np.expm1(x / kelvins)
     return found

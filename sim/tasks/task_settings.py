@@ -34,7 +34,7 @@ class TaskSettings:
     mounts: places of the eyes. If an animal has several kinds of eyes, `eye` and `mounts` are dictionaries, such as
         {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of "eyes".
     fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
-        from a few scenes of the task's episodes. For several kinds of eyes, a common value or a dictionary.
+        from a few scenes of the task's episodes. Several kinds of eyes have a common value or a dictionary.
     substeps: physics steps per action
     episode_steps: number of actions after which an episode is truncated
     spectra: spectra of materials and lights, by name, which replace their colours
@@ -83,7 +83,7 @@ class TaskSettings:
     mode: str = "training"
 
     def __init_subclass__(cls) -> None:
-        """Support subclasses that use the old name of the method `proprioception`, which is `feels`."""
+        """Accept a subclass that defines the method `proprioception` under its old name `feels`, with a warning."""
         super().__init_subclass__()
         if "feels" in vars(cls) and "proprioception" not in vars(cls):
             warn_renamed(f"{cls.__name__}.feels", "proprioception")

@@ -27,7 +27,7 @@ PARALLEL = 1e-9
 class Primitive:
     """Functions for one kind of primitive, which all receive MuJoCo's sizes (`size`).
 
-    hit: (origin, direction, size) -> distance
+    hit: (origin, direction, size) -> distance; infinite for a miss
     normal: (point, size) -> outward normal, not normalised
     """
 

@@ -127,7 +127,10 @@ class Baking:
         return light.reshape(-1, light.shape[-1])
 
     def _on_body(self, radius: float, height: float) -> np.ndarray:
-        """Return harmonics (place, FOURS * 4, component) of the light on a body's surface, ordered by cell, y and x."""
+        """Return harmonics (place, FOURS * 4, component) of the light on a body's surface, ordered by cell, y and x.
+
+        radius, height: radius of the body, and height of its centre [m]
+        """
         margin = self._nodes.body_margin(radius)
         offsets = np.linspace(margin, self._nodes.grid.side - margin, self._nodes.places)
         y, x = (a.ravel() for a in np.meshgrid(offsets, offsets, indexing="ij"))
