@@ -29,10 +29,11 @@ class Advanced:
 class Animals:
     """All agents of a batch of worlds, and their observations.
 
-    renderers: for each agent, the renderers of its eyes, or None if its eyes are not used.
-    memory: number of frames in the observations of learning agents.
-    learners: senses of the learning agents.
-    seeing: senses of all agents whose eyes are used, learners first.
+    simulation: the worlds
+    renderers: for each agent, the renderers of its eyes, or None if its eyes are not used
+    memory: number of frames in the observations of learning agents
+    learners: attribute, senses of the learning agents
+    seeing: attribute, senses of all agents whose eyes are used, learners first
     """
 
     def __init__(self, simulation: Simulation, renderers: Sequence[AgentRenderers | None], memory: int) -> None:

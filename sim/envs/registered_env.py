@@ -55,7 +55,11 @@ def _begun(task: str | Task | type[Task]) -> str | Task:
 
 
 def _steps(asked: int, options: dict[str, Any]) -> int:
-    """Return the number of actions in an episode: the requested number, but at most that of the course or family."""
+    """Return the number of actions in an episode: the requested number, but at most that of the course or family.
+
+    Raises:
+        ValueError: `options` contains `episode_steps`, the number is out of range, or the course is unknown.
+    """
     if "episode_steps" in options:
         raise ValueError(
             f"episode_steps = {options['episode_steps']!r}: must be left out if Gymnasium makes the environment; "

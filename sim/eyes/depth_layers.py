@@ -48,7 +48,7 @@ class DepthLayers:
         return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
     def shares(self, inverse_distance: Array) -> list[Array]:
-        """Return the fraction of the light that each layer receives: one Dr.Jit array per layer, which sum to 1.
+        """Return the fraction of the light that each layer receives: one Dr.Jit array per layer. The sum is 1.
 
         A single layer receives all light; its fraction is the number 1.
 

@@ -229,8 +229,8 @@ class FieldSampling:
 def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[float, float]:
     """Return the numbers of rows and columns of areas per receptor.
 
-    One or more areas per receptor are rounded to a whole number. If `per_receptor` is below 1, several receptors share
-    an area, so there is less than one column per receptor, and with `in_rows` also less than one row.
+    A `per_receptor` of 1 or more is rounded to a whole number. If it is below 1, several receptors share an area, so
+    there is less than one column per receptor, and with `in_rows` also less than one row. aspect: see `parts_of`
     """
     if per_receptor >= 1:
         return parts_of(round(per_receptor), in_rows, aspect)

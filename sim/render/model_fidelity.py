@@ -104,6 +104,9 @@ def choose_model_fidelity(
 class ModelStages:
     """Levels of fidelity for a model, tried at moments of its worlds; see `Stages`.
 
+    scene: the model and its eyes
+    moments: poses in which signals are compared
+    allowed: allowed error of a signal (root mean square)
     light: see `choose_model_fidelity`
     """
 

@@ -52,7 +52,7 @@ def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarr
 def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> np.ndarray:
     """Return the viewing direction of a receptor's centre, (3,); row 0 is at the top.
 
-    axis: optical axis of the eye, (3,)
+    axis: optical axis of the eye, a horizontal unit vector (3,)
     """
     height, width = eyes.resolution
     right, up = np.array([axis[1], -axis[0], 0]), np.array([0, 0, 1])

@@ -284,7 +284,7 @@ def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
 
 
 def _checked(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """Return the data, after checking that they belong to this model and that all their poses are finite."""
+    """Return the data if they belong to this model and all their poses are finite; otherwise raise a ValueError."""
     if data.geom_xpos.shape != (model.ngeom, 3) or data.xpos.shape != (model.nbody, 3):
         raise ValueError(
             f"mirror: data has {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies, but the model has "

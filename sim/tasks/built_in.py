@@ -168,7 +168,12 @@ class AgentTask(BatchTask):
         return [{"position": (x, y), "heading": heading} for (x, y), heading in places]
 
     def weighted(self, worlds: SlidingAgents, events: AgentEvents, failed: Mapping[int, str]) -> Outcome:
-        """Return the outcome of an action that caused these events, with the weighted terms of the reward."""
+        """Return the outcome of an action that caused these events, with the weighted terms of the reward.
+
+        The goals and adversaries that were reached are counted, and `put_elsewhere` moves reached objects.
+
+        failed: the worlds that could not continue, each with the reason; their events are ignored
+        """
         if failed:
             well = np.ones(worlds.n, bool)
             well[list(failed)] = False

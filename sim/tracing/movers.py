@@ -81,7 +81,7 @@ class Movers:
 
     looks, geoms: appearance and geom id of each mover
     atlas: the movers that are meshes
-    lifts: distances by which surfaces are moved outwards [m], by geom
+    lifts, bsdf: distances by which surfaces are moved outwards [m], by geom; any BSDF, for the atlas
     ends: index of the first mover of each kind, for the kernel
     """
 

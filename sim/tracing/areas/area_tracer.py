@@ -213,10 +213,10 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return fractions of the area in which a sphere hides the walls (left, right) and the floor, and its light.
+        """Return fractions of the area in which a sphere hides each wall (left, right) and the floor, then its light.
 
-        The light is multiplied by the fraction of the area that the sphere fills, per component. Parts of the sphere
-        that nearer spheres hide are omitted.
+        The light of the sphere is multiplied by the fraction of the area that the sphere fills, per component. Parts of
+        the sphere that nearer spheres hide are omitted.
         """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)

@@ -50,7 +50,7 @@ class AreaTables:
 
 @dataclass(frozen=True)
 class FrameState:
-    """Inputs that change between calls.
+    """Inputs of area sampling for one frame.
 
     bodies: centres of the moving spheres; the agent is the last one
     inputs: tables that are the same in all worlds
