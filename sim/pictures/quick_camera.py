@@ -81,7 +81,8 @@ class QuickCamera:
         camera: name or id of a camera of the model, or a Viewpoint
 
         Raises:
-            ValueError: the camera is unknown, the image has less than one pixel, or `Mirror.sync` refuses the data.
+            ValueError: the camera is unknown or no plain perspective, the image has less than one pixel, or
+                `Mirror.sync` refuses the data.
         """
         return self.render(data, camera, width, height).picture
 

@@ -198,7 +198,7 @@ class FidelityTrials:
         trial: samples of each eye, and their weights
         depth: layers among which light is divided
         light: level of light
-        views: None: the views of the trials
+        views: views of the signals; None: the views of the trials
         most: largest number of rays in all views together
         """
         rays = len(trial.directions)

@@ -166,7 +166,7 @@ class RayKernel:
 def launched(
     frozen: Any, scenes: Any, frame: Callable[[], Frame], inputs: KernelInputs, variant_name: str
 ) -> Callable[[], np.ndarray]:
-    """Launch a frozen kernel, and return a function that waits for its output."""
+    """Launch a frozen kernel in this variant of Mitsuba, and return a function that waits for its output."""
     with variant(variant_name), GarbageKept():
         found = frozen(scenes, frame(), inputs)
     return lambda: _read(found)
