@@ -78,7 +78,7 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def eyes(self) -> Any:
-        """`sim.Eyes` of a built-in task's agent; None if a user task places the eyes."""
+        """`sim.Eyes` of a built-in task's agent, or several kinds by name; None if a user task places the eyes."""
         return getattr(self.simulation.task, "eyes", None)
 
     @property

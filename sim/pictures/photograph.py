@@ -133,7 +133,12 @@ def _checked(photograph: Any) -> np.ndarray:
 
 
 def _checked_depth(depth: Any, shape: tuple[int, ...], animal: str) -> np.ndarray:
-    """Return the distances [m] of all pixels, (y, x)."""
+    """Return the distances [m] of all pixels, (y, x), from the argument `depth` of `see_photograph`.
+
+    Raises:
+        ValueError: the eye is a compound eye and `depth` is not None, or `depth` has another shape, or a distance is
+            not positive.
+    """
     if depth is None:
         return np.full(shape, math.inf)
     if animal in animals.COMPOUND:

@@ -103,7 +103,8 @@ class EyePlaces:
         """Return the body that the eyes are fixed to, with the eyes' positions on it.
 
         Raises:
-            NotLevelError: the eyes are on several bodies, or on a body that may tilt or change its height.
+            NotLevelError: the eyes are on several bodies, on a body that may tilt or change its height, or on a camera
+                that follows something.
         """
         bodies = {self._body_of(kind, index) for kind, index in self._things}
         if len(bodies) > 1:

@@ -196,7 +196,7 @@ class Cells:
         return (column >= 0) & (column < self._columns) & (row >= 0) & (row < self._rows)
 
     def _place(self, point: Array) -> tuple[Array, Array]:
-        """Return the coordinates of a point in cells."""
+        """Return x and y of a point relative to the grid's lower corner, in sides of a cell."""
         return tuple((point[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
 
 
