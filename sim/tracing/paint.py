@@ -39,6 +39,7 @@ class Paint:
 
     geoms: ids of the painted geoms
     movers: geom id of each mover
+    wavelengths: centres of the bands [m], (band,)
     glow: True if any of the painted geoms glows
     painted: index in `geoms` of each mover's geom, or len(geoms) for geoms without paint, for the kernel
     """

@@ -147,11 +147,12 @@ class Illumination:
     def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: FrameState) -> list[Array]:
         """Return the light that a body sends to a patch, minus the light that the body hides from the patch.
 
-        Both use the form factor of a sphere.
+        Both use the form factor of a sphere. Light that the patch lacks because of the body's shadows on the floor is
+        also subtracted, see `_shadow`.
 
         If the patch's horizon crosses the sphere, Snyder's (1996) form factor applies. The hidden light is the light
         that arrives on the body's far side, as seen from the patch. Its radiance follows from the irradiance of that
-        side. At most the light that arrives at the patch is subtracted.
+        side. The hidden light is at most the light that arrives at the patch (`arriving`, per component).
         """
         way, radius = select(k, now.bodies) - patch.point, select(k, self._radii)
         distance = dr.maximum(dr.norm(way), radius)

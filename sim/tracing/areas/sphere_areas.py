@@ -32,7 +32,7 @@ NEARLY_OPEN = 1e-4  # chosen: outlines whose length exceeds about 100 times thei
 class SphereTexture:
     """A texture that changes along one axis.
 
-    texture: its place in the tables
+    texture: place of the texture in the tables
     to_column: map column = to_column @ (u, v, 1)
     frame: rotation from the sphere's axes to the world's, (3, 3)
     """
