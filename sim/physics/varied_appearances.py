@@ -42,7 +42,7 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
     """Return the varied appearances; None if only light varies.
 
     Raises:
-        ValueError: the model has no such object, or the object cannot vary.
+        ValueError: the model has no such object, the object cannot vary, or a starting position varies.
     """
     if starts := variation.of_things(START):
         raise ValueError(

@@ -167,7 +167,7 @@ class FidelityTrials:
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Return root mean square differences to the signals with the finest layers, for the same rays.
 
-        The layers of each number in `counts` must be among the finest layers.
+        For each number n in `counts`, the n layers must be among the finest layers.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.

@@ -175,6 +175,9 @@ def _check_layouts(task: str, layouts: Any, alone: bool) -> None:
     """Check the type of `layouts`, and that the task has layouts.
 
     alone: True if no other argument, such as `mazes`, defines the layouts; this is required
+
+    Raises:
+        ValueError: a check fails, or `alone` is False.
     """
     of_kind("build_world: layouts", layouts, LayoutSet, "sim.LayoutFamily(seed=0).training")
     if task not in TASKS_WITH_LAYOUTS:
