@@ -270,7 +270,7 @@ class ModelTracer:
         return found
 
     def _emitted(self, hit: _SurfaceHit, there: Surroundings) -> list[Array]:
-        """Return the radiance of the sky for rays without a hit, and of glowing geoms."""
+        """Return the radiance of the sky for rays without a hit, and of glowing geoms, as spectra of LANES bands."""
         found = [mi.Spectrum(0) for _ in self._bands]
         if self._scene.has_sky:
             nothing = hit.active & ~hit.seen
