@@ -36,7 +36,8 @@ def read_photograph(path: str | Path) -> np.ndarray:
     """Read an image file as sRGB values (y, x, 3) in [0, 1], rotated according to its EXIF orientation.
 
     Raises:
-        ValueError: the file is no image, is damaged or too large, has one channel, or has transparent pixels.
+        ValueError: the file is no image, is damaged or too large, has transparency, or does not have three channels of
+            8 bits.
         OSError: the file cannot be read.
     """
     from PIL import Image, ImageOps, UnidentifiedImageError

@@ -59,8 +59,7 @@ class Stripes:
 
     reflectance: (texel, component)
     places: index of the first texel, and number of columns of each texture, (texture, 2)
-
-    tables: the tables in the form in which the kernel receives them
+    tables: attribute, the tables in the form in which the kernel receives them
     """
 
     def __init__(self, reflectance: np.ndarray, places: np.ndarray) -> None:
