@@ -23,7 +23,7 @@ def digest(path: Path) -> str | None:
     """Return the SHA-256 of a file; None if the file is missing.
 
     Raises:
-        OSError: the file cannot be read, or is not a regular file.
+        OSError: the file exists but cannot be read, or is not a regular file.
     """
     try:
         return hashlib.sha256(read(path)).hexdigest()
@@ -44,9 +44,10 @@ def list_checksums(folder: Path, files: Iterable[Path]) -> None:
 
 
 def harmed(folder: Path) -> str | None:
-    """Return a message about EXR files whose content differs from their checksums; None if there are none.
+    """Return a message about EXR files in a folder whose content differs from their checksums; None if there are none.
 
-    Files that were deleted are not reported, because they can be exported again.
+    Deleted files are not reported, because they can be exported again. If a file or the list cannot be read, or if the
+    files are larger than MOST_BYTES together, the message says so instead.
     """
     try:
         known = {match[2]: match[1] for line in _lines(folder) if (match := ENTRY.fullmatch(line))}
@@ -63,7 +64,7 @@ def harmed(folder: Path) -> str | None:
 
 
 def _lines(folder: Path) -> list[str]:
-    """Return the lines of the list of checksums; [] without a list."""
+    """Return the lines of a folder's list of checksums; [] if the folder has no list."""
     try:
         return read(folder / LISTED, LARGEST_LIST).decode(errors="replace").splitlines()
     except FileNotFoundError:

@@ -5,7 +5,7 @@ versions.json      versions of the software at each start of the run
 candidates.jsonl   the record: one line per evaluated candidate and rung, in order of completion
 policies/          trained policies
 trainings/         checkpoints of training runs that may still continue with their next rung
-lock               lock that the process working on the run holds
+lock               file that the process working on the run has locked
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PRODUCTS = (EXR, "tensorboard")  # folders of exported files
 
 @dataclass
 class Run:
-    """A run directory: its config, its record, and the paths of its other files."""
+    """A run directory: its config, its record of evaluated candidates, and the paths of its other files."""
 
     path: Path
     config: RunConfig
@@ -57,7 +57,7 @@ class Run:
     def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Self:
         """Create a run in a directory that does not exist yet, or is empty.
 
-        origin: "RUN:ID", the animal from which the run starts; None without one
+        origin: "RUN:ID", the animal whose genes are the start values; None if there is no such animal
 
         Raises:
             RunError: the directory is not empty, or cannot be written.
@@ -84,14 +84,16 @@ class Run:
         """Open a run directory.
 
         task: "FILE.py:CLASS", if the run has a user task. The code of a user task is executed only if the task is named
-            here. The code is needed to continue the run and to let its animals play.
+            here. It is needed to continue the run and to play episodes of its animals. None: open the run without code
         before_damage: True to use only the lines of the record before the first damaged line, if there is one
 
         Raises:
-            RunError: the directory contains no run, or a line of its record is invalid; the message names the file and
-                the line.
-            ConfigError: the config is invalid, the named task differs from the run's, or its file has changed.
-            StrangeFileError: one of the run's files or folders is a link, FIFO or device.
+            RunError: the directory does not exist or contains no run, or the record cannot be read or has an invalid
+                line; the message names the file and the line.
+            ConfigError: the config is invalid, the named task differs from the run's or cannot be read, or its file has
+                changed.
+            StrangeFileError: one of the run's files or folders is a link, FIFO or device, or config.toml is too large.
+            OSError: config.toml cannot be read.
         """
         path = Path(path)
         if not path.is_dir():
@@ -107,10 +109,11 @@ class Run:
 
     @classmethod
     def create_next(cls, config: RunConfig, preset: str, origin: str | None = None) -> Self:
-        """Create a run in the next free directory, even if other processes create runs at the same time.
+        """Create a run in the next free directory runs/TASK-PRESET-N, even if other processes create runs meanwhile.
 
         Raises:
             RunError: the directory cannot be written.
+            LockedError: another process is creating a run there.
         """
         path, tried = next_directory(config.task_name, preset), None
         while path != tried:  # a broken link seems to be free, but cannot be created: stop
@@ -124,10 +127,12 @@ class Run:
         return cls.create(path, config, origin)
 
     def require_present_light(self) -> None:
-        """Check that the run has a format for which light is computed as in its earlier training.
+        """Check that the run can be continued: this version must compute light like the version that started the run.
 
         Raises:
-            RunError: the format is older; the message names the version that can continue it.
+            RunError: the format of config.toml is too old; the message names the version that can continue the run.
+            ConfigError: config.toml is invalid.
+            OSError: config.toml cannot be read.
         """
         number = format_of(parsed_toml(read(self.path / CONFIG, LARGEST_TOML), str(self.path / CONFIG)).tree)
         if number < OLDEST_CONTINUED:
@@ -139,8 +144,7 @@ class Run:
     def lock(self) -> RunLock:
         """Return the lock of this run, a context manager. A process must hold it to write to the run.
 
-        Raises:
-            LockedError: another process holds the lock.
+        On entry, the context manager raises LockedError if another process holds the lock.
         """
         self._lock = RunLock(self.path)
         return self._lock
@@ -148,11 +152,13 @@ class Run:
     def repair(self) -> None:
         """Read the record again, and remove an unfinished last line and incomplete files.
 
-        If the run was opened with `before_damage`, the lines from the first damaged one on are also removed. A copy of
-        the damaged record is kept. The caller must hold the lock.
+        If the run was opened with `before_damage`, the first damaged line and all lines after it are also removed, and
+        a copy of the damaged record is kept. The caller must hold the lock.
 
         Raises:
-            RunError: the record is damaged or cannot be written, or config.toml has changed since the run was opened.
+            RunError: the record is damaged or cannot be written, config.toml cannot be read, or its settings have
+                changed since the run was opened.
+            ConfigError: config.toml is invalid.
         """
         try:
             text = read(self.path / CONFIG, LARGEST_TOML)
@@ -180,11 +186,11 @@ class Run:
         self.record.append(candidate)
 
     def policy_path(self, candidate_id: int) -> Path:
-        """Return the path of a candidate's trained policy."""
+        """Return the path of a candidate's trained policy. The file need not exist."""
         return self.path / POLICIES / f"{candidate_id:06d}.safetensors"
 
     def checkpoint_path(self, candidate_id: int, rung: int) -> Path:
-        """Return the path of a candidate's checkpoint at the end of a rung."""
+        """Return the path of a candidate's checkpoint at the end of a rung. The file need not exist."""
         return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
@@ -223,7 +229,7 @@ class Run:
         """Return the candidate with this id, or the best candidate if the id is None.
 
         Raises:
-            RunError: the candidate has not been evaluated, or no candidate has succeeded.
+            RunError: no evaluated candidate has this id, or, for None, no candidate has succeeded.
         """
         if candidate_id is None:
             if self.best is None:
@@ -235,7 +241,7 @@ class Run:
         raise RunError(f"{self.path}: there is no candidate {candidate_id}; {len(self.candidates)} have been evaluated")
 
     def generation(self, number: int) -> list[Candidate]:
-        """Return the evaluated candidates of one generation."""
+        """Return the evaluated candidates of one generation, in the order of their ids."""
         ids = generation_ids(number, self.config.search.population)
         first, end = (bisect_left(self.candidates, one, key=lambda c: c.id) for one in (ids.start, ids.stop))
         return list(self.candidates[first:end])
@@ -250,7 +256,7 @@ class Run:
         return self.record.lines.get((candidate_id, rung))
 
     def steps_of(self, candidate_id: int) -> int:
-        """Return the number of training steps of a candidate on record; 0 if it has not been evaluated."""
+        """Return the number of training steps of a candidate after all recorded rungs; 0 if there are none."""
         steps = rung = 0
         while (line := self.on_record(candidate_id, rung)) is not None:
             steps, rung = max(steps, line.steps), rung + 1
@@ -286,7 +292,7 @@ def _require_plain(path: Path) -> None:
 
 
 def next_directory(task: str, preset: str, base: Path = Path("runs")) -> Path:
-    """Return runs/<task>-<preset>-<n> with the first free number n."""
+    """Return the path runs/<task>-<preset>-<n> with the smallest n, from 1, for which nothing exists."""
     n = 1
     while (base / f"{task}-{preset}-{n}").exists():
         n += 1

@@ -18,10 +18,10 @@ FOLDER = "demo"  # run directory within evolve/
 
 
 def copy_shipped_run(directory: Path) -> Run:
-    """Copy the shipped run to a directory, unless it is already there, and return it.
+    """Copy the files of the shipped run that a directory lacks, and return the run in this directory.
 
     Raises:
-        RunError: the directory contains other files.
+        RunError: the directory contains a file of the run with another content, or only other files.
         OSError: the directory cannot be written.
     """
     files = dict(_files(resources.files("evolve") / FOLDER))
