@@ -9,7 +9,12 @@ __all__ = ["Place", "generation_ids"]
 
 @dataclass(frozen=True)
 class Place:
-    """Place of a candidate in a search: number `index` of `generation`, and `id` in the run. All start from 0."""
+    """Place of a candidate in a search. All numbers count from 0.
+
+    id: number of the candidate in the run
+    generation: number of its generation
+    index: number of the candidate in its generation
+    """
 
     id: int
     generation: int

@@ -59,11 +59,18 @@ class RunConfig:
     """All settings that determine the outcome of a run, and the number of its processes.
 
     task: one of TASKS, or FILE.py:CLASS of a user task
+    seed: seed of search, training and evaluation
+    workers: number of worker processes; 0: one per core
+    task_sha256: SHA-256 of a user task's file; "" for a built-in task
+    genome: use of each gene of the animals, by name
     code: code of the user task, if the user has named the task in the command or call; code that only a file names is
         never executed
 
+    The other fields are sections of settings; the classes of the sections describe them.
+
     Raises:
-        ConfigError: settings contradict each other.
+        ConfigError: a value is invalid or out of range, settings contradict each other, or a changed setting has no
+            effect. The message is one line.
     """
 
     task: str
@@ -116,6 +123,7 @@ class RunConfig:
             raise ConfigError(message, *keys)
 
     def _check_task(self) -> None:
+        """Check the genes and settings that only some tasks have, and the frames of receptors with memory."""
         for name in OPTIONAL_GENES:
             if name in self.genome and not self.card.has_gene(name):
                 raise ConfigError(
@@ -204,7 +212,7 @@ class RunConfig:
             )
 
     def __repr__(self) -> str:
-        """Return a short description, because the run has some 150 settings."""
+        """Return a short description, because there are some 150 settings."""
         search, steps = self.search, self.learning.total_steps
         plan = f"{search.generations} generations x {search.population} candidates x {steps:,} steps"
         return f"<RunConfig {self.task}, seed {self.seed}, {plan}>"
@@ -233,7 +241,8 @@ class RunConfig:
         """Return this configuration with the code of its task, named as "FILE.py:CLASS".
 
         Raises:
-            ConfigError: the run has no user task, the class has another name, or the file has changed.
+            ConfigError: the run has no user task, the class has another name, or the file cannot be read or has
+                changed.
         """
         return replace(self, code=self.choice.read(named))
 

@@ -53,7 +53,7 @@ def harmed(folder: Path) -> str | None:
         known = {match[2]: match[1] for line in _lines(folder) if (match := ENTRY.fullmatch(line))}
         files = {name: path for name in known if (path := folder / name).exists()}
         if (size := sum(path.stat().st_size for path in files.values())) > MOST_BYTES:
-            return f"{folder}: EXR files have {size:,} bytes: checksums of at most {MOST_BYTES:,} are compared"
+            return f"{folder}: EXR files have {size:,} bytes: checksums are compared only up to {MOST_BYTES:,} bytes"
         wrong = [name for name, path in files.items() if digest(path) not in (None, known[name])]
     except OSError as error:
         return f"{error.filename}: cannot be read: {error.strerror}"

@@ -202,7 +202,7 @@ def _require_agreement(candidate: Candidate, config: RunConfig, dimension: int, 
     """
     population, rungs = config.search.population, config.search.rungs
     if (candidate.id, candidate.rung) in earlier:
-        raise ValueError(f"candidate {candidate.id} is there twice")
+        raise ValueError(f"candidate {candidate.id} occurs twice")
     if not 0 <= candidate.rung < rungs:
         raise ValueError(f"rung = {candidate.rung}: must be at least 0 and below search.rungs = {rungs}")
     if candidate.rung and (candidate.id, candidate.rung - 1) not in earlier:

@@ -177,7 +177,7 @@ def test_checksums_of_too_much_data_or_of_unreadable_files_are_not_compared(tmp_
     monkeypatch.setattr(checksums, "MOST_BYTES", 300)
     assert harmed(tmp_path) is None
     monkeypatch.setattr(checksums, "MOST_BYTES", 299)
-    assert harmed(tmp_path) == f"{tmp_path}: EXR files have 300 bytes: checksums of at most 299 are compared"
+    assert harmed(tmp_path) == f"{tmp_path}: EXR files have 300 bytes: checksums are compared only up to 299 bytes"
     paths[0].unlink()
     assert harmed(tmp_path) is None, "deleted files can be exported again"
     paths[0].mkdir()

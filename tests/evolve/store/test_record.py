@@ -97,7 +97,7 @@ DAMAGE = {
     "wrong phenotype": (damaged(lambda r: r["phenotype"].pop("n_eyes")), "n_eyes"),
     "wrong genome": (damaged(lambda r: r["genome"].pop()), f"{DIMENSION} genes are open"),
     "wrong place": (damaged(lambda r: r.update(index=3)), "can't be number 3 of generation 0"),
-    "twice": (candidate(0).to_line(), "candidate 0 is there twice"),
+    "twice": (candidate(0).to_line(), "candidate 0 occurs twice"),
 }
 
 
