@@ -37,7 +37,9 @@ def whole_number(value: Any, name: str, low: int, high: int) -> int:
 
 
 def real(value: Any, name: str, valid: Interval) -> float:
-    """Return `value` as a float if it is a number within the range; rounding errors at its ends are allowed.
+    """Return `value` as a float if it is a number within the range. A float may exceed the range by rounding errors.
+
+    valid: the range; its ends belong to it, even if `open_low` is True
 
     Raises:
         ValueError: the value has another type or lies outside the range.
