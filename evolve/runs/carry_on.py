@@ -1,7 +1,4 @@
-"""Evaluation of all candidates that are missing in a run.
-
-An executor evaluates them, and watchers show the progress.
-"""
+"""Evaluation of the candidates that are missing in a run. An executor evaluates them; watchers show the progress."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ class Workers(Executor, Protocol):
 
 
 def local_workers(config: RunConfig) -> LocalExecutor:
-    """Return an executor with processes on this machine; the setting `workers` is the number of processes."""
+    """Return an executor with processes on this machine. Their number is the setting `workers`, or the cores for 0."""
     return LocalExecutor(evaluate_candidate, config.workers, prepare_device)
 
 
@@ -46,8 +43,8 @@ def carry_on(
     workers: function of the run's settings that returns the executor
 
     Raises:
-        RunError: the record cannot be written, or this search proposes other candidates than those on record.
-        ExecutorError: no candidate can be evaluated.
+        RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
+        ExecutorError: no worker can evaluate candidates.
     """
     with workers(run.config) as executor, watched(run, executor.count) as watcher:
         evolve(run, executor, watcher)

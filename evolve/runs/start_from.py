@@ -24,10 +24,12 @@ def starts_from(text: str) -> Source:
     Some genes are relative to settings: a relief's heights are fractions of `eye.relief_height`, for example. With
     other settings, the same genes would describe another lens. These settings are therefore returned as well.
 
-    text: "RUN:ID", a run directory and a candidate; "RUN" stands for the best candidate of the run
+    text: "RUN:ID", a run directory and the id of a candidate; "RUN" stands for the best candidate of the run
 
     Raises:
-        RunError: the run or the candidate does not exist, or no candidate has succeeded.
+        RunError: the run or the candidate does not exist, no candidate has succeeded, or the record is damaged.
+        ConfigError: the config of the run is invalid.
+        OSError: config.toml cannot be read, or a file of the run is a link or FIFO.
     """
     path, candidate_id = _parsed(text)
     run = Run.open(path)
