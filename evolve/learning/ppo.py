@@ -137,7 +137,7 @@ class AdaptingPPO(PPO):
         _require_finite("loss", np.asarray(self.logger.name_to_value["train/value_loss"]), self.num_timesteps)
         for name, parameter in self.policy.named_parameters():
             _require_finite(f"policy's {name}", parameter.detach().numpy(), self.num_timesteps)
-        # The update above needs the normalisation of the rollout. Successive frames are similar, so an eighth is enough.
+        # The update above needed the normalisation of the rollout. Successive frames are similar: an eighth is enough.
         self._adapt(self.rollout_buffer.new_frames[:, ::8], self.rollout_buffer.beside)
         self._adapt_unit()
 

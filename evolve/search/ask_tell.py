@@ -29,6 +29,13 @@ def ask_tell(
     """Yield the genomes of each generation, and their fitness, which the search maximises.
 
     Each genome is (dimension,), with coordinates in [0, 1].
+
+    fitness: function that returns the finite fitness of a genome
+    start: genome from which the search starts, (dimension,)
+    search: settings; the optimizer "mutation" is not supported, because it needs genes
+
+    Raises:
+        ConfigError: the optimizer is unknown, or cannot be used here.
     """
     optimizer = build_optimizer(Space(genes=(), start=start, seed=(seed,)), search)
     for generation in range(search.generations):

@@ -39,10 +39,12 @@ class SameSearch:
         self._same_libraries = all(self._then.get(name) == self._now[name] for name in LIBRARIES)
 
     def require(self, proposal: Proposal | None, candidate: Candidate) -> None:
-        """Check that a proposal equals the candidate on record.
+        """Check that a proposal agrees with the candidate on record.
+
+        proposal: proposal of the search; None if it proposes no candidate with this id
 
         Raises:
-            RunError: the search proposes a different candidate.
+            RunError: the search proposes a different candidate, or none.
         """
         allowed = TAKEN_FOR_ANOTHERS if self._same_libraries and candidate.generation > 0 else ROUNDING
         if proposal is not None and np.abs(proposal.vector - candidate.vector).max() <= allowed:

@@ -1,8 +1,8 @@
 """The search, which proposes candidates and receives their fitness.
 
-A gene may begin to vary only in a later generation (its setting `opens_at`). The generations between two such changes
-are a phase. The state of the search follows from the seed and from the fitness values received so far. A run is
-continued by repeating all proposals and reporting all recorded fitness values again; no state is stored.
+A gene may begin to vary only in a later generation (its setting `opens_at`). A phase consists of the generations
+between two such changes. The state of the search follows from the settings, the seed and the fitness values received so
+far. A run is continued by repeating all proposals and reporting all recorded fitness values again; no state is stored.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Proposal:
     """A proposed genome.
 
     place: place of the candidate in the search
-    genome: (dimension,) in [0, 1]
-    parents: ids of its parents. At the start of a later phase, the new optimizer has no parents yet; the parent is then
-        the candidate from which the phase started.
+    genome: coordinates of the open genes in [0, 1]
+    parents: ids of the candidates from which the optimizer derived the genome. A new optimizer at the start of a later
+        phase has no parents yet; the parent is then the candidate from which the phase started.
     """
 
     place: Place
@@ -45,6 +45,7 @@ class Proposal:
 
     @property
     def vector(self) -> NDArray[np.float64]:
+        """The genome as an array, (gene,)."""
         return np.array(self.genome)
 
 
@@ -56,7 +57,7 @@ class Search:
     proposed.
 
     Raises:
-        ConfigError: the optimizer is unknown.
+        ConfigError: the optimizer is unknown, or cannot be used here.
     """
 
     def __init__(self, config: RunConfig) -> None:
