@@ -25,7 +25,13 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one subcommand and return the exit code."""
+    """Run one subcommand and return the exit code.
+
+    arguments: arguments of the command line without the command's name; None: those of this process
+
+    Raises:
+        SystemExit: help or the version was requested, or an argument is invalid; see `evolve.cli.arguments.parse`.
+    """
     given = list(sys.argv[1:] if arguments is None else arguments)
     open_closed_streams()
     replaced = repair_encodings()
@@ -42,7 +48,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _outcome(arguments: Sequence[str]) -> int:
-    """Run one subcommand and return the exit code. Errors that users can correct are printed as one line."""
+    """Run one subcommand and return the exit code. Errors that users can correct are printed as one line.
+
+    Raises:
+        BrokenPipeError: the program that reads the output has ended.
+    """
     try:
         try:
             return _code(arguments)
