@@ -59,7 +59,9 @@ class Html:
 
 
 def html(template: str, *pieces: object) -> Html:
-    """Fill the placeholders "{}" of a template in order: with Html objects unchanged, with others as escaped text.
+    """Return a template with its placeholders "{}" replaced by the pieces, in order.
+
+    Html objects are inserted unchanged, and all other pieces as escaped text.
 
     Raises:
         ValueError: the number of pieces differs from the number of placeholders.
@@ -79,10 +81,10 @@ def joined(pieces: Iterable[Html]) -> Html:
 
 
 def style(declarations: str) -> Html:
-    """Return an attribute that gives an element some CSS declarations, such as "width:5px".
+    """Return an attribute that applies CSS declarations, such as "width:5px", to its element.
 
-    The page's policy does not allow the attribute `style`. The attribute `data-look` refers to a rule in the page's
-    style sheet instead.
+    The page's content security policy does not allow the attribute `style`. The attribute `data-look` refers to a rule
+    in the page's style sheet instead.
 
     Raises:
         ValueError: the text contains more than declarations.
@@ -159,7 +161,10 @@ def table(
 
 
 def figure(content: Html, caption: Html, kind: str = "") -> Html:
-    """Return a figure with its caption."""
+    """Return a figure with its caption.
+
+    kind: CSS class of the figure
+    """
     return html('<figure class="{}">{}<figcaption>{}</figcaption></figure>\n', kind, content, caption)
 
 
@@ -189,11 +194,11 @@ def asset(name: str) -> str:
 
 
 def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
-    """Return a complete, self-contained page.
+    """Return a complete, self-contained page, encoded as UTF-8.
 
     The content security policy of the page forbids all other files, styles and scripts.
 
-    scripts: names of the files with scripts
+    scripts: names of the files with scripts, in this module's folder
     """
     from evolve.report.theme import CSS
 
