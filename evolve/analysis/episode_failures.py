@@ -1,4 +1,4 @@
-"""Failures that ended training episodes, mostly of methods of a user task."""
+"""Failures that ended episodes of training or evaluation, mostly failures of methods of a user task."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["EpisodeFailure", "episode_failure_lines", "episode_failures_of"]
 
 @dataclass(frozen=True)
 class EpisodeFailure:
-    """A failure that ended one or more training episodes.
+    """A failure that ended one or more episodes of training or evaluation.
 
     said: message of the failure
     episodes: number of episodes that ended with this message
@@ -26,7 +26,7 @@ class EpisodeFailure:
 
 
 def episode_failures_of(candidates: Iterable[Candidate]) -> list[EpisodeFailure]:
-    """Return the failures that ended the candidates' training episodes, the most frequent failure first."""
+    """Return the failures that ended episodes of the candidates, the most frequent failure first."""
     episodes, affected = Counter[str](), Counter[str]()
     for candidate in candidates:
         for said, number in candidate.episode_failures:

@@ -32,7 +32,7 @@ def fitness_text(fitness: float, costs: float, shown: Callable[[float], str] = "
 def fitness_interval(candidate: Candidate) -> tuple[float, float]:
     """Return the 95 % bootstrap interval of a candidate's fitness, from the returns of its evaluation episodes.
 
-    Costs are exact, so they only shift the interval. It is (NaN, NaN) for a single episode.
+    Costs are exact, so they only shift the interval. The interval is (NaN, NaN) for a single episode.
 
     Raises:
         ValueError: the candidate failed, so it has no returns.

@@ -80,7 +80,9 @@ def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floa
     Both arrays are (scene, eye, channel, height, width). The scenes are the same for all animals in a task.
 
     Raises:
-        ConfigError, ValueError, optics.AccuracyError: see `vision`.
+        ConfigError: see `vision`.
+        ValueError: see `vision`.
+        optics.AccuracyError: the PSF cannot be computed accurately enough.
     """
     eyes, task = animal.eyes(config.eye), animal_task(animal, config)
     if (light := task.compared_light) is None:

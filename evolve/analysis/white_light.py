@@ -21,7 +21,7 @@ class WhiteLight:
     """An eye with its PSF in each band (`psf`) and in white daylight (`white`), and measures of the eye.
 
     Raises:
-        optics.AccuracyError: in `from_eye`, the PSF cannot be computed accurately enough, or on access, a measure.
+        optics.AccuracyError: the PSF (in `from_eye`) or a measure (on access) cannot be computed accurately enough.
     """
 
     eye: optics.Eye

@@ -16,7 +16,7 @@ def seed(text: str) -> int:
     """Return the seed in the text of an argument.
 
     Raises:
-        argparse.ArgumentTypeError: the text is not a whole number, 0 or more.
+        ArgumentTypeError: the text is not a whole number, 0 or more.
     """
     if not text.isdecimal() or len(text) > LONGEST:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number, 0 or more")
@@ -27,7 +27,7 @@ def every(text: str) -> int:
     """Return the number of actions between two images, in the text of an argument.
 
     Raises:
-        argparse.ArgumentTypeError: the text is not a whole number from 1 to MOST_EVERY.
+        ArgumentTypeError: the text is not a whole number from 1 to MOST_EVERY.
     """
     if not text.isdecimal() or len(text) > LONGEST or not 1 <= int(text) <= MOST_EVERY:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 1 to {MOST_EVERY:,}")
@@ -38,7 +38,7 @@ def searches(text: str) -> int:
     """Return the number of searches with random fitness, in the text of an argument.
 
     Raises:
-        argparse.ArgumentTypeError: the text is not a whole number from 2 to MOST_SEARCHES.
+        ArgumentTypeError: the text is not a whole number from 2 to MOST_SEARCHES.
     """
     if not text.isdecimal() or len(text) > LONGEST or not 2 <= int(text) <= MOST_SEARCHES:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 2 to {MOST_SEARCHES:,}")

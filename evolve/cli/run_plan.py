@@ -55,7 +55,9 @@ class RunPlan:
         """Return the plan with the paces of this machine, which are measured in a few seconds.
 
         Raises:
-            BackendError, ConfigError, ExecutorError: see `measure_pace`.
+            BackendError: Dr.Jit does not work on this machine.
+            ConfigError: an animal cannot be evaluated on this machine; see `measure_pace`.
+            ExecutorError: a worker process died.
         """
         paces = measure_pace(self.config, self.animals, self.workers)
         return RunPlan(self.config, self.directory, self.workers, paces)
@@ -90,7 +92,7 @@ class RunPlan:
     def disk_bytes(self) -> int:
         """Predicted size of policies, record, report and EXR files [bytes], for the larger of the two animals.
 
-        It requires measured paces.
+        The prediction requires measured paces.
         """
         policy = max(pace.policy_bytes for pace in self.paces.values())
         pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
@@ -174,7 +176,7 @@ class RunPlan:
 def steps_each(config: RunConfig) -> str:
     """Return the number of steps of a training run as text.
 
-    If it was rounded up to whole rollouts, the text also contains the configured number.
+    If the number was rounded up to whole rollouts, the text also contains the configured number.
     """
     learning = config.learning
     trained = trained_steps(learning, 0, learning.total_steps)

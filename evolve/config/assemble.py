@@ -68,13 +68,13 @@ def assemble(
     preset: name of a preset; None: no preset
     file: TOML file with settings; None: no file
     assignments: settings such as "search.population=8"
-    starts: start values of the genes, which `evolve.runs.start_from` reads from another run; None: none
+    starts: start values of the genes, which `evolve.runs.start_from` reads from another run; None: the default values
     scale: scale of a preset that has several, one of SCALES; None: "laptop"
 
     Raises:
-        ConfigError: no source names a task, a task, preset, scale or key is unknown, a value has the wrong type or is
-            out of range, settings contradict each other, or a file cannot be read. The message is one line that names
-            the key, the value, the allowed values, and the location of the setting.
+        ConfigError: no source names a task; or a task, preset, scale or key is unknown; or a value has the wrong type
+            or is out of range; or settings contradict each other; or a file cannot be read. The message is one line
+            that names the key, the value, the allowed values, and the location of the setting.
     """
     choice = None if task is None else TaskChoice.named(task)
     code = None if choice is None else choice.code
@@ -278,7 +278,7 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
 
 
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
-    """Return the RunConfig from checked trees. Later trees override earlier ones, and defaults fill the gaps."""
+    """Return the RunConfig from the checked trees of `layers`. Later trees override earlier ones and the defaults."""
     merged = _merged(trees)
     eye, card = EyeConfig(**merged.get("eye", {})), card_of(merged["task"])
     assert card is not None  # guaranteed by `_checked`

@@ -30,9 +30,9 @@ MOST_LISTED = 36  # maximum number of words listed in a message; all genes or ta
 
 
 class ConfigError(ValueError):
-    """Error for an invalid setting. The message is one line with the key, the value and the allowed values.
+    """A setting or an argument is invalid. The message is one line that names it, its value and the allowed values.
 
-    keys: dotted names of the settings that caused the error; callers use them to find where each was set
+    keys: dotted names of the settings that caused the error; callers use them to find where each setting was made
     """
 
     def __init__(self, message: str, *keys: str) -> None:
@@ -148,7 +148,7 @@ def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> A
 
 
 def quoted(value: Any) -> str:
-    """Return a value as text for a message, on one line."""
+    """Return a value as text for a message, on one line and with at most SHOWN characters before "..."."""
     try:
         whole = repr(value) if isinstance(value, str) else shown(value)
     except ValueError:  # more digits than Python converts to text

@@ -17,7 +17,10 @@ PRICES = Interval(0, 1000)
 
 @dataclass(frozen=True)
 class CostsConfig:
-    """Prices in units of fitness. The search maximises task fitness minus costs. `RunConfig` checks the values."""
+    """Prices in units of fitness. The search maximises task fitness minus costs.
+
+    `RunConfig` checks the values, and `evolve config schema` describes each field.
+    """
 
     per_receptor: float = setting(
         0.0, PRICES, "price of a receptor; a position with several receptor types has one receptor of each type"

@@ -61,7 +61,7 @@ def _check_light(eye: EyeConfig) -> None:
 
 
 def _check_compound(eye: EyeConfig) -> None:
-    """Check that settings of camera eyes and of compound eyes are changed only for eyes that have them."""
+    """Check that compound eyes have optics, and that settings are changed only for the kind of eyes that has them."""
     default = EyeConfig()
     if not eye.compound and eye.facet_area != default.facet_area:
         raise ConfigError(
@@ -78,9 +78,9 @@ def _check_compound(eye: EyeConfig) -> None:
 
 
 def _check_rhabdoms(eye: EyeConfig) -> None:
-    """Check that eyes with rhabdoms have optics and a plausible numerical aperture.
+    """Check that eyes with rhabdoms have optics, and that the numerical aperture of rhabdoms is plausible.
 
-    Also check that settings of rhabdoms are changed only if receptors are rhabdoms.
+    Also check that settings of rhabdoms are changed only if they have an effect.
     """
     default = EyeConfig()
     for name in RHABDOMS if not (eye.rhabdoms or eye.compound) else ():
@@ -107,7 +107,10 @@ def _check_rhabdoms(eye: EyeConfig) -> None:
 
 
 def _check_time(eye: EyeConfig) -> None:
-    """Check that settings of receptors with memory are changed only if they have an effect."""
+    """Check that settings of receptors with memory are changed only if they have an effect.
+
+    Also check that a threshold for events is large enough, and that there is no adaptation in addition to it.
+    """
     default = EyeConfig()
     changed = [name for name in IN_TIME if getattr(eye, name) != getattr(default, name)]
     if changed and eye.temporal_order == 0:

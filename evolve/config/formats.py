@@ -66,7 +66,10 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
 
 
 def in_own_axes(tree: Mapping[str, Any], number: int) -> Tree:
-    """Return settings with `eye.pupil_turned` set if they have format 1 or 2, in which pupils are rotated by 180°.
+    """Return settings in which pupils have the same axes as before.
+
+    In formats 1 and 2, pupils are rotated by 180°. Settings of these formats get `eye.pupil_turned` = True, unless they
+    contain this setting.
 
     number: format of the settings
     """

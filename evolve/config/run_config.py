@@ -143,7 +143,13 @@ class RunConfig:
         check_layouts(self.world)
 
     def _check_settings(self, keys: tuple[str, ...]) -> None:
-        """Check that the task has these settings, or that they have their default values."""
+        """Check that each of these settings has its default value, unless the task has this setting.
+
+        keys: dotted names of settings
+
+        Raises:
+            ConfigError: a setting that the task lacks has another value.
+        """
         for key in keys:
             section, name = key.split(".")
             default = getattr(SECTIONS[section], name)

@@ -31,7 +31,7 @@ FAMILY = "family"  # value of world.layouts
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """Settings of the worlds in which animals are trained and evaluated."""
+    """Settings of the worlds for training and evaluation of animals. `evolve config schema` describes each field."""
 
     mazes: int = setting(1, Interval(1, 32), "number of mazes in the task maze; an episode begins in any of them")
     unseen: bool = setting(
@@ -125,7 +125,7 @@ class WorldConfig:
 
 @dataclass(frozen=True)
 class SearchConfig:
-    """Settings of the search: optimizer, population and successive halving."""
+    """Settings of the search, such as optimizer and population. `evolve config schema` describes each field."""
 
     population: int = setting(16, Interval(2, 10_000), "candidates per generation")
     generations: int = setting(50, Interval(1, 100_000), "generations")
@@ -154,7 +154,7 @@ class SearchConfig:
 
 @dataclass(frozen=True)
 class LearningConfig:
-    """Settings of the training of each candidate by PPO."""
+    """Settings of the training of each candidate by PPO. `evolve config schema` describes each field."""
 
     total_steps: int = setting(1_000_000, Interval(1, 10**10), "number of agent steps in a training run")
     n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated in parallel")
@@ -207,6 +207,8 @@ class LearningConfig:
 class WiringConfig:
     """Settings of the connections between the receptors of an eye and its encoder.
 
+    `evolve config schema` describes each field.
+
     `pool_side` has no effect along an axis with fewer receptors, and `repeat_side` none along an axis with more.
     """
 
@@ -226,7 +228,7 @@ DIRECT = WiringConfig()  # each receptor is an input of its eye's own encoder
 
 @dataclass(frozen=True)
 class EvaluationConfig:
-    """Settings of the evaluation of fitness."""
+    """Settings of the evaluation of fitness. `evolve config schema` describes each field."""
 
     episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the task fitness")
 

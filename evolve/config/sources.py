@@ -91,7 +91,7 @@ def task_defaults(task: Any) -> Source:
 
 
 def read_toml(path: Path) -> Source:
-    """Read a TOML file.
+    """Return the settings in a TOML file. Keys and values are not checked.
 
     Raises:
         ConfigError: the file cannot be read or parsed, or is too large. The message is one line that names the file
@@ -108,7 +108,7 @@ def read_toml(path: Path) -> Source:
 
 
 def parsed_toml(text: bytes | str, name: str) -> Source:
-    """Parse TOML text.
+    """Return the settings in TOML text. Keys and values are not checked.
 
     name: name of the text in error messages
 

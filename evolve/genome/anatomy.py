@@ -33,7 +33,10 @@ def retina_width(receptors: float, sizes: EyeConfig) -> float:
 
 
 def vertical_fov(values: Values, sizes: EyeConfig) -> float | None:
-    """Return an eye's vertical field of view [deg]; None for square receptors."""
+    """Return an eye's vertical field of view [deg]; None for square receptors.
+
+    values: value of each gene, by name
+    """
     gene = {"receptors": None, "horizontal": "fov_deg", "gene": VERTICAL}[sizes.vertical_fov]
     return None if gene is None else values[gene]
 
@@ -61,11 +64,11 @@ def sides(values: Values) -> tuple[int, int]:
 def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     """Return the gene values after the repair of overlaps.
 
-    If receptors are too narrow, their number along the width is reduced. If they are too low, see
-    `_with_high_receptors`. If eyes overlap, they are spread over a larger part of the head. If the searched range of
-    their placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number
-    of its receptors, the numbers of eyes and of receptors are instead reduced in the same proportion. Rhabdoms are
-    narrowed to the shorter side of a receptor; all other genes stay within their searched ranges.
+    If receptors are too narrow, their number along the width is reduced. `_with_high_receptors` repairs receptors that
+    are not high enough. If eyes overlap, they are spread over a larger part of the head. If the searched range of their
+    placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number of its
+    receptors, the numbers of eyes and of receptors are instead reduced in the same proportion. Rhabdoms are narrowed to
+    the shorter side of a receptor; all other genes stay within their searched ranges.
 
     For compound eyes, see `evolve.genome.head_surface`.
 

@@ -205,7 +205,10 @@ class Phenotype:
         return found if isinstance(found, sim.CompoundEye) else optics.immersed(found, optics.turbid_medium(medium))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the fields by name, as values that JSON can represent, for a run's record."""
+        """Return the fields by name, as values that JSON can represent, for a run's record.
+
+        The last four fields and `time_constant_ms` are omitted if they are None.
+        """
         found = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
         return {name: value for name, value in found.items() if value is not None or name not in OMITTED}
 

@@ -26,7 +26,7 @@ def checked_fields(record: Any, names: Iterable[str]) -> dict[str, Any]:
     names: names of all fields; a record may lack some of them
 
     Raises:
-        ValueError: the record is no mapping, a field is unknown, has another type or lies outside its range, or only
+        ValueError: the record is not a mapping, a field is unknown, has another type or lies outside its range, or only
             some of the fields of a pupil or of facets are None. The message names the field.
     """
     if not isinstance(record, Mapping):

@@ -150,14 +150,14 @@ class OpenedRun(Run):
     def drift(self, searches: int = 200) -> pd.DataFrame:
         """Return a table that compares the last generations of the run with simulated searches with random fitness.
 
-        There is a row for each open gene, for the acuity, and for the number of receptors. It contains the mean of the
-        run, the median and the 95 % range of the searches with random fitness, and the p-value of the run's mean.
+        There is a row for each open gene, for the acuity, and for the number of receptors. Each row contains the mean
+        of the run, the median and the 95 % range of the searches, and the p-value of the run's mean.
 
         searches: number of searches with random fitness
 
         Raises:
             RunError: no generation is complete yet.
-            ValueError: `searches` is below 2.
+            ValueError: `searches` is below 2 or above 100,000.
         """
         from evolve.interactive.table import drift_table
         from evolve.report.gene_drift import drift_of
@@ -192,6 +192,7 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the best candidate's policy is missing or damaged.
+            ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
             OSError: a file cannot be read or written.
         """
         from evolve.report.write import write
@@ -260,7 +261,7 @@ def _seed(seed: Any) -> int:
     """Return the seed of an episode after a check.
 
     Raises:
-        ConfigError: it is not a whole number, or is negative.
+        ConfigError: `seed` is not a whole number, or is negative.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ConfigError(f"seed = {quoted(seed)}: must be a whole number, 0 or more")

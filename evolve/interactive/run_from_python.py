@@ -54,6 +54,7 @@ def run(
         LockedError: another process is creating a run in the directory.
         BackendError: Dr.Jit cannot find a usable LLVM library.
         ExecutorError: no worker can evaluate candidates.
+        OSError: a file of the run cannot be read or written.
     """
     _check(task=task, preset=preset, settings=settings, config=config, scale=scale, start_from=start_from, out=out)
     watchers = Callbacks(callbacks, progress)
@@ -113,7 +114,7 @@ RIGHT: Mapping[str, tuple[Any, str]] = {
 
 
 def _check(**given: Any) -> None:
-    """Check the types of arguments, by name.
+    """Check the types of the arguments in `given`, by their names.
 
     Raises:
         ConfigError: an argument has the wrong type.

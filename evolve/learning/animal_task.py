@@ -49,7 +49,8 @@ def azimuths(phenotype: Phenotype, config: RunConfig) -> np.ndarray:
     For a built-in task, no world is built.
 
     Raises:
-        ConfigError, ValueError: see `animal_task`.
+        ConfigError: see `animal_task`.
+        ValueError: see `animal_task`.
     """
     if (code := config.choice.named_code) is not None:
         task = executed_task(code, config.world.encoded_textures)

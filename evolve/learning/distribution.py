@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 
 class Within(torch.autograd.Function):
-    """Identity function of means of actions, whose gradient never moves a mean further beyond the bounds -1 and 1.
+    """Identity function on the means of actions. Its gradient never moves a mean further beyond the bounds -1 and 1.
 
     Actions beyond the bounds are clipped. If the mean is far outside, all actions are clipped to the same value.
     Exploration then has no effect, and no gradient would move the mean back. The remedy is "zeroing gradients"
@@ -30,10 +30,10 @@ class Within(torch.autograd.Function):
 
 
 class Gaussian(DiagGaussianDistribution):
-    """SB3's normal distribution of actions, whose parameter for the spread is created as a constant tensor.
+    """SB3's normal distribution of actions, whose logarithmic standard deviation is created without arithmetic.
 
-    SB3 computes this tensor. On the "meta" device of `load_policy`, arithmetic would import torch's compiler, which
-    takes a second.
+    SB3 multiplies a tensor of ones by the initial value. On the "meta" device of `load_policy`, arithmetic would import
+    torch's compiler, which takes a second.
     """
 
     def proba_distribution_net(self, latent_dim: int, log_std_init: float = 0.0) -> tuple[nn.Module, nn.Parameter]:

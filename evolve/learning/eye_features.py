@@ -75,6 +75,9 @@ class EyeFeatures(BaseFeaturesExtractor):
     At the start of an episode, the memory is not yet full. As in sim's environments, the first frame of the episode
     fills the missing places.
 
+    width: number of units in each layer of the encoders, and number of features of an eye
+    wiring: connections between the receptors and the encoders
+
     Raises:
         ValueError: `wiring` pools or repeats the signals of a compound eye.
     """

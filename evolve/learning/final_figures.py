@@ -19,7 +19,7 @@ __all__ = ["UnfitPolicy", "final_episodes", "require_fit", "require_test_set"]
 
 
 class UnfitPolicy(ValueError):
-    """A policy belongs to an animal with different eyes than the animal that should use it."""
+    """A policy belongs to an animal whose eyes differ from those of the animal that should use the policy."""
 
 
 def final_episodes(

@@ -109,7 +109,8 @@ def directions_from_record(stored: Mapping[str, Any]) -> tuple[tuple[float, ...]
 
     Raises:
         ValueError: the directions do not fit the shape of the eyes, or are not unit vectors.
-        KeyError, TypeError: the record has no shape of the eyes, or a value has the wrong type.
+        KeyError: the record has no shape of the eyes.
+        TypeError: a value has the wrong type.
     """
     found = tuple(tuple(float(part) for part in way) for way in stored.get("directions", ()))
     if len(stored["eyes"]) != (3 if found else 5) or (found and len(found) != int(stored["eyes"][1])):

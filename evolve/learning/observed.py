@@ -83,7 +83,8 @@ def entries_from_record(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
     Older versions stored only the size of the proprioception, or, for built-in tasks, nothing.
 
     Raises:
-        TypeError, ValueError: the record does not describe entries; see `Entry.from_record`.
+        TypeError: a stored entry is not a list.
+        ValueError: a list does not describe an entry.
     """
     if "beside" in stored:
         return tuple(Entry.from_record(entry) for entry in stored["beside"])

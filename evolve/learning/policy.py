@@ -247,7 +247,7 @@ def load_policy(path: Path | str) -> EyePolicy:
 
 
 def learnt(policy: EyePolicy) -> dict[str, Tensor]:
-    """Return all tensors that learning changes, by name: weights, and running means and spreads of inputs.
+    """Return all tensors that learning changes, by name: weights, and running means and variances of inputs.
 
     Tables that follow from the policy's shape, such as the neighbours of ommatidia, are not among them.
     """

@@ -78,7 +78,7 @@ class Episodes:
 
 
 class AdaptingPPO(PPO):
-    """PPO with normalised signals and rewards. Rollouts and updates raise TrainingDiverged if they are not finite.
+    """PPO with normalised signals and rewards. It fails if the numbers of a rollout or an update are not finite.
 
     Rewards are divided by their unit, which follows the spread of the discounted returns. At the start of training,
     agents often touch walls, and the costs of contact are about a hundred times larger than all later rewards. Without

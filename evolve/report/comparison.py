@@ -26,8 +26,8 @@ OF_THE_BEST = ("best candidate", "fitness", *PARTS, "95 % interval", "success ra
 def run_summary(run: Run) -> dict[str, Any]:
     """Return the summary of one run as JSON values.
 
-    Before a candidate has succeeded, values that describe the best candidate are None. The interval of its fitness is
-    also None if it has played a single episode.
+    Before a candidate has succeeded, values that describe the best candidate are None. The interval of the fitness is
+    also None if the best candidate has played a single evaluation episode.
     """
     best = run.best
     interval = None if best is None else fitness_interval(best)

@@ -1,4 +1,7 @@
-"""Figures of a whole run: fitness, costs, success and genes over the generations, descent, and learning curves."""
+"""Figures of a whole run: fitness, costs, success and genes over the generations, descent, and learning curves.
+
+Each public function draws one figure, and returns it as an SVG element.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,7 @@ Generations = Sequence[int] | NDArray[np.int64]
 
 
 def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Candidate]) -> Html:
-    """Draw the fitness of each candidate, the spread and median of each population, and the best so far.
+    """Draw the fitness of each candidate, quantiles and median of each population, and the best fitness so far.
 
     rows: statistics of each generation, at least one
     """

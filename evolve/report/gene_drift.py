@@ -176,7 +176,7 @@ def _open(name: str, config: RunConfig) -> bool:
 def _ends(run: Run, generations: range) -> dict[str, float]:
     """Return the mean of each quantity over the successful candidates of these generations.
 
-    It is NaN for a quantity that no candidate has.
+    The mean is NaN for a quantity that no candidate has.
     """
     values: dict[str, list[float]] = defaultdict(list)
     for candidate in run.candidates:

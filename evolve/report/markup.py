@@ -42,7 +42,7 @@ _SLOT = "{}"
 
 @dataclass(frozen=True)
 class Html:
-    """A piece of a page. Modules other than this one and `svg` must not create it directly, but with `html`.
+    """A piece of a page. Modules other than this one and `svg` must create pieces only with the function `html`.
 
     markup: the HTML text
     rules: CSS declarations for elements of this piece, by the value of the elements' attribute `data-look`
@@ -75,7 +75,7 @@ def html(template: str, *pieces: object) -> Html:
 
 
 def joined(pieces: Iterable[Html]) -> Html:
-    """Return all pieces in sequence."""
+    """Return one piece that contains all pieces in sequence."""
     listed = list(pieces)
     return html(_SLOT * len(listed), *listed)
 
@@ -126,7 +126,7 @@ def duration(seconds: float) -> str:
 
 
 def exact(value: float) -> str:
-    """Return a setting or an integer as text, without rounding to a few digits."""
+    """Return a setting or an integer as text, with at most six significant digits."""
     return f"{value:g}".replace("-", "−")
 
 

@@ -87,7 +87,10 @@ def _from_above(plan: GroundPlan) -> Html:
 
 
 def _sights(episode: Episode) -> Html:
-    """Return a pair of canvases for each eye, which show its signals and the signals behind a perfect lens."""
+    """Return a pair of canvases for each eye, which show its signals with noise and the signals without noise.
+
+    The signals without noise are those behind a perfect lens, except for compound eyes.
+    """
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
     room = ROOM if eyes.n_eyes <= 6 else ROOM // 2

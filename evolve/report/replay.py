@@ -64,7 +64,7 @@ def write_replay(
 
 
 def _require_page(out: Path) -> None:
-    """Check the path of the page before an episode is played, which takes time.
+    """Check the path of the page. The check precedes the episode, because playing takes time.
 
     Raises:
         ConfigError: the path has the ending of an additional file.

@@ -1,7 +1,7 @@
 """Recording of an episode for the viewer Rerun, which opens it with `rerun FILE.rrd`. It needs the extra `rerun`.
 
-A recording has two timelines: `action` is the number of the action, `time` is the time in the world [s]. It has the
-following entities.
+A recording has two timelines: `action` is the number of the action, and `time` is the time in the world [s]. The
+recording has the following entities.
 
 `world` contains `bodies`, the animal's `path` and its `eyes`. Each eye is a camera with an image of its signals.
 

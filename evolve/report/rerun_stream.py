@@ -65,7 +65,10 @@ class RerunStream:
         rr.send_columns(rr.new_entity_path(list(entity)), times, columns, recording=self.stream)
 
     def camera(self, entity: tuple[str, ...], eyes: sim.Eyes) -> None:
-        """Log an entity as a camera with the field of view of these eyes. It looks along z, with x right and y down."""
+        """Log an entity as a camera with the field of view of these eyes.
+
+        In its own frame, the camera looks along z, with x to the right and y down.
+        """
         height, width = eyes.resolution
         # In receptor widths and heights.
         focal_length = [

@@ -25,7 +25,10 @@ class Workers(Executor, Protocol):
 
 
 def local_workers(config: RunConfig) -> LocalExecutor:
-    """Return an executor with processes on this machine. Their number is the setting `workers`, or the cores for 0."""
+    """Return an executor with processes on this machine.
+
+    The setting `workers` is the number of processes; for 0, there is one for each core.
+    """
     return LocalExecutor(evaluate_candidate, config.workers, prepare_device)
 
 
@@ -45,6 +48,8 @@ def carry_on(
     Raises:
         RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
         ExecutorError: no worker can evaluate candidates.
+        ConfigError: the optimizer is unknown, or cannot be used here.
+        OSError: a file of the run cannot be read or written.
     """
     with workers(run.config) as executor, watched(run, executor.count) as watcher:
         evolve(run, executor, watcher)

@@ -25,7 +25,9 @@ EVENT_S = 1.0  # [s] minimum time between two events of one candidate's training
 class Tally:
     """Counts of evaluations and training steps, from which the pace and the remaining time are computed.
 
-    It counts from the start or the resumption of the run in this process.
+    The pace refers to the time since this process started or resumed the run.
+
+    workers: number of workers
     """
 
     def __init__(self, run: Run, workers: int = 1) -> None:
@@ -48,7 +50,7 @@ class Tally:
 
     @property
     def done(self) -> float:
-        """Number of evaluations so far, including fractions for candidates that are being trained."""
+        """Number of evaluations on record, plus the completed fractions of those that are in progress."""
         parts = (min(steps / planned, 1.0) for steps, planned in self._in_training.values() if planned)
         return len(self._run.in_order_of_finish) + sum(parts)
 

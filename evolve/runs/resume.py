@@ -55,7 +55,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
 
 def _changes(run: Run) -> Iterator[str]:
-    """Yield a note on changed software, which may change the numbers of the run."""
+    """Yield a note if the software has changed since the first start of the run, which may change its numbers."""
     then, now = recorded(run.path), present()
     changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
     if changed:

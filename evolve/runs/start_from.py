@@ -61,7 +61,10 @@ def starts_from(text: str) -> Source:
 
 
 def _parsed(text: str) -> tuple[Path, int | None]:
-    """Return the run directory and the candidate of "RUN:ID" or "RUN", where RUN may contain colons, too."""
+    """Return the run directory and the id of the candidate in "RUN:ID"; the id is None for "RUN".
+
+    RUN may also contain colons.
+    """
     head, colon, tail = text.rpartition(":")
     if colon and tail.isdecimal():
         return Path(head), int(tail)

@@ -48,7 +48,7 @@ def ask_tell(
 
 
 def main() -> None:
-    """Find the maximum of a paraboloid at (0.7, 0.7, 0.7)."""
+    """Search for the maximum of a paraboloid, which is at (0.7, 0.7, 0.7), and print the progress."""
     search = SearchConfig(population=8, generations=20)
     generations = ask_tell(lambda genome: -float(np.sum((genome - 0.7) ** 2)), np.full(3, 0.5), search, seed=0)
     for number, (genomes, values) in enumerate(generations):

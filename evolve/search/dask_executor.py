@@ -95,6 +95,8 @@ class DaskExecutor:
 
         If `jobs` is a deque, the caller may append further jobs between results.
 
+        progress: function that is called with (candidate id, steps trained, steps planned); None: no function
+
         Raises:
             ExecutorError: a worker cannot evaluate candidates or has other software, its machine lacks resources such
                 as disk space, the run's settings cannot be used there, or the scheduler or all workers are silent for

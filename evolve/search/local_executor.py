@@ -87,6 +87,8 @@ class LocalExecutor:
 
         If `jobs` is a deque, the caller may append further jobs between results.
 
+        progress: function that is called with (candidate id, steps trained, steps planned); None: no function
+
         Raises:
             ExecutorError: a worker cannot be prepared, the machine lacks resources such as disk space or memory, or the
                 run's settings cannot be used.

@@ -30,8 +30,9 @@ LIBRARIES = ("nevergrad", "cma", "numpy")
 class SameSearch:
     """Comparison of a search's proposals with a run's record.
 
-    The first generation follows from the settings alone, so it may differ only by rounding. Later generations have the
-    wider tolerance, but only if the versions of the optimizer's libraries are the same as at the start of the run.
+    The first generation follows from the settings alone, so its tolerance is ROUNDING. Later generations have the wider
+    tolerance TAKEN_FOR_ANOTHERS if the optimizer's libraries have the same versions as at the start of the run, and
+    otherwise also ROUNDING.
     """
 
     def __init__(self, run: Run) -> None:

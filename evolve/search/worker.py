@@ -117,7 +117,7 @@ def evaluate_candidate(
     *,
     progress: Callable[[int, int], None],
 ) -> Evaluation:
-    """Call `evolve.learning.fitness.evaluate`. It is imported here, so that only workers load its libraries."""
+    """Call `evolve.learning.fitness.evaluate`, which is imported here, so that only workers load its libraries."""
     from evolve.learning.fitness import evaluate
     from sim.scene.mirror import MirrorWarning
 
@@ -171,8 +171,8 @@ def _give_back_memory() -> None:
     """Return freed memory to the system after a candidate.
 
     Otherwise, the memory of a worker would grow with every candidate. glibc keeps about 10 MB per candidate, in gaps
-    that are too small for the next arrays. Dr.Jit keeps the kernels of every shape of eye in memory. After they have
-    been freed, it reloads them from disk if they are needed again.
+    that are too small for the next arrays. Dr.Jit keeps the kernels of every shape of eye in memory. If a kernel is
+    needed again after its memory has been freed, Dr.Jit reloads it from disk.
     """
     gc.collect()  # this must precede the next call, because it frees frozen functions, which refer to kernels
     if (drjit := sys.modules.get("drjit")) is not None and multiprocessing.parent_process() is not None:

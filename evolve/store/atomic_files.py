@@ -29,7 +29,7 @@ def sweep(folder: Path) -> None:
 
 
 def _lives(process: str) -> bool:
-    """Return whether another process with this id is running."""
+    """Return whether a text is the id of a process that is running, and that is not this process."""
     if not process.isdecimal() or int(process) == os.getpid():
         return False
     try:

@@ -34,7 +34,7 @@ class Candidate:
     fitness: task fitness minus costs, which the search maximises; -inf if the candidate failed
     parents: ids of the candidates from which the search derived the genome; () if there are none
     rung: rung after which the candidate was evaluated, counted from 0; steps and seconds include all earlier rungs
-    policy: SHA-256 of the file of the trained policy; None if there is no policy. Records of older versions lack it
+    policy: SHA-256 of the trained policy's file; None if there is no policy, or if an older version wrote the record
     costs: costs of eyes and brain (`evolve.config.costs`); 0 for a failed candidate
     """
 
@@ -130,7 +130,7 @@ class Candidate:
         return replace(self, **{**vars(Evaluation.failed(failure)), **kept}, policy=None, costs=0.0)
 
     def _restored(self) -> Candidate:
-        """Return the candidate that is read back after writing.
+        """Return the candidate after writing its line and reading this line back.
 
         Raises:
             ValueError: a value cannot be written or read back; the message states the reason.

@@ -61,7 +61,7 @@ class Chain:
 
 
 def sealed_record(lines: Iterable[str]) -> bytes:
-    """Return the content of a record: these lines, each with its checksum."""
+    """Return the content of a record that consists of these lines, each with its checksum."""
     content, chain = [], Chain()
     for line in lines:
         content.append(chain.sealed(line.encode()))

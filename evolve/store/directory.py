@@ -83,8 +83,8 @@ class Run:
     def open(cls, path: Path | str, task: str | None = None, before_damage: bool = False) -> Self:
         """Open a run directory.
 
-        task: "FILE.py:CLASS", if the run has a user task. The code of a user task is executed only if the task is named
-            here. It is needed to continue the run and to play episodes of its animals. None: open the run without code
+        task: "FILE.py:CLASS" of a user task, whose code is executed only if the task is named here. The code is needed
+            to continue the run and to play episodes. None: open the run without code
         before_damage: True to use only the lines of the record before the first damaged line, if there is one
 
         Raises:
@@ -144,7 +144,8 @@ class Run:
     def lock(self) -> RunLock:
         """Return the lock of this run, a context manager. A process must hold it to write to the run.
 
-        On entry, the context manager raises LockedError if another process holds the lock.
+        Raises:
+            LockedError: on entry into the context, another process holds the lock.
         """
         self._lock = RunLock(self.path)
         return self._lock
@@ -221,7 +222,7 @@ class Run:
 
     @property
     def best(self) -> Candidate | None:
-        """Candidate with the highest fitness (the earliest of equals); None before a candidate has succeeded."""
+        """Candidate with the highest fitness, or the earliest of several; None before a candidate has succeeded."""
         done = [candidate for candidate in self.candidates if candidate.failure is None]
         return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
 
@@ -248,7 +249,7 @@ class Run:
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:
-        """Candidates in the order of the record; a candidate that has completed several rungs occurs once for each."""
+        """Candidates in the order of the record; a candidate occurs once for each rung that it has completed."""
         return list(self.record.lines.values())
 
     def on_record(self, candidate_id: int, rung: int) -> Candidate | None:

@@ -43,7 +43,9 @@ class Evaluation:
 
 
 def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
-    """Return the KINDS most frequent messages with their numbers of episodes, then the total number of all others.
+    """Return the KINDS most frequent messages with their numbers of episodes, the most frequent first.
+
+    If there are other messages, their total number of episodes follows under the name OTHERS.
 
     failures: number of episodes that ended with each message
     """

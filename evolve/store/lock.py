@@ -24,7 +24,9 @@ class LockedError(ValueError):
 class RunLock:
     """Lock of a run: the operating system's lock on the file `lock`, held within a `with` block.
 
-    The operating system releases it when the process ends, even if the process is killed.
+    The operating system releases the lock when the process ends, even if the process is killed.
+
+    run: run directory
 
     Raises:
         LockedError: on entry, another process holds the lock, or the file cannot be opened.

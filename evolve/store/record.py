@@ -37,8 +37,8 @@ class Record:
     path: the file candidates.jsonl
     lines: candidates by (id, rung), in the order of the file
     candidates: candidates in the order of their ids, each as recorded after the last rung that it has reached
-    notice: message about ignored lines; None without such lines. They are an unfinished last line, for example after a
-        power failure, or a damaged line and all lines after it
+    notice: message about ignored lines; None if there are none. Ignored lines are an unfinished last line, for example
+        after a power failure, or a damaged line and all lines after it
     before_damage: True if only the lines before the first damaged line are used; otherwise, damage is an error
     """
 
@@ -53,7 +53,9 @@ class Record:
 
     @classmethod
     def read(cls, path: Path, config: RunConfig, before_damage: bool = False) -> Record:
-        """Read a record, and check each line: its values, its agreement with `config` and earlier lines, its checksum.
+        """Read a record, and check the values of each line, its checksum, and its agreement with the other lines.
+
+        config: settings of the run, with which the lines must agree
 
         before_damage: True to use only the lines before the first damaged line, if there is one
 

@@ -97,8 +97,8 @@ def folder(path: Path) -> Path:
     """Create a run's folder if it is missing, and return its path. The parent folder must exist.
 
     Raises:
-        StrangeFileError: the path exists, but is not a folder.
-        OSError: the folder cannot be created.
+        StrangeFileError: the path is a link to a folder.
+        OSError: the folder cannot be created, for example because a file has this path.
     """
     path.mkdir(exist_ok=True)
     require_folder(path)
