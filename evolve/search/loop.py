@@ -71,7 +71,7 @@ def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
 
 
 def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Evaluate one generation after the other, and report the fitness of each after all its rungs are complete."""
+    """Evaluate one generation after the other, and report a generation's fitness when all its rungs are complete."""
     same = SameSearch(run)
     for generation in range(run.config.search.generations):
         proposals = {proposal.id: proposal for proposal in search.propose_generation()}

@@ -66,10 +66,10 @@ def require_file_name(path: Path) -> None:
 
 @contextmanager
 def unfinished(path: Path) -> Iterator[Path]:
-    """Create an empty file next to `path`, and yield its path; the caller writes the content.
+    """Create an empty file next to `path`, and yield the path of the new file; the caller writes the content.
 
-    At the end of the context, the file is synchronised with the disk and renamed to `path`. If an exception leaves the
-    context, the file is removed.
+    At the end of the context, the new file is synchronised with the disk and renamed to `path`. If an exception leaves
+    the context, the new file is removed.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.

@@ -90,8 +90,7 @@ class Run:
         Raises:
             RunError: the directory does not exist or contains no run, or the record cannot be read or has an invalid
                 line; the message names the file and the line.
-            ConfigError: the config is invalid, the named task differs from the run's or cannot be read, or its file has
-                changed.
+            ConfigError: the config is invalid, or the named task differs from the run's, cannot be read or has changed.
             StrangeFileError: one of the run's files or folders is a link, FIFO or device, or config.toml is too large.
             OSError: config.toml cannot be read.
         """
@@ -131,7 +130,6 @@ class Run:
 
         Raises:
             RunError: the format of config.toml is too old; the message names the version that can continue the run.
-            ConfigError: config.toml is invalid.
             OSError: config.toml cannot be read.
         """
         number = format_of(parsed_toml(read(self.path / CONFIG, LARGEST_TOML), str(self.path / CONFIG)).tree)
@@ -210,7 +208,7 @@ class Run:
         """Message about damage, in one line; None if there is none.
 
         It lists ignored lines of the record, lost policies, a config.toml that has changed since the last start, and
-        EXR files that do not match their checksums.
+        EXR files that do not match their checksums. An OSError means that config.toml cannot be read.
         """
         found = (
             self.record.notice,

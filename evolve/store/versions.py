@@ -48,7 +48,7 @@ PACKAGES = (
 
 
 def present() -> dict[str, str]:
-    """Return, by name, what influences a run's numbers: installed versions of packages, architecture and device.
+    """Return the software versions, architecture and device that influence a run's numbers, by name.
 
     The names are "python", "machine" (architecture), "commit" (of rhabdom; "" if unknown), "device", and PACKAGES. The
     version of a missing package is "not installed".

@@ -114,7 +114,7 @@ def report(arguments: Namespace) -> int:
 
 
 def export(arguments: Namespace) -> int:
-    """Write the spectral radiance in front of an agent's eyes during an episode as EXR files, and print their paths."""
+    """Write the radiance in front of an agent's eyes and the eyes' signals as EXR files, and print their number."""
     run = _open(arguments)
     with _waiting(arguments, "EXR files are written") as wait:
         from evolve.report.exr_export import export_run
