@@ -151,7 +151,7 @@ def _render(variants: list[str], environment: dict[str, str]) -> dict[str, str]:
 
 
 def print_findings(as_json: bool = False) -> int:
-    """Print the findings; return 0 if all parts that `evolve run` needs work, else 2."""
+    """Print the findings as text, or as JSON if `as_json` is True. Return 0 if `evolve run` can work, else 2."""
     findings = examine()
     if as_json:
         say(json.dumps(findings, indent=2))

@@ -44,7 +44,11 @@ def check_eye(eye: EyeConfig) -> None:
 
 
 def _check_light(eye: EyeConfig) -> None:
-    """Check that the light is strong enough, and that the integration time is changed only if there is shot noise."""
+    """Check that the light is strong enough, and that the integration time is changed only if there is shot noise.
+
+    Raises:
+        ConfigError: one of these conditions is not met.
+    """
     light, default = eye.illuminance, EyeConfig.integration_time
     if 0 < light * eye.integration_time < LEAST_EXPOSURE:
         raise ConfigError(
@@ -61,7 +65,11 @@ def _check_light(eye: EyeConfig) -> None:
 
 
 def _check_compound(eye: EyeConfig) -> None:
-    """Check that compound eyes have optics, and that settings are changed only for the kind of eyes that has them."""
+    """Check that compound eyes have optics, and that settings are changed only for the kind of eyes that has them.
+
+    Raises:
+        ConfigError: one of these conditions is not met.
+    """
     default = EyeConfig()
     if not eye.compound and eye.facet_area != default.facet_area:
         raise ConfigError(
@@ -81,6 +89,9 @@ def _check_rhabdoms(eye: EyeConfig) -> None:
     """Check that eyes with rhabdoms have optics, and that the numerical aperture of rhabdoms is plausible.
 
     Also check that settings of rhabdoms are changed only if they have an effect.
+
+    Raises:
+        ConfigError: one of these conditions is not met.
     """
     default = EyeConfig()
     for name in RHABDOMS if not (eye.rhabdoms or eye.compound) else ():
@@ -110,6 +121,9 @@ def _check_time(eye: EyeConfig) -> None:
     """Check that settings of receptors with memory are changed only if they have an effect.
 
     Also check that a threshold for events is large enough, and that there is no adaptation in addition to it.
+
+    Raises:
+        ConfigError: one of these conditions is not met.
     """
     default = EyeConfig()
     changed = [name for name in IN_TIME if getattr(eye, name) != getattr(default, name)]

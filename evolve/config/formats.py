@@ -33,7 +33,7 @@ Tree = dict[str, Any]
 
 
 def format_of(tree: Mapping[str, Any]) -> int:
-    """Return the format of a run's config.toml.
+    """Return the format of a run's config.toml, whose content is `tree`; 1 if it states none.
 
     Raises:
         ConfigError: the format is unknown.

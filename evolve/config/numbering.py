@@ -27,5 +27,5 @@ class Place:
 
 
 def generation_ids(generation: int, population: int) -> range:
-    """Return the ids of a generation's candidates."""
+    """Return the ids of a generation's candidates; every generation has `population` candidates."""
     return range(generation * population, (generation + 1) * population)

@@ -123,7 +123,11 @@ class RunConfig:
             raise ConfigError(message, *keys)
 
     def _check_task(self) -> None:
-        """Check the genes and settings that only some tasks have, and the frames of receptors with memory."""
+        """Check the genes and settings that only some tasks have, and the frames of receptors with memory.
+
+        Raises:
+            ConfigError: the task lacks a gene or a changed setting, or does not allow this number of frames.
+        """
         for name in OPTIONAL_GENES:
             if name in self.genome and not self.card.has_gene(name):
                 raise ConfigError(
@@ -160,7 +164,11 @@ class RunConfig:
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_clusters(self) -> None:
-        """Check that at least one gene is open, and that no gene is open that the run does not use."""
+        """Check that at least one gene is open, and that no gene is open that the run does not use.
+
+        Raises:
+            ConfigError: one of these conditions is not met.
+        """
         genes = [gene for name, gene in self.genes.items() if self.genome[name].open]
         opened = {
             cluster: [f"genome.{gene.name}.open" for gene in genes if gene.cluster == cluster] for cluster in CLUSTERS
@@ -184,6 +192,11 @@ class RunConfig:
         """Check the settings of successive halving.
 
         It requires whole generations, and its first rung must be at least one rollout long.
+
+        rollout: number of steps in a rollout
+
+        Raises:
+            ConfigError: one of these conditions is not met.
         """
         search = self.search
         if search.rungs == 1:
@@ -202,7 +215,11 @@ class RunConfig:
             )
 
     def _check_phases(self) -> None:
-        """Check that every open gene opens before the run ends, and that at least one opens at its start."""
+        """Check that every open gene opens before the run ends, and that at least one opens at the start of the run.
+
+        Raises:
+            ConfigError: one of these conditions is not met.
+        """
         opening = {name: use.opens_at for name, use in self.genome.items() if use.open}
         for name, generation in opening.items():
             if generation >= self.search.generations:

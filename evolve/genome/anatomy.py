@@ -28,7 +28,10 @@ SLACK = 1e-9  # tolerance for rounding errors: eyes in contact must not count as
 
 
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
-    """Return the width of a retina with this number of receptors along its width [m]. The eye has the same width."""
+    """Return the width of a retina with this number of receptors along its width [m]. The eye has the same width.
+
+    sizes: settings of the eyes, here and in the other functions
+    """
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
 
 
@@ -56,7 +59,10 @@ def receptor_side(resolution: tuple[float, float], fov_deg: float, vertical: flo
 
 
 def sides(values: Values) -> tuple[int, int]:
-    """Return the numbers of receptors along the height and along the width of an eye."""
+    """Return the numbers of receptors along the height and along the width of an eye.
+
+    values: value of each gene, by name
+    """
     height, width = (SIDE, SIDE) if SIDE in values else SIDES
     return int(values[height]), int(values[width])
 

@@ -16,7 +16,10 @@ AUTO = "auto"  # value of a setting whose number is chosen automatically
 
 
 def setting(default: Any, valid: Interval | None, meaning: str) -> Any:
-    """Return a dataclass field whose metadata contain the valid range and the meaning of the setting."""
+    """Return a dataclass field whose metadata contain the valid range and the meaning of the setting.
+
+    valid: valid range of a number; None if it has none, or the value is not a number
+    """
     return field(default=default, metadata={"valid": valid, "meaning": meaning})
 
 

@@ -78,12 +78,18 @@ class GeneConfig:
 
 
 def lowest(name: str, uses: Mapping[str, GeneConfig]) -> float:
-    """Return the lowest value that a gene can have in a run."""
+    """Return the lowest value that a gene can have in a run.
+
+    uses: use of each gene in the run, by name
+    """
     return uses[name].low if uses[name].open else uses[name].start
 
 
 def highest(name: str, uses: Mapping[str, GeneConfig]) -> float:
-    """Return the highest value that a gene can have in a run."""
+    """Return the highest value that a gene can have in a run.
+
+    uses: use of each gene in the run, by name
+    """
     return uses[name].high if uses[name].open else uses[name].start
 
 
@@ -113,7 +119,10 @@ class Gene:
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Return the gene's value at the coordinate u in [0, 1]. Values of an integer gene occupy equal intervals."""
+        """Return the gene's value at the coordinate u in [0, 1]. Values of an integer gene occupy equal intervals.
+
+        use: use of the gene in a run; the coordinates 0 and 1 correspond to `use.low` and `use.high`
+        """
         if self.kind == "real":
             return use.low + u * (use.high - use.low)
         return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)

@@ -25,6 +25,8 @@ def representatives(points: int, symmetric: bool) -> list[str]:
 
     A symmetric relief does not change under reflection and rotation by 90°, so an eighth of its heights determines all
     of them. Only the genes of this eighth exist. Without symmetry, each height has its own gene.
+
+    points: number of heights along one side of the relief
     """
     if not symmetric:
         return doe_names(points)

@@ -139,6 +139,7 @@ def table(
 ) -> Html:
     """Return a table that can be scrolled sideways.
 
+    header, rows: cells of the first row, and of the other rows; texts are escaped
     name: id of the table
     highlight: number of the row that is emphasised; None: no row
     ids: id of each row

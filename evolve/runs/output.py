@@ -85,7 +85,12 @@ class Voice(OwnedStream):
         return len(text)
 
     def _judge(self, fault: OSError | ValueError) -> None:
-        """Report a fault, or raise it if the stream is not patient."""
+        """Report a fault, or raise it if the stream is not patient.
+
+        Raises:
+            BrokenPipeError: the reader has closed the pipe, and the stream is not patient.
+            OSError: another fault has occurred, the stream is not patient, and it has a name.
+        """
         number = fault.errno if isinstance(fault, OSError) else errno.EBADF
         if number in (errno.EPIPE, errno.EIO):  # a closed pipe or terminal
             if not self.patient:
@@ -105,7 +110,7 @@ def results() -> TextIO:
 
 
 def say(text: str, end: str = "\n", flush: bool = False) -> None:
-    """Print a part of a command's result on stdout."""
+    """Print a part of a command's result on stdout, with the arguments `end` and `flush` of `print`."""
     print(text, end=end, file=results(), flush=flush)
 
 

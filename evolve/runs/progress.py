@@ -243,6 +243,7 @@ class Watchers:
 def watcher(run: Run, out: TextIO = sys.stderr, workers: int = 1, as_json: bool = False) -> Bar | Events | Lines:
     """Return the watcher for an output: Events if `as_json` is True, else Bar on a terminal, and Lines elsewhere.
 
+    out: stream for the output
     workers: number of workers, for the utilisation
     """
     if as_json:

@@ -57,6 +57,9 @@ class Watcher(Protocol):
 def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
     """Evaluate all candidates that a locked run still lacks.
 
+    executor: evaluates the candidates
+    watcher: receives the progress of training and each evaluated candidate
+
     Raises:
         RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
         ConfigError: the optimizer is unknown, or cannot be used here.

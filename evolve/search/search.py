@@ -135,5 +135,8 @@ class Search:
 
 
 def training_seed(run_seed: int, candidate_id: int) -> int:
-    """Return the seed of a candidate's training and evaluation, which differs between candidates."""
+    """Return the seed of a candidate's training and evaluation, which differs between candidates.
+
+    run_seed: the setting `seed` of the run
+    """
     return int(np.random.SeedSequence([run_seed, candidate_id]).generate_state(1)[0])

@@ -38,7 +38,10 @@ class Evaluation:
 
     @classmethod
     def failed(cls, failure: str, seconds: float = 0.0) -> Evaluation:
-        """Return the evaluation of a candidate that failed; the message is put on one line and shortened."""
+        """Return the evaluation of a candidate that failed; the message is put on one line and shortened.
+
+        seconds: wall time until the failure [s]
+        """
         return cls(fitness=-math.inf, seconds=seconds, failure=shortened(_in_one_line(failure)))
 
 
