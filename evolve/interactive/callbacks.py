@@ -60,6 +60,8 @@ class Callbacks:
         Raises:
             RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
             ExecutorError: no worker can evaluate candidates.
+            ConfigError: the optimizer is unknown, or cannot be used here.
+            OSError: a file of the run cannot be read or written.
         """
         with voices(patient=True):
             carry_on(run, self._watched)

@@ -134,6 +134,7 @@ class OpenedRun(Run):
                 not functions.
             BackendError: Dr.Jit cannot find a usable LLVM library.
             ExecutorError: no worker can evaluate candidates.
+            OSError: a file of the run cannot be read or written.
         """
         watchers = Callbacks(callbacks, progress)
         with resuming(self) as unfinished:

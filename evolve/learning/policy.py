@@ -60,7 +60,7 @@ class Brain:
 
 @dataclass(frozen=True)
 class PolicyConfig:
-    """Shape of a policy, from which it can be built again.
+    """Shape of a policy, from which an untrained policy can be built.
 
     eyes: shape of the observation's `eyes` (memory, eye, channel, height, width), or (memory, ommatidium, channel)
     neurons, layers, encoder, wiring: see `Brain`

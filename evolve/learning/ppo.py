@@ -295,6 +295,6 @@ def batch_task_of(worlds: VecEnv) -> BatchTask:
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
-    """Return mean and standard deviation of the untrained policy's actions; `first_speed` sets those of SPEED."""
+    """Return mean and standard deviation of each command before training; `learning.first_speed` sets the speed's."""
     speed = (2 * config.first_speed - 1, config.first_speed)
     return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

@@ -184,6 +184,8 @@ class DaskExecutor:
 
         Raises:
             ExecutorError: the worker cannot evaluate candidates.
+            ConnectionLost: the connection was lost before the worker sent the result.
+            OSError: the policy or the checkpoint cannot be written.
         """
         from distributed import KilledWorker
 

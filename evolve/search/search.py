@@ -52,9 +52,9 @@ class Proposal:
 class Search:
     """Search that proposes one candidate after the other.
 
-    In each generation in which further genes begin to vary, a new optimizer starts from the best genome so far. It
-    varies all genes that may vary from then on. Each optimizer receives the fitness of the candidates that it has
-    proposed.
+    In each generation in which further genes begin to vary, a new optimizer starts from the best genome so far. This
+    optimizer varies these genes and those that varied before. Each optimizer receives the fitness of the candidates
+    that it has proposed.
 
     Raises:
         ConfigError: the optimizer is unknown, or cannot be used here.

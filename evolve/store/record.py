@@ -165,7 +165,7 @@ class Record:
 
 
 def _require_readable(candidate: Candidate, path: Path) -> None:
-    """Check that the line of a candidate restores an equal candidate, as for the results of `Candidate.recordable`.
+    """Check that the line of a candidate restores an equal candidate. Results of `Candidate.recordable` pass the check.
 
     Raises:
         RunError: the line would restore a different candidate, or would be refused.

@@ -135,7 +135,7 @@ def open_page(page: Path, arguments: Namespace) -> None:
 
 
 def _waiting(arguments: Namespace, text: str) -> Waiting:
-    """Return a progress bar for one step, which takes at most half a minute."""
+    """Return a progress bar for a single step, which `text` describes."""
     wait = Waiting(1, shown=not (arguments.json or arguments.quiet))
     return wait.of_one_step(text)
 
