@@ -22,6 +22,8 @@ def held_out_episodes(
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
         ConfigError: the run has no test set, or the user task was not named when the run was opened, or fails.
+        ValueError: `episodes` is below 1, or `seed` is negative.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: the policy's file cannot be read.
     """
     require_test_set(run.config)

@@ -60,7 +60,8 @@ def record(
         RunError: the candidate does not exist, or its policy is missing or damaged.
         ConfigError: the mode is unknown, the run has no test set, or the user task was not named when the run was
             opened, or its module cannot be executed.
-        ValueError: radiance_every is not a whole number from 1 to 1,000,000.
+        ValueError: `radiance_every` is not a whole number from 1 to 1,000,000.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: the policy's file cannot be read.
     """
     radiance_every = whole("every", radiance_every, 1, MOST_EVERY)

@@ -80,7 +80,7 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
     workers: number of worker processes
 
     Raises:
-        BackendError: Dr.Jit does not work on this machine.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         ConfigError: the user task fails or has several mounts that no animal would use, or an animal cannot be
             evaluated on this machine, for example because its eyes cannot be computed. The message names the animal and
             the reason.
@@ -139,8 +139,8 @@ def _slowest(paces: list[Pace]) -> Pace:
 def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
-    The first update has the full number of passes over the samples, and the second may have only half of it. The time
-    of a pass follows from the difference between the times of the two updates.
+    The first update has all passes over the samples, and the second update may have only half as many. The time of a
+    pass follows from the difference between the times of the two updates.
 
     policy: path for the trained policy. Its folder belongs to the parent process, which removes it even after Ctrl-C
 

@@ -55,7 +55,7 @@ class RunPlan:
         """Return the plan with the paces of this machine, which are measured in a few seconds.
 
         Raises:
-            BackendError: Dr.Jit does not work on this machine.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
             ConfigError: an animal cannot be evaluated on this machine; see `measure_pace`.
             ExecutorError: a worker process died.
         """

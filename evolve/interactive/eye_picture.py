@@ -33,6 +33,7 @@ def eye_picture(phenotype: Phenotype, config: EyeConfig, medium: str = "air") ->
 
     Raises:
         optics.AccuracyError: the PSF cannot be computed accurately enough.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     eye = phenotype.eye(config, medium)
     count = 2 if isinstance(eye, CompoundEye) else 1 if eye.pupil is None else 3

@@ -63,6 +63,10 @@ class OpenedCandidate(Candidate):
 
         For a perfect lens, only the fields of view are drawn. For compound eyes, the acceptance function is drawn
         instead of relief and PSF.
+
+        Raises:
+            optics.AccuracyError: the PSF cannot be computed accurately enough.
+            optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
         """
         from evolve.interactive.eye_picture import eye_picture
 
@@ -117,6 +121,8 @@ class OpenedRun(Run):
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ConfigError: the run has no test set, or the user task was not named when the run was opened, or fails.
+            ValueError: `episodes` is below 1, or `seed` is negative.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: the policy's file cannot be read.
         """
         from evolve.analysis.held_out import held_out_episodes
@@ -132,7 +138,7 @@ class OpenedRun(Run):
                 format is too old, or the search proposes candidates that differ from those on record.
             ConfigError: the user task was not named when the run was opened, or fails at its start; or callbacks are
                 not functions.
-            BackendError: Dr.Jit cannot find a usable LLVM library.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
             ExecutorError: no worker can evaluate candidates.
             OSError: a file of the run cannot be read or written.
         """
@@ -194,6 +200,7 @@ class OpenedRun(Run):
         Raises:
             RunError: the best candidate's policy is missing or damaged.
             ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """
         from evolve.report.write import write
@@ -224,8 +231,9 @@ class OpenedRun(Run):
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set,
-                or the user task was not named when the run was opened.
+                or the user task was not named when the run was opened, or fails.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """
         from evolve.report.replay import write_replay
@@ -246,8 +254,9 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, or the user task was not named when the run was opened.
+            ConfigError: an argument is invalid, or the user task was not named when the run was opened, or fails.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """
         from evolve.report.exr_export import export_run

@@ -52,7 +52,7 @@ def run(
         ConfigError: a setting or an argument is invalid, or the user task fails; the message is one line.
         RunError: the directory is not empty or cannot be written, or the animal of `start_from` does not exist.
         LockedError: another process is creating a run in the directory.
-        BackendError: Dr.Jit cannot find a usable LLVM library.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         ExecutorError: no worker can evaluate candidates.
         OSError: a file of the run cannot be read or written.
     """
@@ -91,7 +91,7 @@ def resume(
         RunError: the run does not exist, its format is too old, its record is damaged or cannot be written, or the
             search proposes candidates that differ from those on record.
         LockedError: another process is working on the run.
-        BackendError: Dr.Jit cannot find a usable LLVM library.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         ExecutorError: no worker can evaluate candidates.
         OSError: a file of the run cannot be read.
     """

@@ -23,7 +23,7 @@ class Checkpoint:
     """State of a training run.
 
     steps: number of training steps so far
-    curve: (steps, mean return of the evaluation episodes) at each evaluation so far
+    curve: (steps, mean return) of each evaluation so far
     unit: number by which the learner divides rewards
     now: current values of all tensors that learning changes
     best: values of the same tensors at the evaluation with the highest mean return

@@ -35,6 +35,8 @@ def final_episodes(
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ValueError: `episodes` is below 1, or `seed` is negative.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         TrainingDiverged: the policy's actions, or the returns, are not finite.
         UnfitPolicy: the policy was trained with different eyes.
     """

@@ -50,7 +50,7 @@ class Training:
 
     policy: policy at the best evaluation
     steps: number of agent steps, in whole rollouts
-    curve: (steps, mean return of the evaluation episodes), every `eval_interval` steps
+    curve: (steps, mean return) of each evaluation during training
     end: state at the end of training, from which it can continue
     """
 

@@ -40,6 +40,7 @@ def export_run(
         RunError: the candidate does not exist, or its policy is missing or damaged.
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
         ValueError: `every` is not a whole number from 1 to 1,000,000.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file cannot be read or written.
     """
     if out is not None:

@@ -42,10 +42,11 @@ def write_replay(
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
         ConfigError: the package `rerun` or ffmpeg is needed but not installed, `out` has the ending of an additional
-            file, a format is unknown, `every` is given without "rrd", the run has no test set, or the user task was not
-            named when the run was opened.
+            file, a format or the mode is unknown, `every` is given without "rrd", the run has no test set, or the user
+            task was not named when the run was opened, or fails.
         StrangeFileError: `out` is not a regular file, for example a directory.
         ValueError: `every` is not a whole number from 1 to 1,000,000.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file cannot be read or written.
     """
     if isinstance(also, str) or not set(also) <= set(BESIDE):

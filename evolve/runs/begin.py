@@ -93,7 +93,7 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
         ConfigError: a setting is invalid, the optimizer is unknown, random layouts cannot be drawn or two of them are
             equal, or the user task fails or has several mounts that no animal would use; the message is one line.
         RunError: the run or the animal of `start_from` does not exist, or its record is damaged.
-        BackendError: Dr.Jit cannot find a usable LLVM library.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     starts = starts_from(request.start_from) if request.start_from else None
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)

@@ -34,7 +34,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
         RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or its
             format is too old for the run to be continued.
         ConfigError: config.toml is invalid, or the user task was not named when the run was opened or fails.
-        BackendError: Dr.Jit cannot find a usable LLVM library.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file of the run cannot be read or written.
     """
     device.make_ready()

@@ -31,8 +31,8 @@ class SameSearch:
     """Comparison of a search's proposals with a run's record.
 
     The first generation follows from the settings alone, so its tolerance is ROUNDING. Later generations have the wider
-    tolerance TAKEN_FOR_ANOTHERS if the optimizer's libraries have the same versions as at the start of the run, and
-    otherwise also ROUNDING.
+    tolerance TAKEN_FOR_ANOTHERS, but only if the optimizer's libraries have the same versions as at the start of the
+    run. With other versions, the tolerance of all generations is ROUNDING.
     """
 
     def __init__(self, run: Run) -> None:

@@ -85,7 +85,7 @@ def prepare_device() -> None:
     Also configure glibc so that freed memory is kept for later arrays.
 
     Raises:
-        BackendError: Dr.Jit cannot work here.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     from optics.numerics import device
     from sim.envs.threads import set_threads

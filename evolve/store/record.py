@@ -56,7 +56,6 @@ class Record:
         """Read a record, and check the values of each line, its checksum, and its agreement with the other lines.
 
         config: settings of the run, with which the lines must agree
-
         before_damage: True to use only the lines before the first damaged line, if there is one
 
         Raises:

@@ -56,7 +56,7 @@ def validate(arguments: Namespace) -> int:
 
     Raises:
         ConfigError: a name is unknown.
-        BackendError: Dr.Jit cannot find a usable LLVM library.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     listed = CHECKOUT / "validation" / "proofs.toml"
     if not listed.is_file():
