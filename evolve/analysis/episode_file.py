@@ -91,7 +91,7 @@ def load_episode(path: Path | str) -> Episode:
         rest["reward_terms"] = {name: arrays.pop(f"term_{name}") for name in terms}
         return _of_first_form(rest, arrays) if form == 1 else _of_second_form(rest, arrays)
     except (OSError, EOFError, LookupError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{path} holds no episode: {error}") from error
+        raise ValueError(f"{path} contains no episode: {error}") from error
 
 
 def _of_second_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:

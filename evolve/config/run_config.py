@@ -63,8 +63,8 @@ class RunConfig:
     workers: number of worker processes; 0: one per core
     task_sha256: SHA-256 of a user task's file; "" for a built-in task
     genome: use of each gene of the animals, by name
-    code: code of the user task, if the user has named the task in the command or call; code that only a file names is
-        never executed
+    code: code of the user task, if the user has named the task in the command or call; else None. The code of a task
+        that is named only in a file is never executed
 
     The other fields are sections of settings; the classes of the sections describe them.
 

@@ -72,7 +72,7 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
     settings = Source(f"preset {name}", tree, text)
     if not scales:
         if scale is not None:
-            raise ConfigError(f"scale {quoted(scale)}: preset {name} comes in one scale only")
+            raise ConfigError(f"scale {quoted(scale)}: preset {name} has only one scale")
         return [settings]
     chosen = scale or SCALES[0]
     if not isinstance(chosen, str) or chosen not in scales:

@@ -153,7 +153,7 @@ class Phenotype:
         return self._guide(min(1e-6 * self.rhabdom_diameter_um, side), eye, eye.rhabdom_length or None)
 
     def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
-        """Return the pupil of the eyes; None for a perfect lens."""
+        """Return the pupil of the eyes; None for a perfect lens and for compound eyes."""
         import optics
 
         if self.relative_aperture is None or self.relief is None or self.refractive_index is None:
@@ -169,7 +169,11 @@ class Phenotype:
         )
 
     def eyes(self, eye: EyeConfig) -> sim.Eyes:
-        """Return the eyes for the simulation."""
+        """Return the eyes for the simulation.
+
+        Raises:
+            ValueError: a field is outside the range that `sim.Eyes` allows.
+        """
         import optics
         import sim
 
@@ -197,6 +201,9 @@ class Phenotype:
         """Return one eye in the medium of a run's worlds: a camera eye or a compound eye.
 
         medium: one of `MEDIA_OF_WORLDS`, in which a camera eye is immersed; it does not change a compound eye
+
+        Raises:
+            ValueError: the medium is unknown, or a field is outside the range that `sim.Eyes` allows.
         """
         import optics
         import sim

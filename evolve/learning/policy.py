@@ -232,7 +232,7 @@ def load_policy(path: Path | str) -> EyePolicy:
             raise ValueError(f"its units are not {UNITS.__name__}, which this version uses")
         config = PolicyConfig.from_record(stored)
         if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
-            raise ValueError("it holds numbers that are not finite")
+            raise ValueError("it contains numbers that are not finite")
         _require_shape(config, tensors)
         policy = build_policy(config)
         set_learnt(policy, tensors)

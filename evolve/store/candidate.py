@@ -176,7 +176,7 @@ class Candidate:
         names = [KEYS.get(f.name, f.name) for f in fields(cls)]
         task_fitness = record.pop("task_fitness", None) if isinstance(record, dict) else None
         if not isinstance(record, dict) or sorted(record) != sorted(names):
-            raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
+            raise ValueError(f"wrong fields: must be exactly {', '.join(names)}")
         try:
             candidate = cls(
                 **{name: whole_number(record[name], name, 0, most) for name, most in _COUNTS.items()},

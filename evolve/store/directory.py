@@ -101,7 +101,7 @@ class Run:
         try:
             config = from_text(read(path / CONFIG, LARGEST_TOML), str(path / CONFIG))
         except FileNotFoundError:
-            raise RunError(f"{path} is not a run: it holds no {CONFIG}") from None
+            raise RunError(f"{path} is not a run: it contains no {CONFIG}") from None
         if task is not None:
             config = config.with_code(task)
         return cls(path, config, Record.read(path / CANDIDATES, config, before_damage))

@@ -28,7 +28,7 @@ def copy_shipped_run(directory: Path) -> Run:
     there = [name for name in files if (directory / name).exists()]
     same = all(_same(directory / name, files[name]) for name in there)
     if not same or (not there and directory.exists() and any(directory.iterdir())):
-        raise RunError(f"{directory} holds other files: choose another directory with --out")
+        raise RunError(f"{directory} contains other files: choose another directory with --out")
     directory.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         if name not in there:

@@ -239,7 +239,7 @@ def test_the_shipped_run_is_copied_once_and_only_where_nothing_else_is(tmp_path)
     assert copy_shipped_run(tmp_path / "empty").best == first.best
     (tmp_path / "thesis.tex").touch()
     for place in (path, tmp_path):
-        with pytest.raises(RunError, match=f"^{place} holds other files: choose another directory with --out$"):
+        with pytest.raises(RunError, match=f"^{place} contains other files: choose another directory with --out$"):
             copy_shipped_run(place)
 
 
