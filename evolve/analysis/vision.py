@@ -56,6 +56,7 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
         ValueError: the eyes that the task places differ from the animal's.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     medium = config.world.medium
     eye = animal.eye(config.eye, medium)
@@ -83,6 +84,7 @@ def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floa
         ConfigError: see `vision`.
         ValueError: see `vision`.
         optics.AccuracyError: the PSF cannot be computed accurately enough.
+        optics.BackendError: see `vision`.
     """
     eyes, task = animal.eyes(config.eye), animal_task(animal, config)
     if (light := task.compared_light) is None:

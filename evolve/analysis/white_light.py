@@ -22,6 +22,7 @@ class WhiteLight:
 
     Raises:
         optics.AccuracyError: the PSF (in `from_eye`) or a measure (on access) cannot be computed accurately enough.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
 
     eye: optics.Eye
@@ -82,7 +83,8 @@ def eye_image_quality(phenotype: Phenotype, config: EyeConfig, medium: str = "ai
     medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
 
     Raises:
-        optics.AccuracyError: the PSF cannot be computed.
+        optics.AccuracyError: the PSF cannot be computed accurately enough.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     eye = phenotype.eye(config, medium)
     assert isinstance(eye, optics.Eye)

@@ -47,6 +47,7 @@ def evaluate(
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: the policy or a checkpoint cannot be written.
     """
     began, failures = time.perf_counter(), Counter[str]()

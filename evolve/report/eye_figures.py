@@ -229,8 +229,9 @@ def _mtf(light: WhiteLight) -> Html:
 def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
     """Return the MTF in white daylight of a circular aperture of the same width without aberrations, (frequency,).
 
-    In each band, the MTF is (2/π)(arccos s - s √(1 - s²)), where s is the frequency divided by the cutoff frequency
-    (Goodman, §6.3.3). The bands are weighted by daylight and by the mean sensitivity of the eye's channels.
+    In each band, the MTF is (2/π)(arccos s - s √(1 - s²)) for s < 1, else 0, where s is the frequency divided by the
+    cutoff frequency (Goodman, Fourier Optics, §6.3.3). The bands are weighted by daylight and by the mean sensitivity
+    of the eye's channels.
 
     frequency: spatial frequencies on the retina [1/m]
     """

@@ -250,6 +250,7 @@ def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> byte
     Raises:
         RunError: the run has a test set of layouts, and the policy of the best candidate is missing or damaged.
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file of the run cannot be read.
     """
     makers = list(_makers(run, episode))

@@ -68,7 +68,8 @@ def label(name: str) -> str:
 def inline(figure: Figure, name: str, alt: str) -> Html:
     """Return a figure as an <svg> element.
 
-    The page's content security policy does not allow styles in elements. They are moved to the page's style sheet.
+    The page's content security policy does not allow styles in elements. The styles of the figure are therefore moved
+    to the page's style sheet.
 
     name: prefix of the ids in the element, unique on the page
     alt: description of the figure for screen readers

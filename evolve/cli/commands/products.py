@@ -61,6 +61,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
     Raises:
         RunError: the policy of the best animal is missing or damaged.
         ConfigError: the user task was not named when the run was opened, or fails.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file cannot be read or written.
     """
     with Waiting(3 + replay, shown) as wait:
