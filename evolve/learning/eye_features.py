@@ -67,7 +67,7 @@ class EyeFeatures(BaseFeaturesExtractor):
     All layers have the same width. An observation may have one of two forms, which give the same features. Environments
     return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each frame once:
     `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number of steps
-    since the first frame of the episode. Samples are then (step, segment) flattened.
+    since the first frame of the episode. The samples are then the pairs (step, segment) in row-major order.
 
     Frames of a compound eye have the axes (ommatidium, channel) instead of (eye, channel, height, width). Two layers of
     `hexagonal_layers` come before the encoder, and all ommatidia of the observation count as one eye.
