@@ -264,7 +264,7 @@ def _play(
 
 
 def _on_ground(infos: list[Mapping[str, Any]]) -> dict[str, np.ndarray]:
-    """Return positions [m] and headings [rad] before each action, if the task's `info` contains them.
+    """Return positions [m] and headings [rad] before each action by name; {} if the task's `info` lacks them.
 
     These values are exact, in contrast to headings that are computed from rotation matrices.
     """

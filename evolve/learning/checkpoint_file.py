@@ -29,7 +29,7 @@ class CheckpointError(ValueError):
 
 
 class CheckpointWarning(UserWarning):
-    """A checkpoint that cannot be used has been renamed; training starts from an earlier checkpoint or the beginning."""
+    """A checkpoint that cannot be used was renamed; training starts from an earlier checkpoint or the beginning."""
 
 
 def metadata_of(content: bytes) -> dict[str, str]:
