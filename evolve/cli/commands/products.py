@@ -142,7 +142,12 @@ def _waiting(arguments: Namespace, text: str) -> Waiting:
 
 
 def _open(arguments: Namespace) -> Run:
-    """Open the run, and check that eyes can be computed on this machine."""
+    """Open the run, and check that eyes can be computed on this machine.
+
+    Raises:
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        RunError: the directory contains no run, or its record is damaged; see `Run.open` for its other errors.
+    """
     run = Run.open(arguments.directory, arguments.task, arguments.before_damage)
     device.make_ready()
     return run
