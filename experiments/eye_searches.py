@@ -28,9 +28,11 @@ PRICES = ("costs.per_receptor=0.01", "costs.per_eye=2")
 PRESET = "bifurcation-detection"  # for both tasks, so that the genomes are equal
 # Square eyes, 45° high and wide; 16 candidates in each of 12 generations. The training runs are the first 106,496 steps
 # of those in the experiment on factors of eyes, with one evaluation at the end (docs/results/training_length.md).
+LENGTH = {"learning.total_steps": 105_000, "learning.eval_interval": 105_000}
 SETTINGS = (
     *("eye.square=true", "eye.noise_sigma=0.01", "search.population=16", "search.generations=12"),
-    *("search.active=false", *LEARNER, "learning.total_steps=105000", "learning.eval_interval=105000"),
+    *("search.active=false", *(one for one in LEARNER if one.partition("=")[0] not in LENGTH)),
+    *(f"{name}={value}" for name, value in LENGTH.items()),
 )
 
 
