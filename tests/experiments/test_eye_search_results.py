@@ -173,9 +173,9 @@ def test_incomplete_groups_are_refused_and_complete_ones_found(tmp_path, monkeyp
 
 @pytest.mark.slow
 def test_records_with_opposite_selection_reproduce_the_difference(tmp_path, monkeypatch):
-    """Fitness rises with ln(width / eyes) in detection and falls with it in mazes; 100 random searches per group."""
+    """Fitness rises with ln(width / eyes) in detection and falls with it in mazes; 80 random searches per group."""
     monkeypatch.setattr(eye_searches, "SETTINGS", (*eye_searches.SETTINGS, "search.generations=6"))
-    monkeypatch.setattr("experiments.drift.SEEDS", 100)
+    monkeypatch.setattr("experiments.drift.SEEDS", 80)
     signs = {"maze": -100, "detection": 100}
     for search in searches():
         record(tmp_path, search, lambda animal, _, sign=signs[search.task]: sign * ratio(animal))
