@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from experiments import designed
 from experiments.designed import Design, Trained
 from experiments.eye_factors_design import CAMERA, COMPOUND, LEARNER, TASKS, animals, in_task, runs_of
 from experiments.means import mean_of
-from experiments.page import Page, markdown_table
+from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import RECORDS, Origin, read_rows
 
 __all__ = ["Agreement", "agreement", "page"]
@@ -37,7 +37,7 @@ def _scaled(steps: int, more: str = "") -> str:
 SEARCHES = {task: [RECORDS / f"course-{task}-{seed}" for seed in range(3)] for task in ("navigation", "detection")}
 FULL = Path(__file__).parents[1] / "docs/results/data/eye_factors.csv"  # full training runs
 PAIR, SEED = (COMPOUND, CAMERA), 0
-AVERAGED = ("correlation", "shared", "selected", "by_fitness")
+COLORS = ("#D55E00", "#0072B2")
 FIRST = "learning.total_steps=105000 learning.eval_interval=105000"  # trains for 106,496 steps
 SCHEDULES = {
     "50,000 steps": _scaled(50_000),
@@ -91,18 +91,46 @@ def _fitter_half(values: np.ndarray) -> np.ndarray:
     return order
 
 
-def agreement_table() -> str:
-    """Return a table of agreements in the stored searches, with a row per task and evaluation."""
-    lines = []
+def agreements() -> dict[str, list[Agreement]]:
+    """Return the agreement of each evaluation in the stored searches, by task, averaged over the searches."""
+    found = {}
     for task, folders in SEARCHES.items():
         runs = [Run.open(folder) for folder in folders]
         searches = [[run.generation(g) for g in range(run.config.search.generations)] for run in runs]
-        for evaluation in range(len(runs[0].candidates[0].curve)):
-            found = [agreement(one, evaluation) for one in searches]
-            means = (np.mean([getattr(one, name) for one in found]) for name in AVERAGED)
-            lines.append([f"{task}, {found[0].steps:,}", *(f"{mean:.2f}" for mean in means)])
+        evaluations = range(len(runs[0].candidates[0].curve))
+        found[task] = [_mean([agreement(one, evaluation) for one in searches]) for evaluation in evaluations]
+    return found
+
+
+def _mean(found: Sequence[Agreement]) -> Agreement:
+    means = (float(np.mean([getattr(one, field.name) for one in found])) for field in fields(Agreement)[1:])
+    return Agreement(found[0].steps, *means)
+
+
+def agreement_table(found: Mapping[str, Sequence[Agreement]]) -> str:
+    """Return a table of agreements, with a row per task and evaluation."""
+    lines = [
+        [f"{task}, {one.steps:,}", *(f"{getattr(one, field.name):.2f}" for field in fields(one)[1:])]
+        for task, evaluations in found.items()
+        for one in evaluations
+    ]
     header = ["steps", "rank correlation", "same half", "selected by evaluation", "selected by fitness"]
     return markdown_table(header, lines)
+
+
+def draw(found: Mapping[str, Sequence[Agreement]], path: Path) -> None:
+    """Draw the rank correlation and the selection on the shape of eyes over the number of training steps."""
+    figure, axes = new_figure(9, 3.6, columns=2)
+    for (task, evaluations), color in zip(found.items(), COLORS, strict=True):
+        steps = [one.steps for one in evaluations]
+        axes[0, 0].plot(steps, [one.correlation for one in evaluations], "o-", color=color, label=task)
+        axes[0, 1].plot(steps, [one.selected for one in evaluations], "o-", color=color, label=task)
+        axes[0, 1].axhline(evaluations[-1].by_fitness, color=color, ls="--", lw=0.8)
+    axes[0, 0].set(xlabel="training steps", ylabel="rank correlation with fitness", ylim=(0, 1))
+    axes[0, 1].set(xlabel="training steps", ylabel="selected ln(width / eyes)")
+    axes[0, 0].legend(frameon=False)
+    figure.suptitle("After two thirds of the training steps, the fitter half has almost the final eyes")
+    save(figure, path)
 
 
 def schedules_table(rows: Sequence[Trained], full: Sequence[Trained]) -> str:
@@ -165,17 +193,17 @@ def designs() -> list[Design]:
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
     """Return the page of results, made from stored rows and from the records of searches."""
-    full = read_rows(Trained, FULL)
+    full, found = read_rows(Trained, FULL), agreements()
     return Page(
         name=NAME,
         command=f"python -m experiments.{NAME} --compute",
         values={
             "answer": answer,
-            "agreement": agreement_table(),
+            "agreement": agreement_table(found),
             "ranks": ranks_table(rows, full),
             "schedules": schedules_table(rows, full),
         },
-        figures=[],
+        figures=[Figure(NAME, lambda path: draw(found, path))],
         origin=origin,
     )
 
