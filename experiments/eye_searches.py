@@ -19,9 +19,10 @@ from experiments import planned_searches
 from experiments.eye_factors_design import LEARNER, TASKS
 from experiments.planned_searches import PlannedSearch
 
-__all__ = ["PRICES", "Search", "main", "searches"]
+__all__ = ["KINDS", "PRICES", "SEEDS", "Search", "main", "searches"]
 
 SEEDS = (0, 1, 2)
+KINDS = ("free", "priced", "random")
 PRICES = ("costs.per_receptor=0.01", "costs.per_eye=2")
 PRESET = "bifurcation-detection"  # for both tasks, so that the genomes are equal
 # Square eyes, 45° high and wide; 16 candidates in each of 12 generations, all trained to the end.
