@@ -85,7 +85,7 @@ def test_tests_use_only_their_own_pairs_and_end_with_the_first_significant_one()
 
 @pytest.mark.slow
 def test_without_a_difference_the_planned_tests_rarely_find_one(monkeypatch):
-    """The three tests together have a level of 0.05, so 20 of 400 experiments without an effect are expected to find one.
+    """The three tests together have a level of 0.05, so 20 of 400 experiments without an effect should find one.
 
     With a probability of 0.99, the number is between 10 and 31. Three tests at a level of 0.05 each would have a common
     level of 0.107 (Armitage 1969), and 43 would be expected.
