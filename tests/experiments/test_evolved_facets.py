@@ -129,7 +129,10 @@ def test_records_with_selection_for_wide_facets_in_dim_light_give_a_page(tmp_pat
     for one in searches()[:7]:
         if one.name == "facets-bright-2":
             assert main(arguments) == 2
-            assert "facets-bright-2 is missing or unfinished, so 2 pairs" in capsys.readouterr().err
+            assert (
+                "facets-bright-2 is missing or unfinished; complete pairs of searches: 2, must be at least 3"
+                in capsys.readouterr().err
+            )
         sign = 1 if "dim" in one.name else -1
         record(tmp_path, one, lambda a, s=sign: s * a.facet_diameter_um / a.resolution[1])
     assert main(arguments) == 0
