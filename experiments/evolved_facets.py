@@ -73,8 +73,8 @@ def complete_pairs(folder: Path) -> list[tuple[str, Run]]:
     complete = missing // len(LIGHTS)
     if complete < LOOKS[0]:
         raise ValueError(
-            f"{folder}: {runs[missing][0]} is missing or unfinished; complete pairs of searches: {complete}, must be at "
-            f"least {LOOKS[0]}"
+            f"{folder}: {runs[missing][0]} is missing or unfinished; complete pairs of searches: {complete}, "
+            f"must be at least {LOOKS[0]}"
         )
     used = len(LIGHTS) * max(look for look in LOOKS if look <= complete)
     groups = [light for _ in range(max(LOOKS)) for light in LIGHTS]
