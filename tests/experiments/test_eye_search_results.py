@@ -29,7 +29,7 @@ from experiments.eye_search_tests import (
     outcome,
     seeds,
 )
-from experiments.eye_searches import Search, searches
+from experiments.eye_searches import SEEDS, Search, searches
 from experiments.store import Origin
 from tests.experiments.test_evolved import ROW
 
@@ -45,7 +45,7 @@ def store_of(ratios, kinds=TESTED):
     for task in TASKS:
         for kind in kinds:
             name = group(task, kind)
-            for seed in range(3):
+            for seed in SEEDS:
                 eyes, across = (4, round(4 * math.exp(ratios[task]))) if ratios[task] > 0 else (8, 8)
                 rows += [
                     replace(ROW, group=name, seed=seed, generation=g, index=i, n_eyes=eyes, width=across, height=across,
@@ -120,7 +120,7 @@ def test_new_training_runs_of_the_best_animals_have_new_seeds_and_the_layouts_of
     store = store_of(FINE, ("free",))
     wanted = designs(store)
     assert {one.seed for one in wanted} == set(NEW_SEEDS)
-    assert all(f"family_seed={n}" in str([one.own for one in wanted]) for n in range(3))
+    assert all(f"family_seed={seed}" in str([one.own for one in wanted]) for seed in SEEDS)
     trained = [Trained(**vars(one), fitness=60.0 + i, held_out=50.0 + i, steps=1) for i, one in enumerate(wanted)]
     assert best_table(store, []).count("| - | - |") == len(best_table(store, trained).splitlines()) - 2
     assert "| - |" not in best_table(store, trained)
@@ -128,10 +128,10 @@ def test_new_training_runs_of_the_best_animals_have_new_seeds_and_the_layouts_of
 
 def test_random_search_is_compared_after_equal_numbers_of_candidates():
     rows = [
-        replace(ROW, group="maze, random", seed=0, generation=g, index=i, fitness=float(16 * g + i))
+        replace(ROW, group="maze, random", seed=SEEDS[0], generation=g, index=i, fitness=float(16 * g + i))
         for g in range(12) for i in range(16)
     ]  # fmt: skip
-    assert "| maze, random search, seed 0 | 47 | 95 | 191 |" in random_table(Store(rows, [], [], ORIGIN, ""))
+    assert "| maze, random search, seed 20 | 47 | 95 | 191 |" in random_table(Store(rows, [], [], ORIGIN, ""))
 
 
 def record(folder, search, fitness, candidates=None):
@@ -157,15 +157,15 @@ def ratio(animal):
 
 def test_incomplete_groups_are_refused_and_complete_ones_found(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(eye_searches, "SETTINGS", (*eye_searches.SETTINGS, *SMALL))
-    first = Search("maze", "random", 0)
+    first = Search("maze", "random", SEEDS[0])
     record(tmp_path, first, lambda animal, number: float(number), candidates=7)
     arguments = ["--records", str(tmp_path), "--docs", str(tmp_path / "docs")]
     assert eye_search_results.main(arguments) == 2
-    assert "no group of searches is complete; missing or unfinished: eyes-free-maze-0" in capsys.readouterr().err
+    assert "no group of searches is complete; missing or unfinished: eyes-105k-free-maze-20" in capsys.readouterr().err
     (tmp_path / first.name).rename(tmp_path / "former")
     for task in TASKS:
-        record(tmp_path, Search(task, "random", 0), lambda animal, number: float(number))
-    assert [search.kind for search, _ in complete_groups(tmp_path, (0, 1, 2))] == ["random", "random"]
+        record(tmp_path, Search(task, "random", SEEDS[0]), lambda animal, number: float(number))
+    assert [search.kind for search, _ in complete_groups(tmp_path, SEEDS)] == ["random", "random"]
     monkeypatch.setattr(eye_searches, "SETTINGS", (*eye_searches.SETTINGS, "learning.gamma=0.9"))
     assert eye_search_results.main(arguments) == 2
     assert "has other settings than the plan: learning.gamma" in capsys.readouterr().err
@@ -173,16 +173,18 @@ def test_incomplete_groups_are_refused_and_complete_ones_found(tmp_path, monkeyp
 
 @pytest.mark.slow
 def test_records_with_opposite_selection_reproduce_the_difference(tmp_path, monkeypatch):
-    """Fitness rises with ln(width / eyes) in detection and falls with it in mazes; 100 random searches per group."""
-    monkeypatch.setattr(eye_searches, "SETTINGS", (*eye_searches.SETTINGS, "search.generations=6"))
-    monkeypatch.setattr("experiments.drift.SEEDS", 100)
-    signs = {"maze": -100, "detection": 100}
-    for search in searches():
-        record(tmp_path, search, lambda animal, _, sign=signs[search.task]: sign * ratio(animal))
+    """Fitness rises with ln(width / eyes) in detection and falls with it in mazes. There are 80 random searches per
+    task, and no records with prices."""
+    small = "search.population=8", "search.generations=6"
+    monkeypatch.setattr(eye_searches, "SETTINGS", (*eye_searches.SETTINGS, *small))
+    monkeypatch.setattr("experiments.drift.SEEDS", 80)
+    for search in searches()[:6]:
+        sign = {"maze": -100, "detection": 100}[search.task]
+        record(tmp_path, search, lambda animal, _, sign=sign: sign * ratio(animal))
     arguments = ["--docs", str(tmp_path / "docs"), "--records", str(tmp_path)]
     assert eye_search_results.main(arguments) == 0
     text = (tmp_path / "docs/eye_searches.md").read_text()
     assert "**reproduced**" in text
     assert "| free | 6 of 6 |" in text
-    assert "| maze, random search, seed 0 |" in text
+    assert "| priced | 0 of 6 | not computed | - |" in text
     assert (tmp_path / "docs/figures/eye_searches.png").stat().st_size > 5000
