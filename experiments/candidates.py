@@ -48,6 +48,8 @@ class Row:
     above_noise_of_hole: contrast above the noise of the same pupil without its relief
     relief: heights of the relief in [0, 1], row by row; empty for perfect lenses
     glass_power: power of the glass relative to the power that focuses; see experiments.glass
+    facet_diameter_um: width of the facets of compound eyes; NaN for camera eyes
+    rhabdom_diameter_um: NaN for receptors that are not rhabdoms
     peaks_nm: peak wavelengths of evolved pigments [nm]; empty if pigments do not evolve
     """
 
@@ -81,6 +83,8 @@ class Row:
     peaks_nm: str = ""
     full_return: float = NO_NUMBER
     glass_power: float = NO_NUMBER
+    facet_diameter_um: float = NO_NUMBER
+    rhabdom_diameter_um: float = NO_NUMBER
 
 
 def rows_of(run: Run, group: str) -> list[Row]:
@@ -151,12 +155,18 @@ def anatomy(animal: Phenotype, eye: EyeConfig) -> dict[str, Any]:
         "cpd": acuity_cpd(animal),
         "memory_frames": animal.memory_frames,
         "neurons": animal.neurons,
-        "relative_aperture": animal.relative_aperture if animal.relative_aperture is not None else NO_NUMBER,
-        "refractive_index": animal.refractive_index if animal.refractive_index is not None else NO_NUMBER,
+        "relative_aperture": _number(animal.relative_aperture),
+        "refractive_index": _number(animal.refractive_index),
         "relief": " ".join(f"{height:.3g}" for height in animal.relief or ()) if has_optics else "",
         "peaks_nm": " ".join(f"{peak:.1f}" for peak in animal.lambda_max_nm or ()),
         "glass_power": power(animal, eye),
+        "facet_diameter_um": _number(animal.facet_diameter_um),
+        "rhabdom_diameter_um": _number(animal.rhabdom_diameter_um),
     }
+
+
+def _number(value: float | None) -> float:
+    return NO_NUMBER if value is None else value
 
 
 def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:

@@ -10,17 +10,15 @@ after another, until all are complete. It can be interrupted at any time and cal
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from evolve.cli.main import main as evolve
-from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig
+from experiments import planned_searches
 from experiments.eye_factors_design import LEARNER, TASKS
+from experiments.planned_searches import PlannedSearch
 
-__all__ = ["KINDS", "PRICES", "SEEDS", "Search", "command", "main", "searches"]
+__all__ = ["KINDS", "PRICES", "SEEDS", "Search", "main", "searches"]
 
 SEEDS = (20, 21, 22)  # their layouts are in no other experiment
 KINDS = ("free", "priced", "random")
@@ -60,9 +58,14 @@ class Search:
         return (*SETTINGS, *" ".join(layouts).split(), *own, f"seed={self.seed}")
 
     @property
+    def planned(self) -> PlannedSearch:
+        """Name, preset and settings of the search."""
+        return PlannedSearch(self.name, self.task, PRESET, self.assignments)
+
+    @property
     def config(self) -> RunConfig:
         """Settings of the run."""
-        return assemble(self.task, PRESET, assignments=self.assignments)
+        return self.planned.config
 
 
 def searches() -> list[Search]:
@@ -71,37 +74,9 @@ def searches() -> list[Search]:
     return [Search(task, kind, seed) for kind in KINDS for seed in seeds[kind] for task in TASKS]
 
 
-def command(search: Search, folder: Path, workers: int) -> list[str]:
-    """Return the arguments of `evolve` that start a search, or continue it if its run directory exists."""
-    out = folder / search.name
-    if out.exists():
-        return ["resume", str(out)]
-    settings = (*search.assignments, f"workers={workers}")
-    pairs = (part for text in settings for part in ("--set", text))
-    return ["run", search.task, "--preset", PRESET, *pairs, "--out", str(out)]
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """List the searches, or carry them out."""
-    lines = (__doc__ or "").split("\n")
-    options = ArgumentParser(
-        description=lines[0], epilog="\n".join(lines[2:]), formatter_class=RawDescriptionHelpFormatter
-    )
-    options.add_argument("folder", metavar="DIR", type=Path, nargs="?", help="directory of the runs")
-    options.add_argument("--list", action="store_true", help="print the commands that start the searches, then stop")
-    options.add_argument("--workers", type=int, default=1, help="processes of a new run (default: 1)")
-    chosen = options.parse_args(arguments)
-    if chosen.list:
-        for one in searches():
-            print("evolve", *command(one, Path("runs"), chosen.workers))
-        return 0
-    if chosen.folder is None:
-        options.error("DIR: missing; name the directory of the runs, or use --list")
-    for one in searches():
-        code = evolve(command(one, chosen.folder, chosen.workers))
-        if code:
-            return code
-    return 0
+    return planned_searches.main(__doc__ or "", [one.planned for one in searches()], arguments)
 
 
 if __name__ == "__main__":

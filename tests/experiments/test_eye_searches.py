@@ -1,4 +1,4 @@
-"""Searches for eyes in mazes and in detection: equal genomes and learners, and runs that are continued."""
+"""Searches for eyes in mazes and in detection: equal genomes and learners."""
 
 from dataclasses import replace
 
@@ -8,9 +8,8 @@ import pytest
 from evolve.config.assemble import assemble
 from evolve.search.optimizers import Space, build_optimizer
 from evolve.search.successive_halving import trained_steps
-from experiments import eye_searches
 from experiments.eye_factors_design import LEARNER
-from experiments.eye_searches import PRICES, Search, command, main, searches
+from experiments.eye_searches import PRICES, Search, searches
 
 
 def test_only_the_world_differs_between_the_tasks_of_a_group():
@@ -53,26 +52,3 @@ def test_random_search_proposes_uniformly_distributed_genomes():
     drawn = np.array(drawn)
     assert drawn.mean(axis=0) == pytest.approx(np.full(3, 0.5), abs=0.01)
     assert drawn.std(axis=0) == pytest.approx(np.full(3, 1 / np.sqrt(12)), abs=0.01)
-
-
-def test_an_existing_run_is_continued_and_the_next_one_is_started(tmp_path, monkeypatch):
-    called = []
-    monkeypatch.setattr(eye_searches, "evolve", lambda arguments: called.append(arguments) or 0)
-    first, second, *rest = searches()
-    (tmp_path / first.name).mkdir()
-    assert main([str(tmp_path)]) == 0
-    assert called[0] == ["resume", str(tmp_path / first.name)]
-    assert called[1] == command(second, tmp_path, 1)
-    assert called[1][:2] == ["run", second.task]
-    assert len(called) == 2 + len(rest)
-
-
-def test_a_failed_search_ends_the_command_with_its_exit_code(tmp_path, monkeypatch):
-    monkeypatch.setattr(eye_searches, "evolve", lambda arguments: 2)
-    assert main([str(tmp_path)]) == 2
-
-
-def test_without_a_directory_the_command_names_what_is_missing(capsys):
-    with pytest.raises(SystemExit):
-        main([])
-    assert "DIR: missing" in capsys.readouterr().err

@@ -3,8 +3,12 @@
 The ant of `examples/ant_seeks.py`, whose body consists of primitives, has two eyes of 721 ommatidia in 64 worlds. The
 same eyes are built from 1,442 mounts of an `optics.Eye` with one receptor. For both, the table shows the fewest rays
 whose root mean square error is at most half of the receptors' noise (σ = 0.01, relative to white), and this error. It
-also shows the median CPU times of the signals of a single world and of all worlds. The last lines are the ratios of
-these times, and whole steps per CPU second. The first calls, which compile kernels, are not counted.
+also shows the median CPU times of the signals of a single world and of all worlds, the ratios of these times, and whole
+steps per CPU second. The first calls, which compile kernels, are not counted.
+
+The last lines show where the time of the signals of all worlds goes. The time with more rays gives the time per ray and
+the time that does not depend on rays. Models without shadows, and with an invisible ant and ball, give the shares of
+shadow rays and of the intersections with moving geoms.
 """
 
 from __future__ import annotations
@@ -13,11 +17,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 import optics
 import sim
-from examples.ant_seeks import AntSeeks
+from examples.ant_seeks import AntSeeks, ant_and_ball
 from optics.spectra.spectrum import daylight
 from sim.eyes.compound_eye import WorldEye
 
@@ -26,6 +31,7 @@ SIGMA, TRUE = 0.01, 256
 RAYS = (2, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32)
 OMMATIDIUM = optics.Ommatidium(optics.FacetLens(16e-6, 12e-6), optics.Waveguide(1.9e-6))
 PLACE = (0.27, 0.0, 0.1)
+INVISIBLE = 5  # group of geoms that are not rendered
 
 
 class Ant(AntSeeks):
@@ -117,9 +123,8 @@ def whole_steps(rays: int) -> float:
     return WORLDS / took
 
 
-def main() -> None:
-    """Print the table."""
-    task = Ant()
+def poses_after_steps(task: Ant) -> tuple[sim.Poses, mujoco.MjModel]:
+    """Return the poses of all worlds after five steps with random actions, and the model."""
     worlds = sim.make_vec_env(task, n_envs=WORLDS)
     worlds.reset()
     random = np.random.default_rng(0)
@@ -127,6 +132,43 @@ def main() -> None:
         worlds.step(random.uniform(-1, 1, (WORLDS, 2)))
     poses, model = worlds.simulation.poses(), worlds.worlds.model
     worlds.close()
+    return poses, model
+
+
+def without(shadows: bool = False, movers: bool = False) -> Ant:
+    """Return the task without shadows, or with an invisible ant and ball."""
+    spec, task = ant_and_ball(), Ant()
+    for light in spec.lights:
+        light.castshadow = not shadows
+    for geom in spec.geoms:
+        if movers and geom.name != "floor":
+            geom.group = INVISIBLE
+    task.model = spec
+    return task
+
+
+def signals_time(task: Ant, rays: int) -> float:
+    """Return the median CPU time [s] of the signals of all worlds."""
+    poses, model = poses_after_steps(task)
+    renderer = sim.ModelRenderer(model, task.eye, task.mounts, WORLDS, sim.Fidelity(rays, 4))
+    return cpu_time(lambda: renderer.signals(poses))
+
+
+def print_shares(rays: int) -> None:
+    """Print the parts of the time of the signals."""
+    total, more = signals_time(Ant(), rays), signals_time(Ant(), 4 * rays)
+    of_rays = (more - total) / 3
+    print(f"signals: {1e3 * total:.0f} ms, of which {1e3 * (total - of_rays):.0f} ms do not depend on rays")
+    print(f"a ray: {1e9 * of_rays / (rays * len(Ant.eye) * WORLDS):.0f} ns")
+    for name, task in (("shadow rays", without(shadows=True)), ("moving geoms", without(shadows=True, movers=True))):
+        less = signals_time(task, rays)
+        print(f"{name}: {1e3 * (total - less):.0f} ms")
+        total = less
+
+
+def main() -> None:
+    """Print the table."""
+    poses, model = poses_after_steps(Ant())
     (one, white), places = of_one_receptor(), mounts()
 
     def renderer(eye: WorldEye, at: Sequence[sim.Mount]) -> Callable[[int, int], sim.ModelRenderer]:
@@ -136,6 +178,7 @@ def main() -> None:
     ratios = report("mounts", renderer(one, places), white, poses).times / compound.times
     print(f"ratios: {ratios[0]:.1f} for one world, {ratios[1]:.1f} for {WORLDS} worlds")
     print(f"whole steps with {compound.rays} rays: {whole_steps(compound.rays):.0f} per CPU second")
+    print_shares(compound.rays)
 
 
 if __name__ == "__main__":
