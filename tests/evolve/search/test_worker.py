@@ -158,3 +158,22 @@ def test_glibc_keeps_freed_memory(monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setattr(ctypes, "CDLL", lambda name: SimpleNamespace())
     worker._keep_freed_memory()
+
+
+def test_the_wait_for_the_end_of_the_parent_does_not_keep_a_worker_alive(messages, monkeypatch):
+    waiting = []
+    monkeypatch.setattr(worker, "_die_with_parent", lambda: waiting.append(threading.current_thread().daemon))
+    messages(doubled, [(1,)])
+    assert waiting == [True]
+
+
+def test_a_worker_ends_with_its_parent(monkeypatch):
+    """The main process of an application has no parent process to wait for."""
+    events = []
+    monkeypatch.setattr(worker, "wait", lambda sentinels: events.append(sentinels))
+    monkeypatch.setattr(worker.os, "_exit", events.append)
+    worker._die_with_parent()
+    assert events == []
+    monkeypatch.setattr(worker.multiprocessing, "parent_process", lambda: SimpleNamespace(sentinel=7))
+    worker._die_with_parent()
+    assert events == [[7], 1]
