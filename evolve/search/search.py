@@ -77,7 +77,7 @@ class Search:
     def propose(self) -> Proposal:
         """Return the next candidate."""
         place = Place.from_id(self._next, self._config.search.population)
-        if place.index == 0 and place.generation > 0 and place.generation in self._genotype.phases:
+        if place.index == 0 and place.generation in self._genotype.phases[1:]:
             self._begin_phase(place.generation)
         part, parents = self._optimizer.ask(self._next)
         genome = self._base.copy()
@@ -135,4 +135,4 @@ class Search:
 
 def training_seed(run_seed: int, candidate_id: int) -> int:
     """Return the seed of a candidate's training and evaluation, which differs between candidates."""
-    return int(np.random.SeedSequence([run_seed, candidate_id]).generate_state(1)[0])
+    return int(np.random.SeedSequence([run_seed, candidate_id]).generate_state(1).item())
