@@ -152,7 +152,7 @@ def _level(view: Viewpoint, size: tuple[int, int]) -> _Level:
     across, above = plane_coordinates(view.fovy_deg, size)
     x, y = (a.ravel() for a in np.meshgrid(across, above))
     directions = np.stack([x, y, -np.ones_like(x)], axis=-1) @ view.rotation.T
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         depth = (EYE_HEIGHT - view.position[2]) / directions[:, 2]
     pixels = np.flatnonzero((depth > 0) & np.isfinite(depth))
     depth = depth[pixels]
