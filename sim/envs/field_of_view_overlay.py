@@ -151,7 +151,7 @@ def _color(eye: int) -> np.ndarray:
 def _level(view: Viewpoint, size: tuple[int, int]) -> _Level:
     across, above = plane_coordinates(view.fovy_deg, size)
     x, y = (a.ravel() for a in np.meshgrid(across, above))
-    directions = np.stack([x, y, -np.ones_like(x)], axis=-1) @ view.rotation.T
+    directions = np.stack([x, y, -np.ones_like(x)], axis=1) @ view.rotation.T
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = (EYE_HEIGHT - view.position[2]) / directions[:, 2]
     pixels = np.flatnonzero((depth > 0) & np.isfinite(depth))
@@ -169,7 +169,7 @@ def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field
     """Return the field of view of the eye at the position `eye` (2,) [m], whose axis has this azimuth [rad]."""
     half = np.radians(eyes.fov_deg) / 2
     offset = level.points - eye
-    distance = np.linalg.norm(offset, axis=-1)
+    distance = np.linalg.norm(offset, axis=1)
     angle = (np.arctan2(offset[:, 1], offset[:, 0]) - azimuth + np.pi) % (2 * np.pi) - np.pi
     opacity = np.where(np.abs(angle) <= half, FILL, 0.0)
     rims = [(ray, RIM) for ray in (-half, half)]
@@ -219,7 +219,7 @@ def _dot(eye: np.ndarray, view: Viewpoint, size: tuple[int, int], radius: float)
 def _reach(azimuths: np.ndarray, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """Return the distance to the first surface along these azimuths [m], ignoring the agent's own body."""
     n = len(azimuths)
-    rays = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(n)], axis=-1)
+    rays = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(n)], axis=1)
     hit, distance = np.empty(n, np.int32), np.empty(n)
     origin, groups = np.array([*eye, EYE_HEIGHT]), np.array([True, True, True, False, False, False], np.uint8)
     agent = model.body("agent").id

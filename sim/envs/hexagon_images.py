@@ -81,7 +81,7 @@ def _projected(directions: np.ndarray) -> np.ndarray:
     ahead, left, up = directions.T
     half, cosine = np.arctan2(-left, ahead) / 2, np.hypot(ahead, left)  # half the longitude; cosine of the latitude
     root = np.sqrt(2 / (1 + cosine * np.cos(half)))
-    return np.stack([2 * root * cosine * np.sin(half), root * up], axis=-1)
+    return np.stack([2 * root * cosine * np.sin(half), root * up], axis=1)
 
 
 def _unprojected(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

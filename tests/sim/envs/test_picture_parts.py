@@ -52,11 +52,13 @@ def test_only_visible_pixels_of_a_field_are_stored():
 
 def test_opacities_and_widths_of_lines():
     """Lines are 1.2 pixels wide; a field is drawn up to 30 m, with at most 15 receptors and 64 rays."""
-    level = overlay._Level(np.arange(3), np.ones(3), np.array([[10.0, 0], [10.0, 0.05], [31.0, 0.0]]), np.full(3, 0.1))
+    points = np.array([[10.0, 0], [10.0, 0.05], [30.0, 0], [30.1, 0]])
+    level = overlay._Level(np.arange(4), np.ones(4), points, np.full(4, 0.1))
     one = sim.Eyes(n_eyes=1, resolution=(1, 1), fov_deg=70)
     field = overlay._field(level, one, 0.0, np.zeros(2))
-    assert field.pixels.tolist() == [0, 1]
-    np.testing.assert_allclose(field.opacity, [0.55, 0.55 * (1.2 / 2 + 0.5 - 0.5)], rtol=1e-4)
+    assert field.pixels.tolist() == [0, 1, 2]
+    np.testing.assert_allclose(field.opacity, [0.55, 0.55 * (1.2 / 2 + 0.5 - 0.5), 0.55], rtol=1e-4)
+    assert field.visible(np.full(64, 30.0)).all(), "the surface itself is visible"
     edge = overlay._Level(
         np.arange(2),
         np.ones(2),

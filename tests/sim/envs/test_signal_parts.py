@@ -48,13 +48,13 @@ def eye(**changes):
     return SimpleNamespace(**{**given, **changes})
 
 
-def kind(worlds=None, frames=2, memory=2, **changes):
+def kind(worlds=None, frames=2, memory=2, brightest=1.0, **changes):
     """Return the signals of two eyes, each with three channels and 2 x 4 receptors."""
     renderer = SimpleNamespace(
         eye=eye(**changes),
         mounts=["a", "b"],
         fidelity=SimpleNamespace(frames=frames),
-        brightest=1.0,
+        brightest=brightest,
         only_directional=True,
     )
     keys = np.arange(3, dtype=np.uint64)
@@ -64,13 +64,15 @@ def kind(worlds=None, frames=2, memory=2, **changes):
 # --- space
 
 
-def test_bounds_of_noiseless_signals():
-    """A white surface that faces all lights gives 1; twice this value is the limit. float32 rounds by 1e-4 at most."""
-    space = kind().space
+@pytest.mark.parametrize("brightest", [1.0, 4.0])
+def test_bounds_of_noiseless_signals(brightest):
+    """The limit is twice the signal of a white surface that faces all lights. float32 rounds by 1e-4 at most."""
+    space = kind(brightest=brightest).space
     assert isinstance(space, spaces.Box)
     assert space.shape == (2, 2, 3, 2, 4)
-    np.testing.assert_allclose([space.low.min(), space.low.max()], -1e-4, rtol=1e-6)
-    np.testing.assert_allclose([space.high.min(), space.high.max()], 2 + 1e-4, rtol=1e-6)
+    margin = 1e-4 * brightest
+    np.testing.assert_allclose([space.low.min(), space.low.max()], -margin, rtol=1e-6)
+    np.testing.assert_allclose([space.high.min(), space.high.max()], 2 * brightest + margin, rtol=1e-6)
 
 
 def test_noise_widens_the_bounds_by_ten_standard_deviations():
