@@ -1,12 +1,12 @@
 """Tests of environments: which test covers which module.
 
-assembly: test_construction_parts.py, test_batch_parts.py, test_arguments.py, test_env.py, test_vec_env.py, test_tasks_page.py
+assembly: test_construction_parts.py, test_batch_parts.py, test_arguments.py, test_env.py, test_vec_env.py
 parallel_env: test_parallel_parts.py, test_parallel_env.py, test_pictures.py
 auxiliary: test_world_parts.py, test_auxiliary.py
 one_environment: test_shared_environment.py, test_vec_env.py, test_pictures.py
 calls: test_face_parts.py, test_calls.py
 env: test_face_parts.py, test_env.py
-vec_env: test_vec_env_parts.py, test_batch_parts.py, test_vec_env.py, test_episode_infos.py, test_env.py, test_handed_out.py
+vec_env: test_vec_env_parts.py, test_batch_parts.py, test_vec_env.py, test_episode_infos.py, test_handed_out.py
 vector_env: test_face_parts.py, test_vector_env.py
 registered_env: test_face_parts.py, test_vector_env.py
 registration: test_face_parts.py, test_env.py, test_vector_env.py, worlds/test_catalog.py
