@@ -55,7 +55,7 @@ def test_responses_follow_from_the_last_frame_of_each_interval(frames):
 
 def test_events_are_counted_in_each_action():
     """The light rises by a factor of e in every action, which gives four events with a threshold of 1/4."""
-    dynamics = optics.ReceptorDynamics(1e-3, event_threshold=0.2501, dark_light=0.0)
+    dynamics = optics.ReceptorDynamics(1e-3, event_threshold=0.2501, dark_light=1e-9)
     light = np.exp(np.arange(4.0) + 1)
     signals = np.broadcast_to(light[:, None, None, None, None, None, None], (4, 2, 1, 1, 1, 1, 1))
     found = _responses(dynamics, signals, 2, 0.1).ravel()
