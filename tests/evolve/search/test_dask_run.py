@@ -170,6 +170,7 @@ def test_jobs_are_submitted_again_in_their_order_after_a_lost_connection(tmp_pat
     executor._report = lambda progress: reports.append(progress)
 
     def one_round(waiting, under_way):
+        assert not under_way, "after a lost connection, no former submission is left"
         rounds.append([one.id for one in waiting])
         while waiting:
             one = waiting.popleft()

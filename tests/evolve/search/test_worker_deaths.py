@@ -152,7 +152,7 @@ def test_variables_are_restored(monkeypatch):
 
 
 def test_cores(monkeypatch):
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 4, 6}, raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0: {0, 4, 6}}[process], raising=False)
     assert cores() == 3
     assert LocalExecutor(print, 0).count == 3
     monkeypatch.delattr(os, "sched_getaffinity")
