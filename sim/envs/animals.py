@@ -70,7 +70,7 @@ class Animals:
         """
         simulation = self.simulation
         everyones = self._everyones(actions)
-        failed = simulation.move(np.concatenate(everyones, axis=1) if len(everyones) > 1 else everyones[0])
+        failed = simulation.move(np.concatenate(everyones, axis=1))
         first = 0
         for agent, senses in zip(simulation.agents, self._of_agents, strict=True):
             if senses is not None:
