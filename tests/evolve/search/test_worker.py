@@ -152,10 +152,12 @@ def test_glibc_keeps_freed_memory(monkeypatch):
     """The numbers of the settings are those of malloc.h: M_TRIM_THRESHOLD is -1, M_MMAP_THRESHOLD -3."""
     calls = []
     monkeypatch.setattr(ctypes, "CDLL", lambda name: SimpleNamespace(mallopt=lambda *given: calls.append(given)))
-    worker._keep_freed_memory()
-    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(sys, "platform", "linux")
     worker._keep_freed_memory()
     assert calls == [(-3, 32 * 2**20), (-1, 2**30)]
+    monkeypatch.setattr(sys, "platform", "darwin")
+    worker._keep_freed_memory()
+    assert len(calls) == 2
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setattr(ctypes, "CDLL", lambda name: SimpleNamespace())
     worker._keep_freed_memory()
