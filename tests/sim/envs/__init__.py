@@ -18,7 +18,7 @@ ommatidia_space: test_world_parts.py, test_ommatidia_in_worlds.py
 hexagon_images: test_hexagon_images.py, test_images_for_people.py, test_ommatidia_in_worlds.py
 prepared_task: test_task_parts.py, test_shared_environment.py, test_features.py, evolve/learning/test_fitness.py
 batch_task_checker: test_task_parts.py, test_batch_task.py
-animals: test_animal_parts.py, test_batch_parts.py, test_calls_per_step.py, test_encounter.py, test_parallel_env.py, test_features.py
+animals: test_animal_parts.py, test_batch_parts.py, test_calls_per_step.py, test_encounter.py
 senses: test_world_parts.py, test_batch_parts.py, test_task_vec_env.py, test_task_state.py, test_encounter.py
 eyes_of_kind: test_signal_parts.py, test_receptors_in_time.py, test_eyes_of_kind.py, test_eye_kinds.py, test_features.py
 frame_choice: test_frame_choice.py, test_receptors_in_time.py
