@@ -102,7 +102,8 @@ def test_the_connection_is_closed_at_the_end(monkeypatch, fails):
             executor.__enter__()
         assert made.calls == ["close"]
         return
-    with executor:
+    with executor as entered:
+        assert entered is executor
         assert executor.count == 3
         assert made.given[:2] == (executor.scheduler, 7.0)
         made.given[4]([1, 2, 3])

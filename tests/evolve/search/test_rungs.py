@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from evolve.config.run_config import SearchConfig
-from evolve.search.successive_halving import complete, finished, promoted, reaching, sizes, trained_steps
+from evolve.search.successive_halving import complete, finished, promoted, reaching, sizes, steps, trained_steps
 
 
 @pytest.mark.parametrize(
@@ -57,3 +57,11 @@ def test_of_equal_candidates_the_lower_ids_are_promoted_in_any_order():
     assert promoted(search, 1, [(9, 2.0), (4, 1.0), (7, 2.0)]) == {7, 9}
     assert promoted(search, 1, [(9, 2.0), (4, -math.inf), (7, math.nan)]) == {9}
     assert promoted(search, 2, equal) == set()
+
+
+@pytest.mark.parametrize(("total_steps", "rungs", "expected"), [(9, 1, 3 * 4 * 16), (17, 2, 3 * (4 * 16 + 2 * 8))])
+def test_steps_of_a_run_are_those_of_whole_rollouts(total_steps, rungs, expected):
+    """A rollout has 8 steps. With two rungs, the first one ends after 9 steps, and so after two rollouts."""
+    learning = SimpleNamespace(n_envs=2, n_steps=4, eval_interval=8, total_steps=total_steps)
+    search = SearchConfig(generations=3, population=4, rungs=rungs, promoted=0.5)
+    assert steps(SimpleNamespace(search=search, learning=learning)) == expected
