@@ -155,7 +155,7 @@ def test_progress_is_reported_and_forgotten():
 
 
 def test_a_worker_has_ten_seconds_to_send_its_result(tmp_path):
-    """So has the scheduler for the number of attempts."""
+    """The scheduler has as long for the number of attempts."""
     asked = []
     cluster = Cluster(tmp_path, [Future("finished"), Future("error", KILLED), Future("pending")])
     cluster.executor._connection.ask = lambda call, timeout=None: asked.append(timeout) or call()

@@ -109,7 +109,7 @@ def watcher():
 
 
 def test_a_generation_is_reported_after_all_its_rungs(monkeypatch):
-    """With two rungs, the better half continues. Candidates on record are compared with the proposals."""
+    """The better half continues to the second rung. Candidates on record are compared with the proposals."""
     monkeypatch.setattr(loop, "SameSearch", Unchecked)
     monkeypatch.setattr(TrainingRung, "set_aside_unusable", lambda *_: None)
     run = Record("search.rungs=2", "search.generations=2", "learning.total_steps=16384")

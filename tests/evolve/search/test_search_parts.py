@@ -28,7 +28,7 @@ def mutation(population):
 
 
 def test_parents_come_from_the_last_two_populations():
-    """With a population of 4 there is one parent: the fittest of the last eight candidates with known fitness."""
+    """A population of 4 has one parent: the fittest of the last eight candidates with known fitness."""
     found = mutation(4)
     parents = []
     for number in range(12):
@@ -142,7 +142,7 @@ def test_failures_before_any_success_have_a_fitness_below_all_returns(built):
 
 
 def test_each_phase_has_its_optimizer_which_starts_from_the_best_genome(built):
-    """Of two equal candidates, the first one is the best."""
+    """The first of two equal candidates is the best."""
     search = Search(tiny("genome.fov_deg.opens_at=1", "search.generations=3", "seed=6"))
     assert search.proposed == 0
     first = search.propose_generation()

@@ -199,7 +199,7 @@ def test_long_messages_are_shortened_in_the_middle():
 
 
 def test_four_kinds_of_failures_are_named():
-    """Of equally frequent failures, the first in the alphabet is named first."""
+    """Equally frequent failures are named in alphabetical order."""
     counts = Counter({"e": 1, "d": 1, "c": 5, "b": 2, "a\n x": 2, "others": 7})
     assert most_frequent(counts) == (("c", 5), ("a x", 2), ("b", 2), ("d", 1), ("others", 8))
     assert most_frequent(Counter({"b": 1, "a": 1})) == (("a", 1), ("b", 1))

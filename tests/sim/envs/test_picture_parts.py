@@ -146,7 +146,7 @@ def test_images_are_480_pixels_wide_and_show_the_first_world(monkeypatch):
 
 
 def test_a_built_in_task_has_a_following_camera(monkeypatch):
-    """Of several kinds of eyes, the first is drawn."""
+    """The first of several kinds of eyes is drawn."""
     monkeypatch.setattr(
         world_pictures,
         "FollowCamera",

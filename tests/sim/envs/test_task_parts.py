@@ -258,7 +258,7 @@ def test_trials_are_compared_action_by_action():
 
 
 def test_all_comparisons_are_made(monkeypatch):
-    """By default, four worlds and one world play twelve actions."""
+    """Four worlds and one world play twelve actions by default."""
     made, compared = [], []
     monkeypatch.setattr(batch_task_checker, "Simulation", lambda task, n, seed: made.append((n, seed)) or Closing(n))
     monkeypatch.setattr(batch_task_checker, "_played", lambda worlds, steps: [{"a": np.arange(worlds.n) + steps}])
