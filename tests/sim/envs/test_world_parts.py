@@ -251,7 +251,7 @@ def test_auxiliary_entries(names):
 
 
 def test_flow_is_the_reversed_motion_back_to_the_last_poses(monkeypatch):
-    """Nothing has moved in the first observation. Points that were not in front of the eye have no flow."""
+    """Points have not moved in the first observation. Points that were not in front of the eye have no flow."""
     asked = []
 
     def flow(eye, depth, ids, poses, frames):
