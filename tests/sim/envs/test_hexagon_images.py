@@ -140,6 +140,11 @@ def test_pixels_show_the_nearest_ommatidium(eye):
     assert set(numbers.ravel()) == set(range(len(eye) + 1))
 
 
+def test_a_map_is_at_least_one_pixel_high():
+    """Pairs of ommatidia lie so close together that their hexagons are smaller than a pixel."""
+    assert _numbers.__wrapped__(Ommatidia((-90, 0), (-89.98, 0), (89.98, 0), (90, 0))).shape == (1, 960)
+
+
 @pytest.mark.parametrize("mounts", [1, 2])
 def test_images_have_the_colours_of_signals(monkeypatch, mounts):
     """Two ommatidia have two channels. The gap between the maps of two mounts is 4 pixels wide."""
