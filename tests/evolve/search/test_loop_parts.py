@@ -192,7 +192,7 @@ def test_a_job_of_a_rung_has_the_checkpoints_up_to_it(monkeypatch, rung, ends):
 def written(run, outcome, rung=None):
     job = Job(5, PHENOTYPE, run.config, 3, "path", rung)
     seen = watcher()
-    found = loop._write_down(run, proposal(5), job, outcome, seen)
+    found = loop._record(run, proposal(5), job, outcome, seen)
     assert run.lines[-1] is found
     assert seen.seen == [5]
     return found
