@@ -178,5 +178,5 @@ def test_a_restored_state_has_its_returns(monkeypatch, learners):
     expected = [10, 1, 50, 20, 4, 60][: 3 * learners]
     assert found._returns.tolist() == expected
     assert seen["eyes"].tolist() == [0, 0, 0, 1, 1, 1][: 3 * learners]
-    with pytest.raises(ValueError, match="state: must be what get_state returns"):
+    with pytest.raises(ValueError, match="state: must be the return value of get_state"):
         found.set_state({})

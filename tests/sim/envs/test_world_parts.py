@@ -30,11 +30,11 @@ def test_states_with_the_same_entries_are_accepted():
 @pytest.mark.parametrize(
     ("state", "like", "reason"),
     [
-        (7, LIKE, "must be what get_state returns, with the entries steps, physics"),
-        ({"steps": LIKE["steps"]}, LIKE, "must be what get_state returns"),
-        ({**LIKE, "more": LIKE["steps"]}, LIKE, "must be what get_state returns"),
-        ({**LIKE, MODELS: LIKE["steps"]}, LIKE, "must be what get_state returns"),
-        ({"steps": ONE["steps"], MODELS: ONE[MODELS]}, ONE, "must be what get_state returns"),
+        (7, LIKE, "must be the return value of get_state, with the entries steps, physics"),
+        ({"steps": LIKE["steps"]}, LIKE, "must be the return value of get_state"),
+        ({**LIKE, "more": LIKE["steps"]}, LIKE, "must be the return value of get_state"),
+        ({**LIKE, MODELS: LIKE["steps"]}, LIKE, "must be the return value of get_state"),
+        ({"steps": ONE["steps"], MODELS: ONE[MODELS]}, ONE, "must be the return value of get_state"),
         ({**LIKE, "physics": np.zeros((2, 4))}, LIKE, r"physics has shape \(2, 4\): must be \(2, 3\)"),
         ({**ONE, MODELS: np.zeros((1, 4))}, ONE, r"has shape \(1, 4\): must be \(1, 5\)"),
     ],
