@@ -100,7 +100,7 @@ def test_scenes_of_each_kind_of_eyes(monkeypatch):
         assert found == {name: ("world", of) for name, of in expected.items()}
 
 
-class Renderer:
+class BuiltRenderer:
     def __init__(self, *given):
         self.given, self.labels = given, f"labels of {given[0]}"
 
@@ -110,8 +110,8 @@ class Renderer:
 @pytest.mark.parametrize("scenes", [None, {"a": "scene a", "b": "scene b"}])
 @pytest.mark.parametrize("auxiliary", [(), ("depth",)])
 def test_renderers_of_agents(monkeypatch, scenes, auxiliary):
-    monkeypatch.setattr(renderers, "EyeRenderer", Renderer)
-    monkeypatch.setattr(renderers, "BatchedRenderer", Renderer)
+    monkeypatch.setattr(renderers, "EyeRenderer", BuiltRenderer)
+    monkeypatch.setattr(renderers, "BatchedRenderer", BuiltRenderer)
     monkeypatch.setattr(renderers, "_scene_of_model", lambda simulation, kind, fidelity: f"model {kind.name}")
     kinds = [SimpleNamespace(name="a"), SimpleNamespace(name="b")]
     one = SimpleNamespace(name="prey", kinds=kinds, auxiliary=auxiliary)
