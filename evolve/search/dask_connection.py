@@ -52,8 +52,8 @@ class Connection:
     client: Any = None
     signs: SignsOfLife = field(init=False)
     _question: concurrent.futures.Future[Any] | None = None
-    _asked: float = -math.inf
-    _checked: float = 0.0
+    _asked: float = field(init=False)
+    _checked: float = field(init=False)
     _noted: bool = False
 
     def __post_init__(self) -> None:

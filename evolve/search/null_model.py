@@ -14,6 +14,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -172,8 +173,7 @@ def last_generations(config: RunConfig, generations: int) -> list[range]:
     generations: number of generations of the search
     """
     starts = sorted({use.opens_at for use in config.genome.values() if use.open and use.opens_at < generations})
-    ends = [*starts[1:], generations]
-    return [range(max(start, end - LAST), end) for start, end in zip(starts, ends, strict=True)]
+    return [range(max(start, end - LAST), end) for start, end in pairwise([*starts, generations])]
 
 
 def p_value(values: Sequence[float], ends: Floats) -> float:

@@ -78,7 +78,7 @@ class Search:
     def propose(self) -> Proposal:
         """Return the next candidate."""
         place = Place.from_id(self._next, self._config.search.population)
-        if place.index == 0 and place.generation > 0 and place.generation in self._genotype.phases:
+        if place.index == 0 and place.generation in self._genotype.phases[1:]:
             self._begin_phase(place.generation)
         part, parents = self._optimizer.ask(self._next)
         genome = self._base.copy()
@@ -139,4 +139,4 @@ def training_seed(run_seed: int, candidate_id: int) -> int:
 
     run_seed: the setting `seed` of the run
     """
-    return int(np.random.SeedSequence([run_seed, candidate_id]).generate_state(1)[0])
+    return int(np.random.SeedSequence([run_seed, candidate_id]).generate_state(1).item())

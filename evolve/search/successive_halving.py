@@ -39,7 +39,7 @@ def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
 
 def sizes(search: SearchConfig) -> tuple[int, ...]:
     """Return the number of candidates of a generation that are trained in each rung, (rung,), if no candidate fails."""
-    return tuple(max(1, math.ceil(search.population * search.promoted**rung)) for rung in range(search.rungs))
+    return tuple(math.ceil(search.population * search.promoted**rung) for rung in range(search.rungs))
 
 
 def steps(config: RunConfig) -> int:

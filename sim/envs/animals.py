@@ -71,7 +71,7 @@ class Animals:
         """
         simulation = self.simulation
         commanded = self._all_actions(actions)
-        failed = simulation.move(np.concatenate(commanded, axis=1) if len(commanded) > 1 else commanded[0])
+        failed = simulation.move(np.concatenate(commanded, axis=1))
         first = 0
         for agent, senses in zip(simulation.agents, self._of_agents, strict=True):
             if senses is not None:

@@ -51,12 +51,11 @@ class Auxiliary:
         fresh: indices of the worlds whose episode has just begun
         """
         depth = self._renderer.depth(poses)
-        ids = self._renderer.ids(poses) if {IDS, FLOW} & {*self._names} else None
         found = {DEPTH: np.where(np.isfinite(depth), depth, 0).astype(np.float32)}
-        if ids is not None:
-            found[IDS] = ids
-        if FLOW in self._names and ids is not None:
-            found[FLOW] = self._flow(poses, depth, ids)
+        if {IDS, FLOW} & {*self._names}:
+            found[IDS] = self._renderer.ids(poses)
+        if FLOW in self._names:
+            found[FLOW] = self._flow(poses, depth, found[IDS])
             found[FLOW][fresh] = 0.0
         self._before = poses
         return {self._prefix + name: found[name] for name in self._names}

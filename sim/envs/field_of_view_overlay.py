@@ -152,25 +152,30 @@ def _color(eye: int) -> np.ndarray:
 def _level(view: Viewpoint, size: tuple[int, int]) -> _Level:
     across, above = plane_coordinates(view.fovy_deg, size)
     x, y = (a.ravel() for a in np.meshgrid(across, above))
-    directions = np.stack([x, y, -np.ones_like(x)], axis=-1) @ view.rotation.T
-    with np.errstate(divide="ignore"):
+    directions = np.stack([x, y, -np.ones_like(x)], axis=1) @ view.rotation.T
+    with np.errstate(divide="ignore", invalid="ignore"):
         depth = (EYE_HEIGHT - view.position[2]) / directions[:, 2]
     pixels = np.flatnonzero((depth > 0) & np.isfinite(depth))
     depth = depth[pixels]
     points = view.position[:2] + depth[:, None] * directions[pixels, :2]
-    return _Level(pixels, depth, points, depth * 2 * np.tan(np.radians(view.fovy_deg) / 2) / size[0])
+    return _Level(pixels, depth, points, depth * _pixel(view, size))
+
+
+def _pixel(view: Viewpoint, size: tuple[int, int]) -> float:
+    """Return the size of a pixel at a depth of 1 m [m]."""
+    return float(2 * np.tan(np.radians(view.fovy_deg) / 2) / size[0])
 
 
 def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field:
     """Return the field of view of the eye at the position `eye` (2,) [m], whose axis has this azimuth [rad]."""
     half = np.radians(eyes.fov_deg) / 2
     offset = level.points - eye
-    distance = np.linalg.norm(offset, axis=-1)
+    distance = np.linalg.norm(offset, axis=1)
     angle = (np.arctan2(offset[:, 1], offset[:, 0]) - azimuth + np.pi) % (2 * np.pi) - np.pi
     opacity = np.where(np.abs(angle) <= half, FILL, 0.0)
     rims = [(ray, RIM) for ray in (-half, half)]
     for ray, strength in [*((ray, RAY) for ray in _receptor_rays(eyes)), *rims]:
-        off = distance * np.abs(np.sin(angle - ray)) / np.maximum(level.pixel, 1e-9)
+        off = distance * np.abs(np.sin(angle - ray)) / level.pixel
         line = np.where(np.cos(angle - ray) > 0, strength * np.clip(LINE / 2 + 0.5 - off, 0, 1), 0.0)
         opacity = np.maximum(opacity, line)
     rows = np.flatnonzero((opacity > 0) & (distance <= FARTHEST))
@@ -206,7 +211,7 @@ def _dot(eye: np.ndarray, view: Viewpoint, size: tuple[int, int], radius: float)
     x, y, z = (eye - view.position) @ view.rotation
     across, above = plane_coordinates(view.fovy_deg, size)
     off = np.hypot(across - x / -z, above[:, None] - y / -z).ravel() * -z
-    pixel = -z * float(above[0] - above[-1]) / max(size[0] - 1, 1)
+    pixel = -z * _pixel(view, size)
     iris, pupil = (np.clip((r - off) / pixel + 0.5, 0, 1) for r in (radius, radius * PUPIL / IRIS))
     pixels = np.flatnonzero(iris > 0)
     return _Dot(pixels, iris[pixels].astype(np.float32), pupil[pixels].astype(np.float32), float(-z))
@@ -221,9 +226,9 @@ def _reach(azimuths: np.ndarray, eye: np.ndarray, model: mujoco.MjModel, data: m
     eye: x and y of the pupil [m], (2,)
     """
     n = len(azimuths)
-    rays = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(n)], axis=-1)
-    hit, distance = np.full(n, -1, np.int32), np.full(n, -1.0)
-    origin, groups = np.array([*eye, EYE_HEIGHT]), np.array([1, 1, 1, 0, 0, 0], np.uint8)
+    rays = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(n)], axis=1)
+    hit, distance = np.empty(n, np.int32), np.empty(n)
+    origin, groups = np.array([*eye, EYE_HEIGHT]), np.array([True, True, True, False, False, False], np.uint8)
     agent = model.body("agent").id
     mujoco.mj_multiRay(model, data, origin, rays.ravel(), groups, True, agent, hit, distance, None, n, FARTHEST)
     return np.where(hit >= 0, distance, FARTHEST).astype(np.float32)

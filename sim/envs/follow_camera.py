@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -79,8 +80,9 @@ class FollowCamera:
     def _slow_image(self, scene: Mirror, view: Viewpoint, size: tuple[int, int]) -> tuple[np.ndarray, Nearness]:
         scene.sync(self._data)
         height, width = size
-        spp = self.samples or 1
-        radiance = scene.render(view, width, height, spp=spp, wavelengths=WAVELENGTHS, sampler=_sampler(spp))
+        assert self.samples is not None
+        options: dict[str, Any] = {"spp": self.samples, "sampler": _sampler(self.samples)}
+        radiance = scene.render(view, width, height, wavelengths=WAVELENGTHS, **options)
         linear = np.clip(preview(radiance, WAVELENGTHS * 1e9), 0.0, 1.0)
         depth = scene.render_depth(view, width, height).ravel()
         return np.rint(255 * encode_srgb(linear)).astype(np.uint8), lambda pixels: 1 / depth[pixels]

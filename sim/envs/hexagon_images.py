@@ -27,9 +27,8 @@ def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
     """
     linear = np.einsum("enc,nck->enk", frame.reshape(-1, len(eye), frame.shape[-1]), _palette(eye))
     colours = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
-    background = np.full((len(colours), 1, 3), BETWEEN, np.uint8)
     numbers = _numbers(eye)
-    images = np.concatenate([colours, background], axis=1)[:, numbers]
+    images = np.insert(colours, len(eye), BETWEEN, axis=1)[:, numbers]
     gap = np.full((len(numbers), GAP, 3), BETWEEN, np.uint8)
     return np.concatenate([part for image in images for part in (gap, image)][1:], axis=1)
 
@@ -84,11 +83,10 @@ def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.n
 
 def _projected(directions: np.ndarray) -> np.ndarray:
     """Return Hammer's projection (right, up), (n, 2), of directions (ahead, left, up), unit vectors (n, 3)."""
-    longitude = np.arctan2(-directions[:, 1], directions[:, 0])
-    sine = np.clip(directions[:, 2], -1, 1)
-    cosine = np.sqrt(1 - sine**2)
-    root = np.sqrt(2 / (1 + cosine * np.cos(longitude / 2)))
-    return np.stack([2 * root * cosine * np.sin(longitude / 2), root * sine], axis=-1)
+    ahead, left, up = directions.T
+    half, cosine = np.arctan2(-left, ahead) / 2, np.hypot(ahead, left)  # half the longitude; cosine of the latitude
+    root = np.sqrt(2 / (1 + cosine * np.cos(half)))
+    return np.stack([2 * root * cosine * np.sin(half), root * up], axis=1)
 
 
 def _unprojected(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -96,7 +94,7 @@ def _unprojected(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     square = (x / 4) ** 2 + (y / 2) ** 2
     inside = square <= 0.5
     z = np.sqrt(np.maximum(1 - square, 0))
-    longitude = 2 * np.arctan2(z * x, 2 * (2 * z * z - 1))
-    sine = np.clip(z * y, -1, 1)
-    cosine = np.sqrt(1 - sine**2)
-    return np.stack([cosine * np.cos(longitude), -cosine * np.sin(longitude), sine], axis=-1), inside
+    # Products of the cosine of the latitude with the cosine and the sine of half the longitude.
+    along, across = 2 * z**2 - 1, z * x / 2
+    cosine, longitude = np.hypot(along, across), 2 * np.arctan2(across, along)
+    return np.stack([cosine * np.cos(longitude), -cosine * np.sin(longitude), z * y], axis=-1), inside

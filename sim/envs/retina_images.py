@@ -61,7 +61,7 @@ def hues_of(receptors: Receptors) -> np.ndarray:
         return np.ones((1, 3))
     rank = np.argsort(np.argsort([-kind.peak_nm for kind in types], kind="stable"))
     at = rank / (len(types) - 1)
-    return np.stack([np.clip(1 - 2 * at, 0, 1), 1 - np.abs(2 * at - 1), np.clip(2 * at - 1, 0, 1)], axis=-1)
+    return np.stack([np.maximum(1 - 2 * at, 0), 1 - np.abs(2 * at - 1), np.maximum(2 * at - 1, 0)], axis=1)
 
 
 def shares_of(hues: np.ndarray) -> np.ndarray:
@@ -72,4 +72,4 @@ def shares_of(hues: np.ndarray) -> np.ndarray:
     hues: linear colour of each type, (type, 3)
     """
     sums = hues.sum(axis=0)
-    return np.where(sums > 0, hues / np.where(sums > 0, sums, 1), 1 / len(hues))
+    return np.divide(hues, sums, out=np.full(hues.shape, 1 / len(hues)), where=sums > 0)

@@ -216,8 +216,7 @@ class EyesVecEnv(OneEnvironment):
     def _advance(self) -> Advanced:
         """Take the pending actions."""
         self._calls.take()
-        learners = len(self._learners)
-        return self.animals.advance(np.split(self._commanded, learners) if learners > 1 else [self._commanded])
+        return self.animals.advance(np.split(self._commanded, len(self._learners)))
 
     def _start_episodes(self, ended: np.ndarray) -> Any:
         """Start new episodes in these worlds, and launch their rendering."""

@@ -72,7 +72,7 @@ class _ModelCameras:
 
     def __init__(self, animals: Animals) -> None:
         self._animals, self._simulation = animals, animals.simulation
-        self._cameras: dict[int, tuple[bytes, QuickCamera]] = {}
+        self._cameras: dict[int | None, tuple[bytes, QuickCamera]] = {}
 
     def __call__(self, world: int) -> np.ndarray:
         physics = self._simulation.physics
@@ -88,7 +88,7 @@ class _ModelCameras:
         bodies = physics.bodies
         model = bodies.models[world]
         appearance = model.geom_size.tobytes() + model.geom_rgba.tobytes() + model.geom_matid.tobytes()
-        place = world if bodies.varied else 0
+        place = world if bodies.varied else None
         known, camera = self._cameras.get(place, (b"", None))
         if camera is None or appearance != known:
             camera = QuickCamera(model, self._animals.learners[0].renderer.spectra)

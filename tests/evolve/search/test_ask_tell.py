@@ -73,7 +73,7 @@ def test_it_prints_how_it_goes(capsys):
     main()
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 20
-    assert lines[0].startswith("generation  0  best fitness")
+    assert lines[0] == "generation  0  best fitness  -9.93e-02  at [0.389 0.699 0.75 ]"
     assert float(lines[-1].split()[4]) > 0.01 * float(lines[0].split()[4])
     found = [float(value) for value in lines[-1].split("[")[1].rstrip("]").split()]
     np.testing.assert_allclose(found, [0.7] * 3, atol=0.02)

@@ -152,3 +152,15 @@ def test_progress_is_reported_and_forgotten():
     executor._report(None)
     executor._report(lambda *report: said.append(report))
     assert said == [(3, 10, 40), (4, 20, 40)]
+
+
+def test_a_worker_has_ten_seconds_to_send_its_result(tmp_path):
+    """The scheduler has as long for the number of attempts."""
+    asked = []
+    cluster = Cluster(tmp_path, [Future("finished"), Future("error", KILLED), Future("pending")])
+    cluster.executor._connection.ask = lambda call, timeout=None: asked.append(timeout) or call()
+    cluster.counter.get = lambda timeout: asked.append(timeout) or 1
+    cluster.round()
+    cluster.waiting.append(cluster.job)
+    cluster.round()
+    assert asked == [10.0, None, 10.0]

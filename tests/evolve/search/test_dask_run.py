@@ -102,7 +102,8 @@ def test_the_connection_is_closed_at_the_end(monkeypatch, fails):
             executor.__enter__()
         assert made.calls == ["close"]
         return
-    with executor:
+    with executor as entered:
+        assert entered is executor
         assert executor.count == 3
         assert made.given[:2] == (executor.scheduler, 7.0)
         made.given[4]([1, 2, 3])
@@ -170,6 +171,7 @@ def test_jobs_are_submitted_again_in_their_order_after_a_lost_connection(tmp_pat
     executor._report = lambda progress: reports.append(progress)
 
     def one_round(waiting, under_way):
+        assert not under_way, "after a lost connection, no former submission is left"
         rounds.append([one.id for one in waiting])
         while waiting:
             one = waiting.popleft()

@@ -1,5 +1,8 @@
 """A Dask worker compares its software with that of the sender, and evaluates a candidate from its latest checkpoint."""
 
+import importlib.util
+import sys
+
 import pytest
 
 from evolve.config.assemble import to_toml
@@ -8,6 +11,7 @@ from evolve.search import dask_worker
 from evolve.search.dask_worker import Order, UnfitWorker
 from evolve.search.job import Job
 from evolve.store.evaluation import Evaluation
+from evolve.store.versions import present
 from tests.evolve.closed_form import tiny
 from tests.evolve.small_run import PHENOTYPE
 
@@ -72,3 +76,18 @@ def test_a_candidate_without_rungs_has_no_checkpoint(prepared, tmp_path):
     assert (sent.ends, sent.begun) == ((), None)
     reply = dask_worker._evaluate(lambda *_, progress: failed, sent, lambda steps, planned: None)
     assert dask_worker.decode(reply) == (failed, b"", b"")
+
+
+def test_a_fresh_process_is_not_prepared(monkeypatch):
+    specification = importlib.util.find_spec(dask_worker.__name__)
+    fresh = importlib.util.module_from_spec(specification)
+    monkeypatch.setitem(sys.modules, specification.name, fresh)  # dataclasses look their module up
+    specification.loader.exec_module(fresh)
+    calls = []
+    fresh._software, fresh.prepare_device = lambda: HERE, lambda: calls.append("prepared")
+    fresh._prepare(order())
+    assert calls == ["prepared"]
+
+
+def test_the_software_of_a_worker_is_that_of_its_process():
+    assert dask_worker._software() == present()

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from evolve.config.run_config import SearchConfig
-from evolve.search.successive_halving import complete, finished, reaching, trained_steps
+from evolve.search.successive_halving import complete, finished, promoted, reaching, sizes, steps, trained_steps
 
 
 @pytest.mark.parametrize(
@@ -47,3 +47,21 @@ def test_a_generation_is_complete_when_all_rungs_are_on_record():
     assert not finished(run)
     record.update({(k + 4, 0): SimpleNamespace(id=k + 4, fitness=-math.inf) for k in range(4)})
     assert finished(run)
+
+
+def test_of_equal_candidates_the_lower_ids_are_promoted_in_any_order():
+    search = SearchConfig(population=5, rungs=3, promoted=0.5)
+    assert sizes(search) == (5, 3, 2)
+    equal = [(number, 2.0) for number in (9, 4, 7, 5, 3)]
+    assert promoted(search, 0, equal) == {3, 4, 5}
+    assert promoted(search, 1, [(9, 2.0), (4, 1.0), (7, 2.0)]) == {7, 9}
+    assert promoted(search, 1, [(9, 2.0), (4, -math.inf), (7, math.nan)]) == {9}
+    assert promoted(search, 2, equal) == set()
+
+
+@pytest.mark.parametrize(("total_steps", "rungs", "expected"), [(9, 1, 3 * 4 * 16), (17, 2, 3 * (4 * 16 + 2 * 8))])
+def test_steps_of_a_run_are_those_of_whole_rollouts(total_steps, rungs, expected):
+    """A rollout has 8 steps. With two rungs, the first one ends after 9 steps, and so after two rollouts."""
+    learning = SimpleNamespace(n_envs=2, n_steps=4, eval_interval=8, total_steps=total_steps)
+    search = SearchConfig(generations=3, population=4, rungs=rungs, promoted=0.5)
+    assert steps(SimpleNamespace(search=search, learning=learning)) == expected

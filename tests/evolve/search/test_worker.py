@@ -5,6 +5,7 @@ import errno
 import multiprocessing
 import sys
 import threading
+import warnings
 from types import SimpleNamespace
 
 import pytest
@@ -151,10 +152,98 @@ def test_glibc_keeps_freed_memory(monkeypatch):
     """The numbers of the settings are those of malloc.h: M_TRIM_THRESHOLD is -1, M_MMAP_THRESHOLD -3."""
     calls = []
     monkeypatch.setattr(ctypes, "CDLL", lambda name: SimpleNamespace(mallopt=lambda *given: calls.append(given)))
-    worker._keep_freed_memory()
-    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(sys, "platform", "linux")
     worker._keep_freed_memory()
     assert calls == [(-3, 32 * 2**20), (-1, 2**30)]
+    monkeypatch.setattr(sys, "platform", "darwin")
+    worker._keep_freed_memory()
+    assert len(calls) == 2
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setattr(ctypes, "CDLL", lambda name: SimpleNamespace())
     worker._keep_freed_memory()
+
+
+def test_the_wait_for_the_end_of_the_parent_does_not_keep_a_worker_alive(messages, monkeypatch):
+    waiting = []
+    monkeypatch.setattr(worker, "_die_with_parent", lambda: waiting.append(threading.current_thread().daemon))
+    messages(doubled, [(1,)])
+    assert waiting == [True]
+
+
+def test_a_worker_ends_with_its_parent(monkeypatch):
+    """The main process of an application has no parent process to wait for."""
+    events = []
+    monkeypatch.setattr(worker, "wait", lambda sentinels: events.append(sentinels))
+    monkeypatch.setattr(worker.os, "_exit", events.append)
+    worker._die_with_parent()
+    assert events == []
+    monkeypatch.setattr(worker.multiprocessing, "parent_process", lambda: SimpleNamespace(sentinel=7))
+    worker._die_with_parent()
+    assert events == [[7], 1]
+
+
+def test_streams_are_redirected_at_the_start_and_before_each_candidate(messages, monkeypatch):
+    """A task may close or replace the streams."""
+    events = []
+    monkeypatch.setattr(worker, "send_all_to_stderr", lambda: events.append("streams"))
+    messages(lambda value, progress: events.append(value), [(1,), (2,)], lambda: events.append("prepared"))
+    assert events == ["streams", "prepared", "streams", 1, "streams", 2]
+
+
+def test_a_device_is_prepared_for_one_of_several_workers(monkeypatch):
+    from optics.numerics import device
+    from sim.envs import threads
+
+    events = []
+    monkeypatch.setattr(device, "make_ready", lambda: events.append("device"))
+    monkeypatch.setattr(threads, "set_threads", lambda count: events.append(count))
+    monkeypatch.setattr(worker, "_keep_freed_memory", lambda: events.append("memory"))
+    worker.prepare_device()
+    assert events == ["device", 1, "memory"]
+
+
+def test_a_candidate_is_evaluated_without_the_warning_of_its_run(monkeypatch):
+    from evolve.learning import fitness
+    from sim.scene.mirror import MirrorWarning
+
+    def evaluate(*arguments):
+        warnings.warn("a material", MirrorWarning, stacklevel=1)
+        warnings.warn("something else", UserWarning, stacklevel=1)
+        return arguments
+
+    monkeypatch.setattr(fitness, "evaluate", evaluate)
+    with warnings.catch_warnings(record=True) as shown:
+        warnings.simplefilter("always")
+        found = worker.evaluate_candidate("animal", "config", 5, "path", "rung", progress=print)
+    assert found == ("animal", "config", 5, "path", print, "rung")
+    assert [str(warning.message) for warning in shown] == ["something else"]
+
+
+def test_an_error_is_named_with_its_last_line(monkeypatch):
+    """An error in a task has its place there, even if its type would otherwise end the run."""
+    monkeypatch.setattr(worker, "_give_back_memory", lambda: None)
+
+    def inner():
+        raise ValueError("no")
+
+    line = inner.__code__.co_firstlineno + 1
+    found = evaluated(lambda value, progress: inner(), (1,), print)
+    assert found.failure == f"ValueError: no (test_worker.py:{line})"
+    monkeypatch.setattr(worker, "error_in_task", lambda error: "task.py, line 3")
+    for error in (OSError("x"), ValueError("x")):
+        found = evaluated(raising(error), (1,), print)
+        assert found.failure == "task.py, line 3"
+        assert 0 <= found.seconds < 10
+
+
+@pytest.mark.parametrize("name", ["posix", "nt"])
+def test_memory_is_trimmed_where_the_library_can(monkeypatch, name):
+    calls = []
+    monkeypatch.setattr(worker.gc, "collect", lambda: None)
+    monkeypatch.setitem(sys.modules, "drjit", None)
+    monkeypatch.setattr(worker, "os", SimpleNamespace(name=name))
+    monkeypatch.setattr(ctypes, "CDLL", lambda library: SimpleNamespace(malloc_trim=calls.append))
+    worker._give_back_memory()
+    assert calls == ([0] if name == "posix" else [])
+    monkeypatch.setattr(ctypes, "CDLL", lambda library: SimpleNamespace())
+    worker._give_back_memory()

@@ -1,6 +1,8 @@
 """Deaths of the workers of a local executor, with stand-ins for processes."""
 
 import os
+import signal
+import sys
 from collections import deque
 from types import SimpleNamespace
 
@@ -150,9 +152,61 @@ def test_variables_are_restored(monkeypatch):
 
 
 def test_cores(monkeypatch):
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 4, 6}, raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0: {0, 4, 6}}[process], raising=False)
     assert cores() == 3
     assert LocalExecutor(print, 0).count == 3
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: None)
     assert cores() == 1
+
+
+def test_a_child_does_not_see_the_script_of_its_parent(monkeypatch):
+    """Without a file and a specification of the main module, multiprocessing does not execute it again."""
+    main = SimpleNamespace(__file__="script.py", __spec__="specification", other=1)
+    monkeypatch.setitem(sys.modules, "__main__", main)
+    with local_executor._without_main():
+        assert vars(main) == {"__spec__": None, "other": 1}
+    assert vars(main) == {"__file__": "script.py", "__spec__": "specification", "other": 1}
+    del main.__file__
+    with local_executor._without_main():
+        assert vars(main) == {"__spec__": None, "other": 1}
+    assert vars(main) == {"__spec__": "specification", "other": 1}
+
+
+def test_interrupts_are_held_only_meanwhile():
+    def blocked():
+        return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+    assert not blocked()
+    with local_executor.interrupts_held():
+        assert blocked()
+    assert not blocked()
+
+
+def test_a_new_worker_is_a_daemon_with_one_thread(monkeypatch):
+    """The executor closes its copy of the worker's end of the pipe, so that it notices the worker's death."""
+    events = []
+
+    def process(**options):
+        events.append(options)
+        return SimpleNamespace(start=lambda: events.append(os.environ["OMP_NUM_THREADS"]))
+
+    ends = [SimpleNamespace(close=lambda k=k: events.append(f"closed {k}")) for k in (0, 1)]
+    context = SimpleNamespace(Pipe=lambda: ends, Process=process)
+    monkeypatch.setattr(local_executor.multiprocessing, "get_context", lambda name: {"spawn": context}[name])
+    executor = LocalExecutor(print, 2, "prepare")
+    executor._workers.append("another")
+    found = executor._hire()
+    assert executor._workers == ["another", found]
+    assert found.connection is ends[0]
+    assert events == [
+        {"target": local_executor.work, "args": (ends[1], print, "prepare"), "daemon": True},
+        "1",
+        "closed 1",
+    ]
+
+
+def test_one_worker_for_each_core_by_default(monkeypatch):
+    monkeypatch.setattr(local_executor, "cores", lambda: 5)
+    assert LocalExecutor(print).count == 5
+    assert LocalExecutor(print, 3).count == 3

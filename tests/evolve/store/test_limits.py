@@ -206,3 +206,11 @@ def test_a_candidate_that_is_written_twice_or_cannot_be_read_is_refused(tmp_path
     with pytest.raises(RunError, match=r"jsonl: candidate 1 cannot be written: .*seed.*; nothing is added"):
         run.append(replace(candidate(1), seed=2**64))
     assert len(Run.open(run.path).candidates) == 1
+
+
+@pytest.mark.parametrize(("name", "entry"), [("curve", [1, 2.0]), ("mishaps", ["it fell", 1])])
+def test_entries_of_lists_are_pairs(name, entry):
+    read_back(**{name: [entry]})
+    for wrong in (entry[:1], [*entry, 1], entry[0]):
+        with pytest.raises(ValueError, match=name):
+            read_back(**{name: [wrong]})

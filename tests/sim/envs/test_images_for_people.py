@@ -94,7 +94,16 @@ def test_types_have_colours_by_wavelength():
 
 @pytest.mark.parametrize(
     ("eyes", "height", "width", "scale"),
-    [(1, 1, 1, 240), (2, 10, 20, 23), (3, 5, 4, 48), (4, 2, 60, 3), (1, 300, 10, 1), (1, 2, 2000, 1), (1, 241, 1, 1)],
+    [
+        (1, 1, 1, 240),
+        (2, 1, 2, 239),
+        (2, 10, 20, 23),
+        (3, 5, 4, 48),
+        (4, 2, 60, 3),
+        (1, 300, 10, 1),
+        (1, 2, 2000, 1),
+        (1, 241, 1, 1),
+    ],
 )
 def test_images_of_eyes_are_as_large_as_possible(eyes, height, width, scale):
     """An image has at most 240 x 960 pixels, and gaps of 4 pixels between eyes."""
