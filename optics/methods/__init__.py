@@ -7,6 +7,7 @@ textbook             the angular spectrum in plain NumPy: start here
 carrier              the phase of a spherical wave, which methods remove from fields and restore
 problem              Problem: the parameters of a computation
 pupil_edge           the soft edge of a pupil
+diffraction_kernel   the kernel of the integral, with its near field
 method_sampling      Sampling: the interface of all methods
 rayleigh_sommerfeld  the direct sum: the reference
 angular_spectrum     transforms on grids, whole or with the paraxial part split off

@@ -17,6 +17,7 @@ from optics.apertures.aperture import SoftAperture
 from optics.apertures.circular import SoftAnnulus
 from optics.apertures.curved_disk import curved_ring
 from optics.elements.light_stack import LightStack
+from optics.methods.diffraction_kernel import FAR, diffraction_kernel, near_field
 from optics.methods.sine_samples import MOST_SQUARE, MOST_STRETCH, RIM, SineSamples
 from optics.numerics.array_library import turned
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
@@ -27,7 +28,6 @@ __all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines", "single_sta
 # Choices for tables of the transmittance against r²: number of values per cycle of the edge, and of smoothed waves.
 PER_CYCLE, SMOOTHED_LEVELS = 1000, 16384
 SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a few points
-FAR = 1000.0  # choice: smallest kz for which the near-field term of the kernel is constant over the pupil
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +127,9 @@ class SineStack(SineGeometry):
         if any(beam.pupil.mask is not None for beam in stack.beams):
             size = size * stack.amplitude(*self.points)
         waves = self._waves(stack)
-        if (2 * np.pi * stack.distance / stack.wavelength).min() < FAR:
-            near = (
-                stack.wavelength[:, None, None] * np.sqrt(self._cosine2()) / (2 * np.pi * self.distance[:, None, None])
-            )
-            size, waves = size * np.sqrt(1 + near * near), waves + np.arctan(near) / (2 * np.pi)
+        if (stack.wavelength / stack.distance).max() > 2 * np.pi * FAR:
+            far = self.distance[:, None, None] / np.sqrt(self._cosine2())
+            size = size * near_field(stack.wavelength[:, None, None], far)[0]
         if not self.curvature.any():
             return np.asarray(turned(size, waves, dtype))
         found = turned(1.0, waves, dtype)
@@ -195,19 +193,11 @@ class SineStack(SineGeometry):
 
     def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the paths through points (x, y) [m], in waves up to a constant."""
-        found = stack.waves(x, y)
-        found += self._behind(x, y) / stack.wavelength[:, None, None]
-        return found
+        return np.asarray(stack.waves(x, y) + self._to_middle(stack.wavelength[:, None, None], x, y)[1])
 
-    def _behind(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the path D - ρ [m] from points (x, y) [m] to the middle of the window."""
-        z, middle = self.distance[:, None, None], math.hypot(*self.centre)
-        # D - ρ = (ξ² - 2 c·ξ) / (D + ρ), without a difference of nearly equal numbers
-        excess, rho = x * x + y * y, np.hypot(z, middle)
-        if middle:
-            excess -= 2 * (self.centre[0] * x + self.centre[1] * y)
-        excess /= np.sqrt(excess + rho * rho) + rho
-        return np.asarray(excess)
+    def _to_middle(self, wavelength: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the `diffraction_kernel` from points (x, y) [m] to the middle of the window."""
+        return diffraction_kernel(wavelength, self.distance[:, None, None], (x, y), self.centre)
 
     def to_middle(self, wavelength: float | np.ndarray, dtype: str) -> np.ndarray:
         """Return the factor between the light of samples and their contribution to the middle, (pupil, y, x), complex.
@@ -218,11 +208,7 @@ class SineStack(SineGeometry):
         """
         key = "to_middle", float(wavelength), dtype
         if key not in self.known:
-            z, cosine2 = self.distance[:, None, None], self._cosine2()
-            near = wavelength * np.sqrt(cosine2) / (2 * np.pi * z)
-            size = cosine2 / (z * wavelength) * np.sqrt(1 + near * near)
-            waves = self._behind(*self.points) / wavelength + np.arctan(near) / (2 * np.pi)
-            self.known[key] = turned(size, waves, dtype)
+            self.known[key] = turned(*self._to_middle(wavelength, *self.points), dtype)
         return np.asarray(self.known[key])
 
 

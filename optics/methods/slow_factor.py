@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from optics.methods.diffraction_kernel import near_field
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples
 from optics.methods.sine_samples import SineSamples
@@ -125,7 +126,7 @@ def slow_factor(
     window: tuple[np.ndarray, np.ndarray],
     dtype: str = "float64",
 ) -> np.ndarray:
-    """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
+    """Return the slow factor (z/D)² (1 + i/(kD)) e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
 
     D is the distance from ξ to u, and ρ the distance from the pupil's centre to u. All arrays are broadcast.
 
@@ -191,10 +192,13 @@ def _slow(
     rho2 = x * x + y * y + z * z
     excess = xi * xi + eta * eta - 2 * (x * xi + y * eta)
     distance2 = rho2 + excess
-    excess /= np.sqrt(distance2) + np.sqrt(rho2)
+    distance = np.sqrt(distance2)
+    excess /= distance + np.sqrt(rho2)
     excess += u * s + v * t
     excess /= wavelength
-    return z * z / distance2, excess
+    size, waves = near_field(wavelength, distance)
+    excess += waves
+    return z * z / distance2 * size, excess
 
 
 def _rounded(pair: tuple[np.ndarray, np.ndarray], dtype: str) -> tuple[np.ndarray, np.ndarray]:

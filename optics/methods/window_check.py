@@ -12,9 +12,11 @@ from bisect import bisect
 
 import numpy as np
 
+from optics.methods.diffraction_kernel import diffraction_kernel
 from optics.methods.sine_stack import SineStack
-from optics.methods.slow_factor import Path, axis_kernel, remaining_factor
+from optics.methods.slow_factor import Path, axis_factor, axis_kernel
 from optics.methods.window_sums import intensity_of
+from optics.numerics.array_library import turned
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
 __all__ = ["window_errors"]
@@ -97,7 +99,7 @@ def _ratios(
         s, t = (part[:, None, None] for part in directions)
         more = (1,) * (s.ndim - 3)
         at = u.reshape(len(u), 1, -1, *more), v.reshape(len(v), -1, 1, *more)
-        return remaining_factor(path, samples, (s, t), at, dtype)
+        return _remaining(path, samples, (s, t), at, dtype)
 
     angle, outermost = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None]
     rim = samples.directions(outermost * np.cos(angle), outermost * np.sin(angle))
@@ -115,6 +117,30 @@ def _ratios(
         if np.abs(np.einsum("nvuba,bnk,ank->nvuk", outer, weight[1], weight[0]) - exact).max() < most:
             break
     return nodes, found
+
+
+def _remaining(
+    path: Path,
+    samples: SineStack,
+    directions: tuple[np.ndarray, np.ndarray],
+    place: tuple[np.ndarray, np.ndarray],
+    dtype: str,
+) -> np.ndarray:
+    """Return the `remaining_factor` between directions and positions in the window, which broadcast.
+
+    It follows from the diffraction kernel itself, so that the check shares no approximation with the sums of the PSF.
+    """
+    (s, t), (u, v) = directions, place
+    wavelength, distance = path.numbers(s.ndim)
+    x, y = path.window.centre
+    points = samples.points_at(s, t)
+    size, waves = diffraction_kernel(wavelength, distance, points, (u + x, v + y))
+    middle = diffraction_kernel(wavelength, distance, points, (x, y))
+    size, waves = size / middle[0], waves - middle[1] + (u * s + v * t) / wavelength
+    found = turned(size, waves, dtype)
+    for axis in (0, 1):
+        found *= (1 / axis_factor(path, samples, axis, directions[axis], place[axis])).astype(found.dtype)
+    return found
 
 
 def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -141,7 +141,7 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
     (xi, eta), z = pupil.points, path.distance
     distance = np.sqrt((x - xi) ** 2 + (y - eta) ** 2 + z * z)
     near = path.wavelength / (2 * np.pi * distance) - 1j
-    kernel = slow_factor(path, (xi, eta), (column, row), (u, v)) * near / (path.wavelength * z)
+    kernel = slow_factor(path, (xi, eta), (column, row), (u, v)) * (-1j / (path.wavelength * z))
     kernel = kernel / (axis_factor(path, pupil, 0, column, u) * axis_factor(path, pupil, 1, row, v))
 
     def by_distance() -> np.ndarray:

@@ -3,6 +3,7 @@
 angular_spectrum: test_angular_spectrum.py, test_textbook.py, test_oracles_waves.py, test_even_pupils.py
 carrier: point_spread/test_field.py
 derivative_cells: point_spread/test_gradients.py
+diffraction_kernel: test_diffraction_kernel.py
 far_field: test_textbook.py, test_far_field.py
 far_field_nodes: test_far_field.py
 fresnel: test_fresnel.py

@@ -80,7 +80,7 @@ def test_the_whole_kernel_is_the_product_of_its_factors():
     def kernel(u, v):
         far = np.sqrt((x - u - 3e-6) ** 2 + (y - v + 2e-6) ** 2 + Z**2)
         rho = math.hypot(u + 3e-6, v - 2e-6, Z)
-        return (Z / far) ** 2 * np.exp(2j * np.pi / WAVE * (far - rho))
+        return (Z / far) ** 2 * (1 + 1j * WAVE / (2 * np.pi * far)) * np.exp(2j * np.pi / WAVE * (far - rho))
 
     across, down = (
         axis_kernel(path, samples, axis, np.array([[at]]), "float64")[:, 0, 5::9] for axis, at in enumerate((u, v))
