@@ -14,7 +14,7 @@ import numpy as np
 
 from optics.methods.diffraction_kernel import diffraction_kernel
 from optics.methods.sine_stack import SineStack
-from optics.methods.slow_factor import Path, axis_factor, axis_kernel
+from optics.methods.slow_factor import Path, axis_factor, axis_kernel, remaining_factor
 from optics.methods.window_sums import intensity_of
 from optics.numerics.array_library import turned
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
@@ -27,7 +27,7 @@ ACROSS = 10  # choice: number of rows and of columns in which the check computes
 SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
 INTERPOLATED = 0.5  # choice: largest error of the interpolated kernel of the check, relative to the tolerance
 # Choices: numbers of interpolation points across the pupil, and phases [rad] from which on each is too small.
-ORDERS, PHASES = (2, 3, 5, 7, 9, 12, 16), (0.02, 0.3, 0.8, 1.5, 3.0, 6.0)
+ORDERS, PHASES = (2, 3, 4, 5, 7, 9, 12, 16), (0.02, 0.3, 0.8, 1.2, 1.8, 3.0, 6.0)
 
 
 def window_errors(
@@ -46,20 +46,23 @@ def window_errors(
     total = np.square(images, dtype=np.float64).sum((1, 2))
     rows, columns, chance = _drawn(np.where((total > 0)[:, None, None], images, 1))
     u, v = ((at - n // 2) * window.dx for at, n in zip((columns, rows), window.shape[::-1], strict=True))
-    exact = _at_points(samples, path, field, (u, v), tolerance)
+    exact, apart = _at_points(samples, path, field, (u, v), tolerance)
     drawn = images[np.arange(len(images))[:, None, None], rows[:, :, None], columns[:, None, :]]
     squared = np.mean(np.square(drawn - exact) / chance, (1, 2))
     # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the darker of the two
     bright = np.minimum(total, np.mean(np.square(exact) / chance, (1, 2)))
     total = np.where(total > 0, np.where(squared > 0.01 * total, bright, total), np.nan)
     rounding = float(np.finfo(field.real.dtype).eps)
-    return np.asarray(CAUTION * np.sqrt(squared / total) + UNSEEN * tolerance + rounding)
+    unlike = np.where(apart > tolerance, apart, 0)  # if the factors of the sums do not fit the kernel
+    return np.asarray(CAUTION * (np.sqrt(squared / total) + unlike) + UNSEEN * tolerance + rounding)
 
 
 def _at_points(
     samples: SineStack, path: Path, field: np.ndarray, place: tuple[np.ndarray, np.ndarray], tolerance: float
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """Return |U|² in columns u and rows v [m], relative to the middle of the window, (stack, v, u).
+
+    The second result is the largest difference between the slow factor and the diffraction kernel, (stack,).
 
     The slow factor, divided by its values A along both axes, is interpolated from a few points (ξ_a, η_b) of the pupil
     with weights L_a and L_b:
@@ -67,13 +70,13 @@ def _at_points(
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v) Σ_ηξ L_b A_v e^{-ik v t} P L_a A_u e^{-ik u s}.
     """
     (u, v), dtype = place, str(field.real.dtype)
-    nodes, ratio = _ratios(samples, path, place, dtype, INTERPOLATED * tolerance)
+    nodes, ratio, apart = _ratios(samples, path, place, dtype, INTERPOLATED * tolerance)
     # The nodes and the samples of all pupils are alike, apart from their scale.
     weight = lagrange_basis(samples.at[0], nodes[0]).astype(dtype)
     across, down = (_interpolated_kernel(path, samples, axis, part, weight) for axis, part in enumerate((u, v)))
     sums = down @ field @ across.swapaxes(1, 2)
     split = sums.reshape(len(v), v.shape[1], len(weight), u.shape[1], len(weight))
-    return np.asarray(intensity_of(np.einsum("nvuba,nvbua->nvu", ratio, split)))
+    return intensity_of(np.einsum("nbavu,nvbua->nvu", ratio, split)), apart
 
 
 def _interpolated_kernel(
@@ -86,25 +89,28 @@ def _interpolated_kernel(
 
 def _ratios(
     samples: SineStack, path: Path, place: tuple[np.ndarray, np.ndarray], dtype: str, most: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return interpolation points in sines, (pupil, a), and the factor there, (stack, v, u, b, a).
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return interpolation points in sines, (pupil, a), the factor there, (stack, b, a, v, u), and its error, (stack,).
 
     The factor is the slow factor relative to the middle of the window, divided by its values along both axes. Its
-    interpolation is compared with the factor at the rim, for the outermost columns and rows of each window. The
-    search starts with a number of points that is usually sufficient for the phase there.
+    interpolation is compared with the factor in the middle and at the rim of the pupil, for the outermost columns and
+    rows of each window. The search starts with a number of points that is usually sufficient for the phase there.
+
+    most: error at which the search ends.
     """
 
-    def ratio(directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return the factor in directions (pupil, ...), (stack, v, u, ...)."""
-        s, t = (part[:, None, None] for part in directions)
+    def broadcast(
+        directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray
+    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Return directions (pupil, ...) and positions with the axes (stack, ..., v, u)."""
+        s, t = (part[..., None, None] for part in directions)
         more = (1,) * (s.ndim - 3)
-        at = u.reshape(len(u), 1, -1, *more), v.reshape(len(v), -1, 1, *more)
-        return _remaining(path, samples, (s, t), at, dtype)
+        return (s, t), (u.reshape(len(u), *more, 1, -1), v.reshape(len(v), *more, -1, 1))
 
-    angle, outermost = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None]
-    rim = samples.directions(outermost * np.cos(angle), outermost * np.sin(angle))
+    angle, radius = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None] * np.array([0, *[1] * 12])
+    rim = samples.directions(radius * np.cos([0, *angle]), radius * np.sin([0, *angle]))
     ends = [0, -1]  # rows and columns ascend
-    exact = ratio(rim, *(part[:, ends] for part in place))
+    exact = _remaining(path, samples, *broadcast(rim, *(part[:, ends] for part in place)))
     phase = float(np.abs(np.angle(exact)).max())
     side = samples.at[:, [0, -1]]
     middle, half = side.mean(axis=1)[:, None], np.diff(side) / 2
@@ -112,11 +118,12 @@ def _ratios(
         nodes = middle + half * chebyshev_points(order)
         own = np.broadcast_to(nodes[:, None, :], (len(nodes), order, order))
         weight = [lagrange_basis((part - middle) / half, chebyshev_points(order)) for part in rim]
-        found = ratio((own, own.swapaxes(1, 2)), *place)
-        outer = found[:, ends][:, :, ends]
-        if np.abs(np.einsum("nvuba,bnk,ank->nvuk", outer, weight[1], weight[0]) - exact).max() < most:
+        found = remaining_factor(path, samples, *broadcast((own, own.swapaxes(1, 2)), *place), dtype)
+        outer = np.einsum("nbavu,bnk,ank->nkvu", found[..., ends, :][..., ends], weight[1], weight[0])
+        apart = np.abs(outer - exact).max(axis=(1, 2, 3))
+        if apart.max() < most:
             break
-    return nodes, found
+    return nodes, found, apart
 
 
 def _remaining(
@@ -124,22 +131,17 @@ def _remaining(
     samples: SineStack,
     directions: tuple[np.ndarray, np.ndarray],
     place: tuple[np.ndarray, np.ndarray],
-    dtype: str,
 ) -> np.ndarray:
-    """Return the `remaining_factor` between directions and positions in the window, which broadcast.
-
-    It follows from the diffraction kernel itself, so that the check shares no approximation with the sums of the PSF.
-    """
+    """Return the `remaining_factor` from the diffraction kernel itself, as a check of the factors of the sums."""
     (s, t), (u, v) = directions, place
     wavelength, distance = path.numbers(s.ndim)
     x, y = path.window.centre
     points = samples.points_at(s, t)
     size, waves = diffraction_kernel(wavelength, distance, points, (u + x, v + y))
     middle = diffraction_kernel(wavelength, distance, points, (x, y))
-    size, waves = size / middle[0], waves - middle[1] + (u * s + v * t) / wavelength
-    found = turned(size, waves, dtype)
+    found = turned(size / middle[0], waves - middle[1] + (u * s + v * t) / wavelength, "float64")
     for axis in (0, 1):
-        found *= (1 / axis_factor(path, samples, axis, directions[axis], place[axis])).astype(found.dtype)
+        found /= axis_factor(path, samples, axis, directions[axis], place[axis])
     return found
 
 
