@@ -98,19 +98,11 @@ def _ratios(
 
     most: error at which the search ends.
     """
-
-    def broadcast(
-        directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray
-    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Return directions (pupil, ...) and positions with the axes (stack, ..., v, u)."""
-        s, t = (part[..., None, None] for part in directions)
-        more = (1,) * (s.ndim - 3)
-        return (s, t), (u.reshape(len(u), *more, 1, -1), v.reshape(len(v), *more, -1, 1))
-
+    (u, v), (left, top) = place, ([0, -1, 0, -1], [0, 0, -1, -1])  # corners, since rows and columns ascend
     angle, radius = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None] * np.array([0, *[1] * 12])
     rim = samples.directions(radius * np.cos([0, *angle]), radius * np.sin([0, *angle]))
-    ends = [0, -1]  # rows and columns ascend
-    exact = _remaining(path, samples, *broadcast(rim, *(part[:, ends] for part in place)))
+    corners = u[:, left, None], v[:, top, None]
+    exact = _remaining(path, samples, (rim[0][:, None], rim[1][:, None]), corners)
     phase = float(np.abs(np.angle(exact)).max())
     side = samples.at[:, [0, -1]]
     middle, half = side.mean(axis=1)[:, None], np.diff(side) / 2
@@ -118,9 +110,10 @@ def _ratios(
         nodes = middle + half * chebyshev_points(order)
         own = np.broadcast_to(nodes[:, None, :], (len(nodes), order, order))
         weight = [lagrange_basis((part - middle) / half, chebyshev_points(order)) for part in rim]
-        found = remaining_factor(path, samples, *broadcast((own, own.swapaxes(1, 2)), *place), dtype)
-        outer = np.einsum("nbavu,bnk,ank->nkvu", found[..., ends, :][..., ends], weight[1], weight[0])
-        apart = np.abs(outer - exact).max(axis=(1, 2, 3))
+        directions = own[..., None, None], own.swapaxes(1, 2)[..., None, None]
+        found = remaining_factor(path, samples, directions, (u[:, None, None, None], v[:, None, None, :, None]), dtype)
+        outer = np.einsum("nbac,bnk,ank->nck", found[..., top, left], weight[1], weight[0])
+        apart = np.abs(outer - exact).max(axis=(1, 2))
         if apart.max() < most:
             break
     return nodes, found, apart
