@@ -151,10 +151,9 @@ class SineStack(SineGeometry):
         return np.asarray(self.known[dtype])
 
     def _new_sizes(self, dtype: str) -> np.ndarray:
-        cosine2 = self._cosine2(dtype)
-        size = (self.distance * np.square(self.pitch))[:, None, None].astype(dtype) / cosine2
-        if self.curvature.any():
-            size = size.astype(np.result_type(dtype, np.complex64))
+        stretch = 1 / self._cosine2(dtype)
+        size = (self.distance * np.square(self.pitch))[:, None, None].astype(dtype) * stretch
+        found = np.empty(size.shape, np.result_type(dtype, np.complex64)) if self.curvature.any() else size
         first: dict[tuple[int, float], int] = {}
         kinds = zip(map(id, self.edges), self.curvature.tolist(), strict=True)
         same = np.array([first.setdefault(kind, place) for place, kind in enumerate(kinds)])
@@ -166,16 +165,16 @@ class SineStack(SineGeometry):
                 per_level = (len(profile) - 1) / ((1 + edge.reach) * radius) ** 2
                 if self.centre == (0.0, 0.0):  # r² = z² (1/cos²θ - 1)
                     scale = (np.square(self.distance)[own, None, None] * per_level).astype(dtype)
-                    level = scale / cosine2[own]
+                    level = scale * stretch[own]
                     level -= scale
                 else:
                     x, y = self.points
                     level = (np.square(x[own]) + np.square(y[own])) * per_level
-                size[own] *= profile.take(level.astype(np.int32), mode="clip")
+                found[own] = size[own] * profile.take(level.astype(np.int32), mode="clip")
             else:
                 x, y = self.points
-                size[own] *= _transmittance(edge, x[own] / radius, y[own] / radius)
-        return size
+                found[own] = size[own] * _transmittance(edge, x[own] / radius, y[own] / radius)
+        return found
 
     def _waves(self, stack: LightStack) -> np.ndarray:
         """Return the paths through all samples to the middle of the window, in waves up to a constant, (beam, y, x).

@@ -36,8 +36,8 @@ NEGLECTED = 3e-4  # choice: light that is neglected, as a share of all light, at
 # Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
 # diffraction spreads the light of a ray.
 NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
-# Choices for narrow edges of PSFs without derivatives: cycles per radius at a tolerance of 0.01, and the same relative to
-# those of the rays at the edge.
+# Choices for narrow edges of PSFs without derivatives: cycles per radius at a tolerance of 0.01, and the same relative
+# to those of the rays at the edge.
 NARROW_CYCLES, NARROW_RIM_CYCLES = 4.0, 3.0
 # Choices: distance from the axis [radii] beyond which rays count as rays of the edge, and cycles of most of these rays,
 # relative to their median.
@@ -104,7 +104,10 @@ class WindowEdges:
         return self._where_narrowed(wide, narrow)
 
     def _where_narrowed(self, wide: list[SoftAperture], narrow: list[SoftAperture]) -> list[SoftAperture]:
-        """Return wide soft edges, and narrow ones for some beams. Fine detail of maps sends light from the edge anywhere."""
+        """Return wide soft edges, and narrow ones for some beams.
+
+        Fine detail of maps sends light from the edge anywhere.
+        """
         choices = zip(self._narrowed.tolist(), narrow, wide, strict=True)
         return [one if narrowed else other for narrowed, one, other in choices]
 
