@@ -36,9 +36,9 @@ NEGLECTED = 3e-4  # choice: light that is neglected, as a share of all light, at
 # Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
 # diffraction spreads the light of a ray.
 NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
-# Choices for narrow edges of PSFs without derivatives: cycles per radius at a tolerance of 0.01, and the same relative
-# to those of the rays at the edge.
-NARROW_CYCLES, NARROW_RIM_CYCLES = 4.0, 3.0
+# Choices: the same spread for light behind maps, whose fine detail diffracts light away from its rays. Cycles at a
+# tolerance of 0.01, the same relative to those of the rays at the edge, and exponent of the tolerance.
+MAPPED_CYCLES, MAPPED_RIM_CYCLES, MAPPED_EXPONENT = 4.0, 3.0, -0.4
 # Choices: distance from the axis [radii] beyond which rays count as rays of the edge, and cycles of most of these rays,
 # relative to their median.
 RIM, RIM_CYCLES = 0.85, 1.2
@@ -88,7 +88,7 @@ class WindowEdges:
         narrow = self._narrow(self.density, CARRIED_RIPPLES[0])
         if self.derivatives is not None:
             return narrow
-        return self._where_narrowed(self._wide(self._choice[1].passband, self._ripples(self.curvature)[0]), narrow)
+        return self._unless_mapped(self._wide(self._choice[1].passband, self._ripples(self.curvature)[0]), narrow)
 
     @cached_property
     def finer_edges(self) -> list[SoftAperture]:
@@ -101,15 +101,12 @@ class WindowEdges:
             FINER * self.density - bands.around - _transitions(self._ripples(self.curvature)[1]), bands.passband
         )
         wide = self._wide(np.minimum(passband, SHARPER * bands.passband), self._ripples(self.curvature)[1])
-        return self._where_narrowed(wide, narrow)
+        return self._unless_mapped(wide, narrow)
 
-    def _where_narrowed(self, wide: list[SoftAperture], narrow: list[SoftAperture]) -> list[SoftAperture]:
-        """Return wide soft edges, and narrow ones for some beams.
-
-        Fine detail of maps sends light from the edge anywhere.
-        """
-        choices = zip(self._narrowed.tolist(), narrow, wide, strict=True)
-        return [one if narrowed else other for narrowed, one, other in choices]
+    def _unless_mapped(self, wide: list[SoftAperture], narrow: list[SoftAperture]) -> list[SoftAperture]:
+        """Return wide soft edges, and narrow ones for maps: their fine detail sends light from the edge anywhere."""
+        choices = zip(self.stack.mapped.tolist(), narrow, wide, strict=True)
+        return [one if mapped else other for mapped, one, other in choices]
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, _Bands]:
@@ -155,11 +152,10 @@ class WindowEdges:
         passband = np.maximum(passband, seen)
         stopband = passband + _transitions(self._ripples(curvature)[0])
         reach = self._reach(np.where(np.abs(bend) * r > stopband[:, None], 0, along))
-        wide = self._masks + np.maximum(cycles + reach + SPREAD_CYCLES, near + stopband)
-        sharp = NARROW_CYCLES + NARROW_RIM_CYCLES * np.median(along[:, r > RIM], axis=1)
-        narrow = cycles + reach + sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT + self._masks
-        density = np.where(self._narrowed, np.maximum(narrow, self._widest), wide)
-        return _Bands(density, passband, near)
+        detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * np.median(along[:, r > RIM], axis=1)
+        spread = np.where(self.stack.mapped, detail * (self.tolerance / 0.01) ** MAPPED_EXPONENT, SPREAD_CYCLES)
+        density = self._masks + np.maximum(cycles + reach + spread, near + stopband)
+        return _Bands(np.maximum(density, np.where(self.stack.mapped, self._widest, 0)), passband, near)
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> _Bands:
         """Return the bands of light that carries derivatives.
@@ -181,11 +177,6 @@ class WindowEdges:
         """Cycles per radius with which the narrow edges of the check do not extend beyond EDGE_REACH, (beam,)."""
         widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
         return np.asarray(widest + self._window_cycles / 2)
-
-    @property
-    def _narrowed(self) -> np.ndarray:
-        """True for beams with narrow soft edges: all if waves are not smoothed, and those behind maps, (beam,)."""
-        return np.asarray(self.stack.mapped | (not self.smoothed))
 
     @cached_property
     def _masks(self) -> np.ndarray:
