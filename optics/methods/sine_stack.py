@@ -99,10 +99,14 @@ class SineStack(SineGeometry):
         found: np.ndarray = (1 + np.array([edge.reach for edge in self.edges])) * self.radius
         return found
 
+    def _sine2(self, dtype: str = "float64") -> np.ndarray:
+        """Return the squared sines of the angles between rays and axis, (pupil, y, x)."""
+        across, down = (np.square(self.at + part[:, None]).astype(dtype) for part in self._middle)
+        return np.asarray(across[:, None, :] + down[:, :, None])
+
     def _cosine2(self, dtype: str = "float64") -> np.ndarray:
         """Return the squared cosines of the angles between rays and axis, (pupil, y, x)."""
-        across, down = (np.square(self.at + part[:, None]).astype(dtype) for part in self._middle)
-        found: np.ndarray = (1 - across)[:, None, :] - down[:, :, None]
+        found: np.ndarray = 1 - self._sine2(dtype)
         least = 1 - np.maximum(np.square(self.steepest), MOST_SQUARE)
         if (found[:, [0, 0, -1, -1], [0, -1, 0, -1]].min(axis=1) < least).any():
             np.maximum(found, least[:, None, None], out=found)
@@ -163,10 +167,9 @@ class SineStack(SineGeometry):
             if edge.rotationally_symmetric:
                 profile = _profile(edge, float(self.curvature[place]), dtype)
                 per_level = (len(profile) - 1) / ((1 + edge.reach) * radius) ** 2
-                if self.centre == (0.0, 0.0):  # r² = z² (1/cos²θ - 1)
-                    scale = (np.square(self.distance)[own, None, None] * per_level).astype(dtype)
-                    level = scale * stretch[own]
-                    level -= scale
+                if self.centre == (0.0, 0.0):  # r² = z² tan²θ
+                    level = (np.square(self.distance)[own, None, None] * per_level).astype(dtype) * stretch[own]
+                    level *= self._sine2(dtype)[own]
                 else:
                     x, y = self.points
                     level = (np.square(x[own]) + np.square(y[own])) * per_level
