@@ -240,7 +240,7 @@ def rim_sines(
     steepest = np.hypot(*rim).max(axis=1)
     half = np.max([np.abs(at - own[:, None]).max(axis=1) for at, own in zip(rim, middle, strict=True)], axis=0)
     straight = (1 - np.square(middle[0]) - np.square(middle[1])) ** -1.5
-    squared = np.maximum(1 - np.square(steepest), 1e-300)
+    squared = np.maximum(1 - np.square(steepest), 1e-200)
     return half, steepest, (steepest < 1) & (squared**-1.5 <= MOST_STRETCH * straight)
 
 

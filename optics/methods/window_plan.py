@@ -95,7 +95,7 @@ class WindowPlan:
 
     @cached_property
     def _ranks(self) -> tuple[np.ndarray, np.ndarray]:
-        steepest = np.minimum(self._rims[1], 1.0)
+        steepest = np.minimum(self._rims[1], 1 - 1e-9)  # finite points, also for pupils without a rank
         geometry = SineGeometry(self.stack.distance, self.window.centre, steepest, self._elsewhere)
         return window_ranks(self.stack, geometry, self._rays, self.window, self.tolerance, self.derivatives)
 
