@@ -45,7 +45,7 @@ RIM, RIM_CYCLES = 0.85, 1.2
 # Choices for PSFs that carry derivatives, to which points near the edge contribute as much as others. The soft edge is
 # then narrow: ripples as above, passband relative to the stopband; cycles per radius at a tolerance of 0.01, the same
 # relative to those of the rays at the edge, exponent of the tolerance, and cycles per cell between knots.
-CARRIED_RIPPLES, CARRIED_PASSBAND = (0.03, 0.0075), 0.35
+CARRIED_RIPPLES, CARRIED_PASSBAND = (0.03, 0.002), 0.35
 CARRIED_CYCLES, CARRIED_RIM_CYCLES, CARRIED_EXPONENT, CELL_CYCLES = 7.6, 5.7, -0.4, 0.375
 EDGES = 4  # choice: number of sharpnesses of the edge per octave; equal ones share tables
 SMOOTHED_RIPPLE = 0.1  # choice: ripple for smoothed waves, whose brightest light it affects, relative to others
