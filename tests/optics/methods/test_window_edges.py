@@ -97,3 +97,13 @@ def test_a_wrapped_lens_as_a_map_has_enough_samples_at_each_tolerance():
     assert relative_l2(found[0].psf, found[2].psf) <= errors[0] + errors[2]
     assert relative_l2(found[1].psf, found[2].psf) <= errors[1] + errors[2]
     assert {result.plan.method for result in found} == {"low_rank"}
+
+
+def test_the_check_finds_a_ripple_of_narrow_edges():
+    """The window lies in the shadow of a ring, so that both edges determine its light. Maps have narrow edges."""
+    heights = optics.HeightMap(1.3e-8 * np.random.default_rng(0).random((10, 10)))
+    pupil, z = optics.Pupil(75e-6, heights, aperture=optics.Annulus(0.56)), 520e-6
+    view = {"dx": 41e-9, "shape": (43, 45)}
+    exact = optics.psf(pupil, [LAMBDA], z, **view, tolerance=1e-5, method="rayleigh_sommerfeld").psf[0]
+    found = optics.psf(pupil, [LAMBDA], z, **view, tolerance=2.25e-3, method="low_rank")
+    assert relative_l2(found.psf[0], exact) <= found.plan.predicted_error
