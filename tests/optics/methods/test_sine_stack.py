@@ -125,7 +125,7 @@ def test_pupils_with_different_edges_share_a_stack():
 
 
 def test_the_edge_of_a_distant_pupil_is_sharp_in_float32():
-    """At 500 radii, 1/cos² - 1 is 4e-6 at the rim, and float32 retains two of its digits."""
+    """In float32, 1 minus a squared cosine near 1 has few correct digits."""
     stack = stack_of(20e-6, aperture=optics.Annulus(0.4))
     [beam] = stack.beams
     stack = LightStack((replace(beam, distance=10e-3),))
