@@ -125,7 +125,7 @@ def test_pupils_with_different_edges_share_a_stack():
 
 
 def test_the_edge_of_a_distant_pupil_is_sharp_in_float32():
-    """In float32, 1 minus a squared cosine near 1 has few correct digits."""
+    """The radii of samples do not follow from squared cosines, which float32 rounds to 1 within a few digits."""
     stack = stack_of(20e-6, aperture=optics.Annulus(0.4))
     [beam] = stack.beams
     stack = LightStack((replace(beam, distance=10e-3),))
