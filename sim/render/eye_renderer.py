@@ -83,7 +83,7 @@ class EyeRenderer:
         self._mosaic = self.eye.mosaic
         self._mixing = self.eye.aperture_throughput * self.eye.spectral_bands.weights
         self._receptor_sums = self.sensor.receptor_sums(self._mixing, self.tracer.basis)
-        self._white = _white(scene)
+        self._white = scene.white
         self.brightest = self.brightest_in(np.ones(len(self._white)))
         self._set_width(n_envs)
 
@@ -295,14 +295,3 @@ class EyeRenderer:
     def _components(self, found: np.ndarray) -> np.ndarray:
         """Return a kernel's flat output as (layer, component, n), with n rays of all views, or n sums over rays."""
         return found.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)
-
-
-def _white(scene: PreparedScene) -> np.ndarray:
-    """Return the radiance (band,) of a white surface that faces all directional lights, or of veiling light.
-
-    The larger of the two counts in each band.
-    """
-    levels = [light.level for light in scene.scene.lights.found if light.kind == "directional"]
-    surface: np.ndarray = sum(levels, np.zeros(scene.eye.bands)) / np.pi
-    medium = scene.scene.medium
-    return surface if medium is None else np.maximum(surface, medium.veil)

@@ -18,7 +18,7 @@ sample_choice: test_sample_rules.py, test_fidelity_levels.py, test_sample_choice
 random_views: test_trial_errors.py, test_model_rules.py, test_fidelity_trials.py, test_fidelity.py
 populations: test_trial_errors.py, test_model_rules.py, test_sample_choice.py, test_fidelity.py
 fidelity_trials: test_signals.py, test_trial_errors.py, test_trial_parts.py, test_model_rules.py, test_fidelity.py
-prepared_scene: test_scene_parts.py, test_trial_parts.py, test_renderer_parts.py, test_batched_renderer.py
+prepared_scene: test_signals.py, test_scene_parts.py, test_trial_parts.py, test_renderer_parts.py
 memory_budget: test_fidelity_levels.py, test_memory_budget.py, test_sample_choice.py
 receptors_in_time: test_renderer_parts.py, test_receptors_in_time.py
 receptor_noise: test_signals.py, test_renderer_parts.py, test_receptor_noise.py

@@ -13,12 +13,13 @@ import sim
 from sim.eyes.eyes import BODY_RADIUS
 from sim.render import batched_renderer, eye_renderer, fidelity_trials
 from sim.render.batched_renderer import BatchedRenderer
-from sim.render.eye_renderer import EyeRenderer, _white
+from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import Fidelity
 from sim.render.fidelity_trials import FidelityTrials
 from sim.render.labels import Labels
 from sim.render.light_factors import LightFactors
 from sim.render.optic_flow import flow_between
+from sim.render.prepared_scene import PreparedScene
 from sim.render.random_views import RandomViews
 from sim.render.receptor_noise import Normals
 from sim.scene.variant import default_variant, variant
@@ -27,20 +28,22 @@ from sim.worlds.state import WorldState
 RNG = np.random.default_rng(6)
 
 
-def scene_of(*lights, veil=None):
+def white_in(*lights, veil=None):
+    """Return the radiance of white in a scene with these lights and this veiling light."""
+    scene = PreparedScene.__new__(PreparedScene)
     found = [SimpleNamespace(kind=kind, level=np.array(level)) for kind, level in lights]
     medium = None if veil is None else SimpleNamespace(veil=np.array(veil))
-    return SimpleNamespace(
-        eye=SimpleNamespace(bands=2), scene=SimpleNamespace(lights=SimpleNamespace(found=found), medium=medium)
-    )
+    scene.eye = SimpleNamespace(bands=2)
+    scene.scene = SimpleNamespace(lights=SimpleNamespace(found=found), medium=medium)
+    return scene.white
 
 
 def test_the_radiance_of_white():
     """A surface reflects 1/π of its irradiance. Veiling light counts where it is brighter."""
     suns = ("directional", [1.0, 2.0]), ("point", [50.0, 60.0]), ("directional", [3.0, 1.0])
-    np.testing.assert_allclose(_white(scene_of(*suns)), np.array([4, 3]) / math.pi)
-    np.testing.assert_allclose(_white(scene_of(*suns, veil=[1.0, 2.0])), [4 / math.pi, 2])
-    np.testing.assert_array_equal(_white(scene_of()), [0, 0])
+    np.testing.assert_allclose(white_in(*suns), np.array([4, 3]) / math.pi)
+    np.testing.assert_allclose(white_in(*suns, veil=[1.0, 2.0]), [4 / math.pi, 2])
+    np.testing.assert_array_equal(white_in(), [0, 0])
 
 
 def renderer(mosaic=None, basis=None, channels=3):
