@@ -12,6 +12,7 @@ pixelated      any shape tiled by square pixels
 outline        edges and their crossings with lines
 strips         quadrature over the area inside an outline
 soft_edge      kernel that softens an edge
+curved_disk    curved waves behind disks and rings, convolved with this kernel
 soft_polygon   polygons convolved with this kernel
 soft_outline   straight segments and arcs convolved with this kernel
 triangulation  polygons as triangles

@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
@@ -38,6 +39,7 @@ class SoftAperture(ABC):
     cases to within `ripple`. At distances above `reach` from the edge, the transmittance is 1 or 0.
     """
 
+    rotationally_symmetric: ClassVar[bool] = False
     edge: SoftEdge
 
     @property

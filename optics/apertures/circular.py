@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, pi
+from typing import ClassVar
 
 import numpy as np
 
@@ -107,6 +108,7 @@ class Annulus(Aperture):
 class SoftAnnulus(SoftAperture):
     """Difference of two soft disks; a single soft disk if `inner` is 0."""
 
+    rotationally_symmetric: ClassVar[bool] = True
     edge: SoftEdge
     inner: float
 

@@ -13,7 +13,7 @@ from optics.apertures.aperture import Aperture
 from optics.apertures.circular import Circle
 from optics.elements.pixel_relief import PixelRelief
 from optics.elements.pupil_path import lens_path, relief_height, wavefront_ahead
-from optics.elements.pupil_slopes import all_slopes, sampled_slopes
+from optics.elements.pupil_slopes import all_slopes
 from optics.elements.refractive_index import Dispersion, index_of, material
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
@@ -239,13 +239,9 @@ class Pupil:
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
         level = self._level if self.pixels else self
-        return all_slopes(level, same, number(source.distance), source.plain.angle, self._pieces(same))
+        return all_slopes(level, same, number(source.distance), source.plain.angle, self.pieces(same))
 
-    def sampled_slopes(self, wavelength: float, source: PointSource) -> Slopes:
-        """Return `slopes` at a limited number of points. Each slope is exact, but the steepest point may be missed."""
-        return sampled_slopes(self._level if self.pixels else self, wavelength, source, self._pieces(wavelength))
-
-    def _pieces(self, wavelength: float) -> int:
+    def pieces(self, wavelength: float) -> int:
         """Return the number of polynomial pieces of relief and wavefront across the pupil."""
         pieces = [self.height.knots if self.bends(wavelength) else 0]
         pieces += [0 if self.wavefront is None else self.wavefront.knots]

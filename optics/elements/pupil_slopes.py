@@ -13,9 +13,9 @@ from optics.elements.wavefront_slopes import Slopes, derivative
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
-__all__ = ["all_slopes", "sampled_slopes"]
+__all__ = ["all_slopes"]
 
-FEW, MANY = 33, 65  # choices: numbers of points along a side of `sampled_slopes`, without and with fine detail
+FEW, MANY = 33, 65  # choices: least numbers of points along a side, without and with polynomial pieces
 MOST = 1025  # choice, limited by memory: largest number of points along a side of `all_slopes`
 
 
@@ -36,23 +36,6 @@ def all_slopes(pupil: HasPath, wavelength: float, distance: float, angle: tuple[
     x, y = grid.coordinates(precision("float64"))
     path = pupil.path(x, y, wavelength, PointSource(distance, angle)).numpy().reshape(grid.shape)
     return _by_neighbours(path, grid, pupil.radius)
-
-
-def sampled_slopes(pupil: HasPath, wavelength: float, source: PointSource, pieces: int) -> Slopes:
-    """Return slopes at a limited number of points, by differences with steps shorter than a polynomial piece."""
-    place = source.plain
-    if 4 * pieces < FEW:
-        grid = _grid(pupil, FEW)
-        path = pupil.path(grid.x[None, :], grid.y[:, None], wavelength, place)
-        return _by_neighbours(path, grid, pupil.radius)
-    grid, step = _grid(pupil, MANY), pupil.radius / (8 * pieces)
-    x, y = grid.x[None, :], grid.y[:, None]
-    ahead, behind, above, below = (
-        pupil.path(x + sign * dx, y + sign * dy, wavelength, place)
-        for dx, dy in ((step, 0.0), (0.0, step))
-        for sign in (1, -1)
-    )
-    return Slopes(grid, (ahead - behind) / (2 * step), (above - below) / (2 * step), pupil.radius)
 
 
 def _grid(pupil: HasPath, n: int) -> Grid:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from optics.numerics.arguments import finite, in_range, one_of, positive, shown, vacuum_wavelength, without_derivative
@@ -178,7 +179,13 @@ def index_of(name: str, value: Any) -> Dispersion:
             raise ValueError(f"{name} requires a derivative, but none is propagated through it: pass plain numbers")
         return value
     _refuse_name(name, value)
-    return RefractiveIndex(in_range(name, value, 1.0, 10.0))
+    return _constant(in_range(name, value, 1.0, 10.0))
+
+
+@lru_cache(maxsize=64)
+def _constant(n: float) -> RefractiveIndex:
+    """Return the curve of a medium without dispersion. Many pupils have the same medium, so it is cached."""
+    return RefractiveIndex(n)
 
 
 def material(name: str, value: Any) -> Dispersion:

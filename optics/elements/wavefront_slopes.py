@@ -131,42 +131,6 @@ class Slopes(ReadOnlyArrays):
             found.append(max(steepest, _total(rest, around, bend).max(initial=0)))
         return float(found[0]), float(found[1])
 
-    def to_window(self, distance: float, centre: tuple[float, float], medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return slopes of the paths to the centre of a window, and distances of their points from the axis [radii].
-
-        Both arrays are flat and have one entry for each point ξ of the disk. A slope is |∇L + n (ξ - c) / D| along x or
-        along y, whichever is larger, where L is the optical path to ξ and D the distance from ξ to the centre c.
-        """
-        inside = self._inside
-        along_x, along_y = self._bent(distance, centre, medium_n)
-        return np.maximum(np.abs(along_x), np.abs(along_y))[inside], self.distance_from_axis[inside] / self.radius
-
-    def end_points(
-        self, distance: float, centre: tuple[float, float], medium_n: float, count: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return points (x, y) [m] of the disk, and the hit points (u, v) [m] of their rays on the window.
-
-        About `count` rays are returned. Hit points are relative to the centre c of the window. To first order, they are
-        D/n times the slopes along x and y of `to_window`.
-        """
-        some = np.flatnonzero(self._inside)
-        some = some[:: max(1, len(some) // count)]
-        x, y = (part.ravel()[some] for part in np.meshgrid(self.grid.x, self.grid.y))
-        length = np.sqrt((x - centre[0]) ** 2 + (y - centre[1]) ** 2 + distance**2) / medium_n
-        u, v = (part.ravel()[some] * length for part in self._bent(distance, centre, medium_n))
-        return x, y, u, v
-
-    @property
-    def _inside(self) -> np.ndarray:
-        found: np.ndarray = self.distance_from_axis <= self.radius
-        return found
-
-    def _bent(self, distance: float, centre: tuple[float, float], medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return ∇L + n (ξ - c) / D along x and along y; see `to_window`."""
-        x, y = self.grid.x[None, :] - centre[0], self.grid.y[:, None] - centre[1]
-        scale = medium_n / np.sqrt(x * x + y * y + distance * distance)
-        return self.along_x + x * scale, self.along_y + y * scale
-
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the points at which rays from the disk hit a plane at `distance` [m]; infinite for evanescent rays."""
         inside = self.distance_from_axis <= self.radius

@@ -7,6 +7,7 @@ textbook             the angular spectrum in plain NumPy: start here
 carrier              the phase of a spherical wave, which methods remove from fields and restore
 problem              Problem: the parameters of a computation
 pupil_edge           the soft edge of a pupil
+diffraction_kernel   the kernel of the integral, with its near field
 method_sampling      Sampling: the interface of all methods
 rayleigh_sommerfeld  the direct sum: the reference
 angular_spectrum     transforms on grids, whole or with the paraxial part split off
@@ -19,10 +20,13 @@ smooth_spectrum      the angular spectrum of steep pupils, from the light of `sm
 hankel               the angular spectrum of rotationally symmetric pupils, along one radius
 low_rank             one matrix product, with a Fourier kernel times a slow factor
 slow_factor          the slow factor of `low_rank`, and the points of the window that interpolate it
-window_sampling      `low_rank` at coarse tolerances, with only the samples that the window's light needs
-window_rank          rank of the slow factor for the samples of `window_sampling`
+window_sampling      `low_rank` at coarse tolerances, for one PSF
+window_plan          samples of several pupils that the light in a window needs, at coarse tolerances
+window_edges         soft edges and densities of these samples, smoothed waves of wide pupils without a lens
+window_rank          rank of the slow factor for the samples of `window_plan`
+window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         several sources and wavelengths through one pupil, from the same samples
-window_check         error of a PSF of `window_sampling`, by a sum over other samples in a few places
+window_check         error of such PSFs, by a sum over other samples in a few places
 window_sums          sums over the pupil for `window_sampling` and `window_stack`, and their adjoint
 far_field            one Fourier transform onto directions for each of a few nodes of the window
 far_field_nodes      the choice of the nodes of `far_field`, and their weights in every direction
@@ -34,5 +38,6 @@ scalar_theory        upper bound on the error of scalar theory
 rays                 end points of rays in geometrical optics
 pupil_sampling       samples of the pupil for matrix products
 sine_samples         samples of the pupil that are evenly spaced in the sines of rays to the window
+sine_stack           such samples of several pupils at once
 spectral_taper       the taper of a spectrum before grazing incidence
 """

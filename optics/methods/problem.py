@@ -13,6 +13,7 @@ from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.elements.derivative_knots import DerivativeKnots, carries_derivatives, derivative_knots
+from optics.elements.light_stack import LightStack
 from optics.elements.torch_numbers import refuse_torch
 from optics.elements.wavefront_slopes import Slopes
 from optics.methods.derivative_cells import derivative_cells
@@ -60,8 +61,7 @@ class Problem:
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: True if the PSF carries derivatives.
     moves: True if derivatives with respect to the distance are requested.
-    knots: knots of the maps whose samples have derivatives; None if no such derivatives are requested.
-    mask_detail: bandwidth [1/m] of the mask's amplitude; 0 without a mask.
+    knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     detail_part: largest phase [rad] of neglected detail, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even if the window needs fewer samples.
     steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Methods then remove light
@@ -86,7 +86,6 @@ class Problem:
     differentiated: bool = False
     moves: bool = False
     knots: DerivativeKnots | None = None
-    mask_detail: float = 0.0
     detail_part: float = DETAIL_PART
     all_light: bool = False
     steep: bool = False
@@ -126,14 +125,14 @@ class Problem:
         return replace(found, moves=carries_derivative(beam.distance), symmetric=symmetric, even=even)
 
     @cached_property
+    def stack(self) -> LightStack:
+        """The light as a stack of one beam."""
+        return LightStack((self.light,))
+
+    @cached_property
     def slopes(self) -> Slopes:
         """Slopes of the wavefront, on a grid that resolves all maps."""
         return self.light.pupil.slopes(self.light.wavelength, self.light.source)
-
-    @cached_property
-    def sampled_slopes(self) -> Slopes:
-        """Slopes of the wavefront at a limited number of points, which may miss the steepest point."""
-        return self.light.pupil.sampled_slopes(self.light.wavelength, self.light.source)
 
     @cached_property
     def detail(self) -> float:
@@ -248,11 +247,12 @@ class Problem:
     @property
     def steepest_sine(self) -> float:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
-        straight, per_slope = self.radius / math.hypot(self.radius, self.distance), SLOPE_MARGIN / self.medium_n
-        if per_slope * self.sampled_slopes.steepest_inside >= straight:
-            return straight  # the remaining slopes and the detail can only increase the sine of light behind the pupil
-        leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius
-        return steepest_sine(self.radius, self.distance, leaving)
+        straight = self.radius / math.hypot(self.radius, self.distance)
+        slopes = self.slopes.steepest_inside if self.pixelated is not None else float(self.stack.slopes.steepest[0])
+        if SLOPE_MARGIN * slopes >= straight * self.medium_n:
+            return straight  # all slopes and finer detail can only increase the sine of light that leaves the pupil
+        band = SLOPE_MARGIN * slopes / self.light.wavelength + self.detail
+        return steepest_sine(self.radius, self.distance, (band + 1 / self.radius) * self.wavelength)
 
     @property
     def scalar_error(self) -> float:
@@ -292,7 +292,6 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float
         tolerance=tolerance,
         dtype=dtype,
         masked=pupil.mask is not None,
-        mask_detail=0.0 if pupil.mask is None else pupil.mask.bandwidth(min(tolerance, 0.1), pupil.radius),
         medium_n=beam.index,
         spread=light_spread(pupil),
         even=on_axis and window.centre == (0.0, 0.0) and pupil.mirror_symmetric(wavelength),

@@ -38,6 +38,7 @@ IN_FOCUS = (
     (0.99, 0.6866),
     (0.999, 0.8100),
 )
+_TABLE = np.array(IN_FOCUS).T
 ROUND = 0.25  # mean of x² over a disk of radius R, in R²
 # Choice: safety factor on the error in focus. It covers aberrations and small windows, see test_scalar_theory.py.
 MARGIN = 1.6
@@ -64,8 +65,7 @@ def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
 
     spread: see `light_spread`.
     """
-    sines, errors = zip(*IN_FOCUS, strict=True)
-    return MARGIN * spread / ROUND * float(np.interp(sine, sines, errors)) * min(sine, 1.0) ** 2
+    return MARGIN * spread / ROUND * float(np.interp(sine, *_TABLE)) * min(sine, 1.0) ** 2
 
 
 def light_spread(pupil: Pupil) -> float:

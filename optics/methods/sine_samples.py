@@ -45,6 +45,7 @@ class SineSamples:
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
+    elsewhere: sine at which factors along the other axis are evaluated, see `slow_factor.axis_factor`.
     """
 
     edge: PupilEdge
@@ -52,6 +53,7 @@ class SineSamples:
     centre: tuple[float, float]
     distance: float
     steepest: float
+    elsewhere: float = 0.0
 
     @property
     def at(self) -> np.ndarray:

@@ -10,33 +10,69 @@ from functools import lru_cache
 
 import numpy as np
 
+from optics.methods.diffraction_kernel import near_field
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples
 from optics.methods.sine_samples import SineSamples
+from optics.methods.sine_stack import SineGeometry, SineStack, even_weights
 from optics.numerics.array_library import turned
-from optics.numerics.grid import Grid
+from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
-__all__ = ["RANKS", "Path", "axis_factor", "fourier_kernel", "remaining_factor", "slow_factor", "uniform_rank"]
+__all__ = [
+    "RANKS",
+    "Path",
+    "axis_factor",
+    "axis_kernel",
+    "cross_term",
+    "fourier_kernel",
+    "remaining_factor",
+    "slow_factor",
+    "uniform_rank",
+    "window_kernel",
+]
 
 # Choice: ranks to try, in ascending order.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 # Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; see test_low_rank.py.
 RANK_RIPPLE = 0.4
+FEW_WAVES = 1000.0  # choice: number of waves of a path up to which float32 is sufficient
+SMOOTH = 12  # choice: number of sines, and of positions, from which smooth phases are interpolated
 TRIED = 41  # choice: number of test positions along a line through the window
 
 
 @dataclass(frozen=True)
 class Path:
-    """The geometry of a problem: the wavelength [m] in the medium, and the distance [m] and samples of the window."""
+    """The geometry of a problem: the wavelength [m] in the medium, and the distance [m] and samples of the window.
 
-    wavelength: float
-    distance: float
+    Wavelength and distance may be arrays (pupil,). All other arrays then have pupils as their first axis.
+    """
+
+    wavelength: float | np.ndarray
+    distance: float | np.ndarray
     window: Grid
 
     @classmethod
     def from_problem(cls, problem: Problem) -> Path:
         return cls(problem.wavelength, problem.distance, problem.window)
+
+    def short(self, steepest: float | np.ndarray) -> bool:
+        """Return whether paths differ by few enough waves for float32, for pupils with sines up to `steepest`."""
+        reach = steepest + np.hypot(*self.window.centre) / self.distance + self.window.half_diagonal / self.distance
+        return bool(np.max(np.square(reach) * self.distance / self.wavelength) < FEW_WAVES)
+
+    def rounded(self, dtype: str) -> Path:
+        """Return the same path with numbers of another type."""
+        wavelength, distance = (np.asarray(part, dtype) for part in (self.wavelength, self.distance))
+        return Path(wavelength, distance, self.window)
+
+    def numbers(self, axes: int) -> tuple[float | np.ndarray, float | np.ndarray]:
+        """Return wavelength and distance, with as many axes as the arrays with which they broadcast."""
+        wavelength, distance = (
+            part.reshape(-1, *[1] * (axes - 1)) if isinstance(part, np.ndarray) else part
+            for part in (self.wavelength, self.distance)
+        )
+        return wavelength, distance
 
 
 def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
@@ -90,7 +126,7 @@ def slow_factor(
     window: tuple[np.ndarray, np.ndarray],
     dtype: str = "float64",
 ) -> np.ndarray:
-    """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
+    """Return the slow factor (z/D)² (1 + i/(kD)) e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
 
     D is the distance from ξ to u, and ρ the distance from the pupil's centre to u. All arrays are broadcast.
 
@@ -99,50 +135,150 @@ def slow_factor(
     window: points u (x, y) [m], relative to the window's centre.
     dtype: type in which the phase is rounded, "float32" or "float64".
     """
-    (xi, eta), (u, v), (s, t) = pupil, window, directions
-    x, y = u + path.window.centre[0], v + path.window.centre[1]
-    z = path.distance
-    rho2 = x * x + y * y + z * z
-    excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
-    distance = np.sqrt(rho2 + excess)
-    waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / path.wavelength
-    found: np.ndarray = turned(z * z / distance**2, waves, dtype)
-    return found
+    return np.asarray(turned(*_slow(path, pupil, directions, window), dtype))
 
 
-def axis_factor(path: Path, samples: SineSamples, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the slow factor along x (0) or y (1), divided by its value at the middle of the window, complex.
+def axis_factor(
+    path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
+) -> np.ndarray:
+    """Return the slow factor along x (0) or y (1), relative to its value at the middle of the window, complex.
 
     Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
-    that kernel.
+    that kernel. Along the other axis, the sine is that of the centre plus `elsewhere`.
 
-    sines: sines along the axis, minus that of the pupil's centre. Along the other axis, the sine is that of the centre.
-    places: positions [m] along the axis, relative to the middle of the window. They are broadcast with the sines.
+    sines: sines along the axis, minus that of the pupil's centre.
+    places: positions [m] along the axis, relative to the middle of the window. They broadcast with the sines.
     """
-    none = np.zeros(1)
-    directions, window = ((sines, none), (places, none)) if axis == 0 else ((none, sines), (none, places))
-    points = samples.points_at(*directions)
-    return slow_factor(path, points, directions, window) / slow_factor(path, points, directions, (none, none))
+    return np.asarray(turned(*_along(path, samples, axis, sines, places), "float64"))
 
 
 def remaining_factor(
     path: Path,
-    samples: SineSamples,
+    samples: SineSamples | SineGeometry,
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
+    dtype: str = "float64",
 ) -> np.ndarray:
-    """Return the slow factor divided by both axis factors (`axis_factor`). It varies even more slowly over the window.
+    """Return the slow factor, relative to the middle of the window, divided by both axis factors.
 
-    directions, window: see `slow_factor`.
+    It varies even more slowly over the window. Arguments: see `slow_factor`. With dtype="float32", short paths are
+    computed in float32, too.
     """
-    whole = slow_factor(path, samples.points_at(*directions), directions, window)
+    none, points = np.zeros((1,) * directions[0].ndim), samples.points_at(*directions)
+    if dtype == "float32" and path.short(samples.steepest):
+        path = path.rounded(dtype)
+        points, directions, window = (_rounded(pair, dtype) for pair in (points, directions, window))
+        none = none.astype(dtype)
+    size, waves = _slow(path, points, directions, window)
+    middle = _slow(path, points, directions, (none, none))
+    size, waves = size / middle[0], waves - middle[1]
     for axis in (0, 1):
-        whole = whole / axis_factor(path, samples, axis, directions[axis], window[axis])
-    return whole
+        along = _along(path, samples, axis, directions[axis], window[axis])
+        size /= along[0]
+        waves -= along[1]
+    return np.asarray(turned(size, waves, dtype))
+
+
+def _slow(
+    path: Path,
+    pupil: tuple[np.ndarray, np.ndarray],
+    directions: tuple[np.ndarray, np.ndarray],
+    window: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return amplitude and phase [waves] of `slow_factor`."""
+    (xi, eta), (u, v), (s, t) = pupil, window, directions
+    x, y = u + path.window.centre[0], v + path.window.centre[1]
+    wavelength, z = path.numbers(max(part.ndim for part in (xi, eta, x, y)))
+    rho2 = x * x + y * y + z * z
+    excess = xi * xi + eta * eta - 2 * (x * xi + y * eta)
+    distance2 = rho2 + excess
+    distance = np.sqrt(distance2)
+    excess /= distance + np.sqrt(rho2)
+    excess += u * s + v * t
+    excess /= wavelength
+    size, waves = near_field(wavelength, distance)
+    excess += waves
+    return z * z / distance2 * size, excess
+
+
+def _rounded(pair: tuple[np.ndarray, np.ndarray], dtype: str) -> tuple[np.ndarray, np.ndarray]:
+    return pair[0].astype(dtype), pair[1].astype(dtype)
+
+
+def _along(
+    path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return amplitude and phase [waves] of `axis_factor`."""
+    none, elsewhere = np.zeros((1,) * max(sines.ndim, places.ndim), places.dtype), samples.elsewhere
+    other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
+    other = other.astype(places.dtype)
+    directions, window = ((sines, other), (places, none)) if axis == 0 else ((other, sines), (none, places))
+    points = _rounded(samples.points_at(*directions), str(places.dtype))
+    size, waves = _slow(path, points, directions, window)
+    middle = _slow(path, points, directions, (none, none))
+    size /= middle[0]
+    waves -= middle[1]
+    return size, waves
+
+
+def cross_term(
+    path: Path,
+    samples: SineGeometry,
+    directions: tuple[np.ndarray, np.ndarray],
+    window: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return factors a and b, so that the slow factor divided by both axis factors is about 1 + a b.
+
+    It is the term -ik us vt/D of the phase, with the mean of 1/D over the pupil. The factor a depends on u and s, and b
+    on v and t, so it costs as much as a second Fourier kernel along either axis.
+
+    directions: s and t. window: u and v. Their last two axes broadcast.
+    """
+    (s, t), (u, v) = directions, window
+    wavelength, z = path.numbers(s.ndim)
+    cosine = np.sqrt(np.maximum(1 - 2 * np.square(samples.elsewhere), 0)).reshape(-1, *[1] * (s.ndim - 1))
+    return u * s * (cosine * (-2j * np.pi) / (wavelength * z)), v * t
+
+
+def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, dtype: str) -> np.ndarray:
+    """Return the Fourier kernel times `axis_factor`, (stack, place, sample), complex.
+
+    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window.
+
+    places: positions [m] along the axis, relative to the middle of the window, (stack, place).
+    dtype: "float32" or "float64".
+    """
+    return np.asarray(turned(*_whole(path, samples, axis, samples.at, places), dtype))
+
+
+def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
+    """Return `axis_kernel` for all columns (0) or rows (1) of the window, (stack, place, sample).
+
+    The phase is smooth, and is interpolated from a few sines and positions.
+    """
+    at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
+    if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
+        return axis_kernel(path, samples, axis, place[None, :], dtype)
+    nodes = chebyshev_points(SMOOTH)
+    sides = [part[:, [0, -1]] for part in (at, place[None, :])]
+    sines, few = (side.mean(axis=1)[:, None] + np.diff(side) / 2 * nodes for side in sides)
+    to_sines, to_places = (even_weights(count, SMOOTH) for count in (at.shape[1], len(place)))
+    size, waves = (to_places @ part @ to_sines.T for part in _whole(path, samples, axis, sines, few))
+    return np.asarray(turned(size, waves, dtype))
+
+
+def _whole(
+    path: Path, samples: SineStack, axis: int, sines: np.ndarray, places: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return amplitude and phase [waves] of `axis_kernel`, (stack, place, sine)."""
+    sines, places = sines[:, None, :], places[:, :, None]
+    size, waves = _along(path, samples, axis, sines, places)
+    wavelength, _ = path.numbers(3)
+    return size, waves - places * sines / wavelength
 
 
 def fourier_kernel(
-    at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float, dtype: str
+    at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float | np.ndarray, dtype: str
 ) -> np.ndarray:
     """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} along one axis, complex (position, node · sample).
 

@@ -3,18 +3,19 @@
 The other samples are finer, and their edge is sharper. Their grid is shifted by a fraction of the pitch that is not a
 simple ratio. The comparison therefore shows the errors due to aliased light, to detail between the samples, and to the
 soft edge. It also shows the error due to the rank, because the check interpolates the slow factor over the pupil
-instead of the window. The error of the sum itself is at most half of the error that it finds.
+instead of the window. It compares the slow factor with the diffraction kernel itself, which both sums would otherwise
+trust. The error of the sum itself is at most half of the error that it finds.
 """
 
 from __future__ import annotations
 
 from bisect import bisect
-from functools import lru_cache
 
 import numpy as np
 
-from optics.methods.sine_samples import SineSamples
-from optics.methods.slow_factor import Path, slow_factor
+from optics.methods.diffraction_kernel import diffraction_kernel
+from optics.methods.sine_stack import SineStack
+from optics.methods.slow_factor import Path, axis_factor, axis_kernel, remaining_factor
 from optics.methods.window_sums import intensity_of
 from optics.numerics.array_library import turned
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
@@ -22,104 +23,120 @@ from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 __all__ = ["window_errors"]
 
 CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_sampling.py
-ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
-SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the four distributions of rows and columns, see `_drawn`
-INTERPOLATED = 2e-4  # choice: allowed error of the slow factor that the check interpolates
-# Choices: numbers of interpolation points across the pupil, and phases [rad] at which each but the last is too small.
-ORDERS, PHASES = (3, 5, 7, 9, 12, 16), (0.1, 0.6, 1.5, 3.0, 6.0)
+UNSEEN = 0.05  # choice: error that both sums may share, relative to the tolerance
+ACROSS = 10  # choice: number of rows and of columns in which the check computes the PSF
+SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
+INTERPOLATED = 0.5  # choice: largest error of the interpolated kernel of the check, relative to the tolerance
+# Choices: numbers of interpolation points across the pupil, and phases [rad] from which on each is too small.
+ORDERS, PHASES = (2, 3, 4, 5, 7, 9, 12, 16), (0.02, 0.3, 0.8, 1.2, 1.8, 3.0, 6.0)
 
 
-def window_errors(samples: SineSamples, path: Path, light: np.ndarray, images: np.ndarray) -> np.ndarray:
+def window_errors(
+    samples: SineStack, path: Path, field: np.ndarray, images: np.ndarray, tolerance: float
+) -> np.ndarray:
     """Return the relative L2 errors of intensities over a window, estimated in a few rows and columns, (stack,).
 
     The result is NaN for a window without light.
 
-    samples: samples of the pupil for the comparison.
-    light: light behind the pupil at these samples, times their areas, (stack, y, x), complex.
+    samples: samples of the pupils for the comparison. They and the path may have a first axis of length 1.
+    field: contribution of each of these samples to the middle of the window, see `SineStack.arriving`, (stack, y, x).
     images: |U|² over the window, (stack, y, x).
+    tolerance: tolerance of the PSFs.
     """
     window = path.window
     total = np.square(images, dtype=np.float64).sum((1, 2))
-    dark = ~(total > 0)
-    if dark.all():
-        return np.full(len(images), np.nan)
-    if dark.any():
-        found = np.full(len(images), np.nan)
-        found[~dark] = window_errors(samples, path, light[~dark], images[~dark])
-        return found
-    rows, columns, chance = _drawn(images)
+    rows, columns, chance = _drawn(np.where((total > 0)[:, None, None], images, 1))
     u, v = ((at - n // 2) * window.dx for at, n in zip((columns, rows), window.shape[::-1], strict=True))
-    exact = _at_points(samples, path, light, u, v)
+    exact, apart = _at_points(samples, path, field, (u, v), tolerance)
     drawn = images[np.arange(len(images))[:, None, None], rows[:, :, None], columns[:, None, :]]
     squared = np.mean(np.square(drawn - exact) / chance, (1, 2))
     # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the darker of the two
     bright = np.minimum(total, np.mean(np.square(exact) / chance, (1, 2)))
-    total = np.where(squared > 0.01 * total, bright, total)
-    rounding = float(np.finfo(light.real.dtype).eps)
-    return np.asarray(CAUTION * np.sqrt(squared / total) + rounding)
+    total = np.where(total > 0, np.where(squared > 0.01 * total, bright, total), np.nan)
+    rounding = float(np.finfo(field.real.dtype).eps)
+    unlike = np.where(apart > tolerance, apart, 0)  # if the factors of the sums do not fit the kernel
+    return np.asarray(CAUTION * (np.sqrt(squared / total) + unlike) + UNSEEN * tolerance + rounding)
 
 
-def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _at_points(
+    samples: SineStack, path: Path, field: np.ndarray, place: tuple[np.ndarray, np.ndarray], tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return |U|² in columns u and rows v [m], relative to the middle of the window, (stack, v, u).
 
-    The slow factor G is interpolated from a few points (ξ_a, η_b) of the pupil, with weights L_a and L_b. P is the
-    light behind the pupil, and s and t are the sines of its rays:
+    The second result is the largest difference between the slow factor and the diffraction kernel, (stack,).
 
-        U(u, v) = Σ_ba G(ξ_a, η_b; u, v)/G(ξ_a, η_b; 0, 0) Σ_ηξ L_b e^{-ik v t} P G(ξ, η; 0, 0) L_a e^{-ik u s}.
+    The slow factor, divided by its values A along both axes, is interpolated from a few points (ξ_a, η_b) of the pupil
+    with weights L_a and L_b:
+
+        U(u, v) = Σ_ba G(ξ_a, η_b; u, v) Σ_ηξ L_b A_v e^{-ik v t} P L_a A_u e^{-ik u s}.
     """
-    nodes, ratio = _ratios(samples, path, u, v, str(light.real.dtype))
-    weight = lagrange_basis(samples.at, nodes).astype(light.real.dtype)
-    across, down = (_interpolated_kernel(path, part, samples.at, weight) for part in (u, v))
-    sums = down @ (light * _in_middle(samples, path).astype(light.dtype)) @ across.swapaxes(1, 2)
-    split = sums.reshape(len(v), v.shape[1], len(nodes), u.shape[1], len(nodes))
-    found = np.einsum("nvuba,nvbua->nvu", ratio, split)
-    x, y = u[:, None, :] + path.window.centre[0], v[:, :, None] + path.window.centre[1]
-    near = 1 + (path.wavelength / (2 * np.pi)) ** 2 / (x * x + y * y + path.distance**2)
-    return np.asarray(intensity_of(found) * near / (path.wavelength * path.distance) ** 2)
+    (u, v), dtype = place, str(field.real.dtype)
+    nodes, ratio, apart = _ratios(samples, path, place, dtype, INTERPOLATED * tolerance)
+    # The nodes and the samples of all pupils are alike, apart from their scale.
+    weight = lagrange_basis(samples.at[0], nodes[0]).astype(dtype)
+    across, down = (_interpolated_kernel(path, samples, axis, part, weight) for axis, part in enumerate((u, v)))
+    sums = down @ field @ across.swapaxes(1, 2)
+    split = sums.reshape(len(v), v.shape[1], len(weight), u.shape[1], len(weight))
+    return intensity_of(np.einsum("nbavu,nvbua->nvu", ratio, split)), apart
 
 
-@lru_cache(maxsize=64)
-def _in_middle(samples: SineSamples, path: Path) -> np.ndarray:
-    """Return the slow factor between all samples and the middle of the window, complex (y, x)."""
-    middle = np.zeros(1), np.zeros(1)
-    return slow_factor(path, samples.points, (samples.at[None, :], samples.at[:, None]), middle)
-
-
-def _interpolated_kernel(path: Path, place: np.ndarray, sines: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the Fourier kernel times the interpolation weights, L_a(s) e^{-ik u s}, (stack, place · a, sine)."""
-    kernel = turned(1.0, place[..., None] * (sines / -path.wavelength), str(weight.dtype))
-    return np.asarray((kernel[:, :, None, :] * weight).reshape(len(place), -1, len(sines)))
+def _interpolated_kernel(
+    path: Path, samples: SineStack, axis: int, place: np.ndarray, weight: np.ndarray
+) -> np.ndarray:
+    """Return L_a A e^{-ik u s}, (stack, place · a, sine)."""
+    kernel = axis_kernel(path, samples, axis, place, str(weight.dtype))
+    return np.asarray((kernel[:, :, None, :] * weight).reshape(len(place), -1, weight.shape[1]))
 
 
 def _ratios(
-    samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray, dtype: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return interpolation points in sines, and the slow factor G(·; u, v)/G(·; 0, 0) there, (stack, v, u, b, a).
+    samples: SineStack, path: Path, place: tuple[np.ndarray, np.ndarray], dtype: str, most: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return interpolation points in sines, (pupil, a), the factor there, (stack, b, a, v, u), and its error, (stack,).
 
-    The number of points is increased until the interpolated factor equals the exact one, up to an error of
-    INTERPOLATED, on the pupil's rim and for the outermost columns and rows. The first number is usually sufficient for
-    the largest phase of the factor there.
+    The factor is the slow factor relative to the middle of the window, divided by its values along both axes. Its
+    interpolation is compared with the factor in the middle and at the rim of the pupil, for the outermost columns and
+    rows of each window. The search starts with a number of points that is usually sufficient for the phase there.
+
+    most: error at which the search ends.
     """
-
-    def ratio(directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        points = samples.points_at(*directions)
-        place = u[:, None, :, None, None], v[:, :, None, None, None]
-        middle = slow_factor(path, points, directions, (np.zeros(1), np.zeros(1)))
-        found: np.ndarray = slow_factor(path, points, directions, place, dtype) * (1 / middle).astype(kind)
-        return found
-
-    angle, kind = 2 * np.pi * np.arange(12) / 12, np.result_type(dtype, np.complex64)
-    rim = samples.directions(samples.outermost * np.cos(angle), samples.outermost * np.sin(angle))
-    ends = [np.array([[part.min(), part.max()]]) for part in (u, v)]
-    exact = ratio(rim, *ends)[..., 0, :]
+    (u, v), (left, top) = place, ([0, -1, 0, -1], [0, 0, -1, -1])  # corners, since rows and columns ascend
+    angle, radius = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None] * np.array([0, *[1] * 12])
+    rim = samples.directions(radius * np.cos([0, *angle]), radius * np.sin([0, *angle]))
+    corners = u[:, left, None], v[:, top, None]
+    exact = _remaining(path, samples, (rim[0][:, None], rim[1][:, None]), corners)
     phase = float(np.abs(np.angle(exact)).max())
+    side = samples.at[:, [0, -1]]
+    middle, half = side.mean(axis=1)[:, None], np.diff(side) / 2
     for order in ORDERS[bisect(PHASES, phase) :]:
-        nodes = (at := samples.at[[0, -1]]).mean() + (at[1] - at[0]) / 2 * chebyshev_points(order)
-        across, down = np.meshgrid(nodes, nodes)
-        weight = lagrange_basis(rim[1], nodes)[:, None] * lagrange_basis(rim[0], nodes)
-        if np.abs(np.tensordot(ratio((across, down), *ends), weight, 2) - exact).max() < INTERPOLATED:
+        nodes = middle + half * chebyshev_points(order)
+        own = np.broadcast_to(nodes[:, None, :], (len(nodes), order, order))
+        weight = [lagrange_basis((part - middle) / half, chebyshev_points(order)) for part in rim]
+        directions = own[..., None, None], own.swapaxes(1, 2)[..., None, None]
+        found = remaining_factor(path, samples, directions, (u[:, None, None, None], v[:, None, None, :, None]), dtype)
+        outer = np.einsum("nbac,bnk,ank->nck", found[..., top, left], weight[1], weight[0])
+        apart = np.abs(outer - exact).max(axis=(1, 2))
+        if apart.max() < most:
             break
-    return nodes, ratio((across, down), u, v)
+    return nodes, found, apart
+
+
+def _remaining(
+    path: Path,
+    samples: SineStack,
+    directions: tuple[np.ndarray, np.ndarray],
+    place: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Return the `remaining_factor` from the diffraction kernel itself, as a check of the factors of the sums."""
+    (s, t), (u, v) = directions, place
+    wavelength, distance = path.numbers(s.ndim)
+    x, y = path.window.centre
+    points = samples.points_at(s, t)
+    size, waves = diffraction_kernel(wavelength, distance, points, (u + x, v + y))
+    middle = diffraction_kernel(wavelength, distance, points, (x, y))
+    found = turned(size / middle[0], waves - middle[1] + (u * s + v * t) / wavelength, "float64")
+    for axis in (0, 1):
+        found /= axis_factor(path, samples, axis, directions[axis], place[axis])
+    return found
 
 
 def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -134,7 +151,7 @@ def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     found, roots, squares = [], np.sqrt(images), np.square(images)
     for along in (2, 1):
-        root, bright = (part.sum(axis=along, dtype=np.float64) for part in (roots, squares))
+        root, bright = (part.sum(axis=along).astype(np.float64) for part in (roots, squares))
         bright[:, 1:-1] = bright[:, :-2] + bright[:, 1:-1] + bright[:, 2:]
         size = root.shape[1]
         sides = np.zeros(size)

@@ -16,6 +16,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.pupil_path import lens_path, relief_height, wavefront_ahead
 from optics.elements.source import PointSource
 from optics.methods.sine_samples import SineSamples
+from optics.methods.sine_stack import single_stack
 from optics.methods.slow_factor import Path
 from optics.methods.window_check import window_errors
 from optics.methods.window_sampling import WindowSampling
@@ -56,14 +57,15 @@ class WindowStack:
         images = [self._image(light, sampling, path) for path, light in lights]
         return library(images[0]).stack(images, 1) / self.pupil.area
 
-    def errors(self, sampling: WindowSampling, images: np.ndarray) -> np.ndarray:
+    def errors(self, sampling: WindowSampling, images: np.ndarray, tolerance: float) -> np.ndarray:
         """Return the relative L2 error of each PSF over the window, see `window_errors`, (source, wavelength).
 
         images: result of `intensity` as a NumPy array. The stack carries no derivatives.
+        tolerance: tolerance of the PSFs.
         """
-        seen = np.moveaxis(images * self.pupil.area, 1, 0)
+        seen, finer = np.moveaxis(images * self.pupil.area, 1, 0), single_stack(sampling.finer)
         found = [
-            window_errors(sampling.finer, path, light, own)
+            window_errors(finer, path, light * finer.to_middle(path.wavelength, self.dtype), own, tolerance)
             for path, light, own in zip(self._paths, self._light(sampling.finer), seen, strict=True)
         ]
         return np.stack(found, 1)

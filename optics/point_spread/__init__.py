@@ -13,8 +13,7 @@ vector_focus   vector_focus: beyond scalar theory
 converging     VectorFocus: a polarised field behind a pupil
 disk_sum       sum of the light on a round receptor
 microvilli     Microvilli: receptors with polarisation sensitivity
-population     PSFs of many pupils with one plan
-population_members  parameters of each pupil for the common plan
+coarse_batch   PSFs of many beams at coarse tolerances, as stacks of matrix products
 batch          psf_batch: PSFs of many eyes at once
 modulation_transfer  MTF: contrast at any frequency
 arriving       fraction of the light that is not evanescent

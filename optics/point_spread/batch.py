@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import Plan
@@ -26,9 +27,8 @@ from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, padded_for_packets, precision
 from optics.numerics.read_only import read_only
+from optics.point_spread.coarse_batch import coarse_psfs
 from optics.point_spread.pictures import pictures
-from optics.point_spread.population import population_pictures
-from optics.point_spread.population_members import Member
 from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.request import Request, Setup, sensor_place
 from optics.point_spread.window_cost import check_window
@@ -43,7 +43,7 @@ class PSFBatch(OnWindow):
     tensor: PSFs [1/m²] as a Dr.Jit tensor (eye, depth, wavelength, y, x) with derivatives.
     psf: the same as a NumPy array.
     plans: one plan per PSF, in the same order, as a flat tuple.
-    members: parameters of each PSF, in the order of `plans`.
+    members: light of each PSF, in the order of `plans`.
     setup: parameters that all PSFs share.
 
     See PSFResult for conventions.
@@ -52,7 +52,7 @@ class PSFBatch(OnWindow):
     tensor: Array
     dx: float
     plans: tuple[Plan, ...]
-    members: tuple[Member, ...]
+    members: tuple[Beam, ...]
     setup: Setup
 
     def __repr__(self) -> str:
@@ -117,10 +117,10 @@ def psf_batch(
     source_distances: distances [m] of sources on the axis.
     dx, shape, tolerance, method, dtype: see `optics.psf`.
 
-    Pupils without a relief, or with a smooth relief of 4 x 4 points, can share one plan and one stack of matrix
-    products. They may have Zernike wavefronts, masks, and different media in front and behind. The shared plan computes
-    thousands of PSFs per second. It is used if the tolerance is 1e-3 or more and the plan is accurate enough. All other
-    PSFs are planned first. Each of them is then computed while the next one is prepared.
+    At tolerances of 3e-4 or more, all PSFs are planned together, and PSFs with equal numbers of samples are computed as
+    stacks of matrix products. The error of each PSF is checked. Pupils with derivatives or pixels are excluded, as are
+    PSFs that remain inaccurate or take long. They are planned one by one, and each is computed while the next one is
+    prepared.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.
@@ -135,11 +135,11 @@ def psf_batch(
     members = list(_members(pupils, wavelengths, sensor_distance, source_distances))
     precision(dtype)
     check_window(window, dtype, len(members))
-    plain = isinstance(method, str) and (method, dtype) == ("auto", "float32")
-    by_one_plan = population_pictures(members, window, tolerance) if plain else ()
-    known = {index: (image, plan) for index, image, plan in by_one_plan}
+    plain = isinstance(method, str) and method in ("auto", "exact", "low_rank")
+    coarse = coarse_psfs(members, window, tolerance, dtype) if plain else ()
+    known = {index: (image, plan) for index, image, plan in coarse}
     rest = [index for index in range(len(members)) if index not in known]
-    setup = Setup(members[0].distance, PointSource(members[0].source), window, tolerance, method, dtype)
+    setup = Setup(members[0].distance, members[0].source, window, tolerance, method, dtype)
     requests = [_request(members[index], setup) for index in rest]
     flat, plans = _joined(
         known, {index: picture[:2] for index, picture in zip(rest, pictures(requests), strict=True)}, precision(dtype)
@@ -148,8 +148,8 @@ def psf_batch(
     return PSFBatch(precision(dtype).Tensor(flat, sizes), window.dx, tuple(plans), tuple(members), setup)
 
 
-def _request(member: Member, setup: Setup) -> Request:
-    own = replace(setup, sensor_distance=member.distance, source=PointSource(member.source))
+def _request(member: Beam, setup: Setup) -> Request:
+    own = replace(setup, sensor_distance=member.distance, source=member.source)
     return own.request(member.pupil, member.wavelength)
 
 
@@ -158,18 +158,17 @@ def _members(
     wavelengths: Sequence[float],
     sensor_distance: Scalar | None,
     source_distances: Sequence[Scalar],
-) -> Iterator[Member]:
+) -> Iterator[Beam]:
     """Yield all combinations of eyes, depths and wavelengths. The wavelength varies fastest."""
     if sensor_distance is not None:
         positive("sensor_distance", sensor_distance, carried=True)
     lambdas = [vacuum_wavelength(wavelength) for wavelength in wavelengths]
     first = PointSource(next(iter(source_distances))).distance
-    for depth in source_distances:
-        positive("source_distance", depth, infinite=True, carried=True)
+    sources = [PointSource(depth) for depth in source_distances]
     for pupil in pupils:
         of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
         at = sensor_place(pupil, sensor_distance, first)
-        yield from (Member(pupil, wavelength, at, depth) for depth in source_distances for wavelength in lambdas)
+        yield from (Beam(pupil, source, wavelength, at) for source in sources for wavelength in lambdas)
 
 
 def _joined(
@@ -177,7 +176,7 @@ def _joined(
 ) -> tuple[Array, list[Plan]]:
     """Return all PSFs in one array, and their plans.
 
-    known, rest: PSFs of the shared plan, and all other PSFs, by index.
+    known, rest: PSFs of stacks, and all other PSFs, by index.
     """
     import drjit as dr
 

@@ -14,7 +14,8 @@ from optics.elements.beam import Beam
 from optics.elements.torch_numbers import torch_numbers
 from optics.methods.problem import Problem
 from optics.methods.sine_samples import SineSamples
-from optics.methods.window_sampling import TIGHTEST, WindowSampling
+from optics.methods.window_plan import TIGHTEST
+from optics.methods.window_sampling import WindowSampling
 from optics.methods.window_stack import WindowStack
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.autodiff import Array, carries_derivative, plain
@@ -41,8 +42,8 @@ def coarse_stack(
     if sampling is None:
         return None
     images = stack.intensity(sampling)
-    accurate: np.ndarray = without.errors(sampling, plain(images)) <= tolerance
-    return images, accurate  # a dark window has the error NaN, so other methods compute it
+    met: np.ndarray = without.errors(sampling, plain(images), tolerance) <= tolerance
+    return images, met  # a dark window has the error NaN, so other methods compute it
 
 
 def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method: str) -> WindowSampling | None:
@@ -65,7 +66,13 @@ def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method
         found.append(sampling)
     pupil = max((each.pupil for each in found), key=_across)
     finer = max((each.finer for each in found), key=_across)
-    return replace(found[0], pupil=pupil, finer=finer, rank=max(each.rank for each in found))
+    return replace(
+        found[0],
+        pupil=pupil,
+        finer=finer,
+        rank=max(each.rank for each in found),
+        crossed=any(each.crossed for each in found),
+    )
 
 
 def _across(samples: SineSamples) -> int:

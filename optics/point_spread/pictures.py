@@ -16,7 +16,8 @@ from optics.elements.beam import Beam
 from optics.methods.geometric import NoDerivativesError
 from optics.methods.method_sampling import Sampling, WithField
 from optics.methods.problem import Problem
-from optics.methods.window_sampling import TIGHTEST, WindowSampling
+from optics.methods.window_plan import TIGHTEST
+from optics.methods.window_sampling import WindowSampling
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field

@@ -20,10 +20,7 @@ from optics.numerics.cost import (
 from optics.numerics.grid import Grid
 from optics.point_spread.spot_check import EFFORT
 
-__all__ = ["check_seconds", "check_window", "population_seconds", "window_bytes", "window_seconds"]
-
-# Time [s] of a PSF by a common plan: per PSF, per entry of pupil and Fourier kernels, and per sample of the window.
-PER_PSF, PER_ENTRY, PER_SAMPLE = 5e-5, 2e-8, 1.7e-7
+__all__ = ["check_seconds", "check_window", "window_bytes", "window_seconds"]
 
 
 def window_seconds(problem: Problem) -> float:
@@ -47,11 +44,6 @@ def check_seconds(problem: Problem, sampling: Sampling) -> float:
     slower = PAIRS_PER_SECOND["float32"] / PAIRS_PER_SECOND["float64"]
     most = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     return needed if samples < EFFORT.fewest else min(needed, most * sampling.seconds * slower)
-
-
-def population_seconds(across: int, window: Grid) -> float:
-    """Return the approximate time [s] per PSF by a population's common plan, for `across` samples across the pupil."""
-    return PER_PSF + across * (across + sum(window.shape)) * PER_ENTRY + math.prod(window.shape) * PER_SAMPLE
 
 
 def window_bytes(problem: Problem) -> float:

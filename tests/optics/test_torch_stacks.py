@@ -8,7 +8,7 @@ import optics
 import optics.torch
 from optics import BSplineRelief, GaussianMask, HeightMap, MaskMap, PixelRelief, Pupil, WavefrontMap, Zernike
 from optics.elements.torch_numbers import torch_numbers, with_numbers
-from optics.methods import window_sampling
+from optics.methods import window_edges
 from optics.methods.window_rank import DERIVATIVE_ERROR
 from optics.point_spread.light_batch import LightBatch
 from validation.reference import relative_l2
@@ -115,8 +115,8 @@ def test_a_graph_serves_several_passes_and_no_second_derivative(only_stacks):
 
 def test_psfs_that_fail_the_check_are_computed_again(monkeypatch):
     """Half of the rays are neglected, and light from outside the window appears in it."""
-    monkeypatch.setattr(window_sampling, "NEGLECTED", 0.5)
-    monkeypatch.setattr(window_sampling, "RIM_CYCLES", 0.0)
+    monkeypatch.setattr(window_edges, "NEGLECTED", 0.5)
+    monkeypatch.setattr(window_edges, "RIM_CYCLES", 0.0)
     again, images = [], LightBatch.images
     monkeypatch.setattr(LightBatch, "images", lambda self, places, *a: again.append(places) or images(self, places, *a))
     strong = {"pupil": lens(wavefront=Zernike(5 * MODES)), "sensor_distance": 1.03e-3}

@@ -5,6 +5,7 @@ bitmap: test_bitmap.py
 boundary: test_combined.py, test_nearly_touching.py
 circular: test_aperture.py
 combined: test_combined.py
+curved_disk: test_curved_disk.py
 outline: test_pixelated.py
 pixelated: test_pixelated.py
 polygonal: test_polygonal.py

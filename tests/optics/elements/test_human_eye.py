@@ -167,7 +167,7 @@ def test_centered_moves_the_centroid_of_the_image_to_the_axis():
     places = []
     for centered in (False, True):
         eye = HumanEye(1.5e-3, centered=centered)
-        seen = optics.psf(eye.pupil, [570e-9], eye.focal_length, dx=2e-6, shape=(129, 129), tolerance=1e-2)
+        seen = optics.psf(eye.pupil, [570e-9], eye.focal_length, dx=2e-6, shape=(129, 129), tolerance=1e-3)
         image = seen.psf[0] / seen.psf[0].sum()
         places.append(np.array([image.sum(axis=0) @ seen.x, image.sum(axis=1) @ seen.y]) / eye.sensor_width(1 / 60))
     assert places[0] == pytest.approx([1.24, -0.67], abs=0.03)

@@ -3,6 +3,7 @@
 angular_spectrum: test_angular_spectrum.py, test_textbook.py, test_oracles_waves.py, test_even_pupils.py
 carrier: point_spread/test_field.py
 derivative_cells: point_spread/test_gradients.py
+diffraction_kernel: test_diffraction_kernel.py
 far_field: test_textbook.py, test_far_field.py
 far_field_nodes: test_far_field.py
 fresnel: test_fresnel.py
@@ -13,6 +14,9 @@ slow_factor: test_low_rank.py
 window_check: test_window_sampling.py
 window_rank: test_window_sampling.py, test_torch_stacks.py
 window_sampling: test_window_sampling.py
+window_edges: test_window_edges.py
+window_plan: test_window_sampling.py, point_spread/test_coarse_batch.py
+window_images: test_sine_stack.py, point_spread/test_coarse_batch.py
 window_stack: test_torch_stacks.py
 window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py
@@ -26,6 +30,7 @@ rays: test_geometric.py
 method_sampling: point_spread/test_planner.py
 scalar_theory: test_scalar_theory.py
 sine_samples: test_sine_samples.py
+sine_stack: test_sine_stack.py
 smooth_pupil: test_smooth_spectrum.py
 smooth_spectrum: test_smooth_spectrum.py, eye/test_steep_reliefs.py
 smythe: point_spread/test_vector_focus.py

@@ -6,7 +6,7 @@ import pytest
 import optics
 from optics import BSplineRelief, GaussianMask, Grid, HeightMap, PointSource, Pupil, Zernike
 from optics.elements.beam import Beam
-from optics.methods import window_sampling as module
+from optics.methods import window_edges as module
 from optics.methods.problem import Problem
 from optics.methods.window_sampling import WindowSampling, window_sampling
 from optics.methods.window_sums import pupil_gradient, window_field

@@ -17,8 +17,7 @@ contrast: test_contrast_parts.py, test_measures.py, test_measure_errors.py, test
 mixture: test_mixture.py
 pictures: test_attempt_parts.py, test_check_parts.py, test_pictures.py
 planner: test_planner_parts.py, test_cost_formulas.py, test_planner.py
-population: test_common_plans.py, test_population_parts.py, test_population.py, test_population_members.py
-population_members: test_population_parts.py, test_population_members.py
+coarse_batch: test_coarse_batch.py
 psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
 request: test_check_parts.py, test_cost_formulas.py, test_request.py, test_psf.py
 psf_result: test_psf_result.py, test_psf.py, test_measure_errors.py

@@ -23,7 +23,7 @@ def test_equals_one_by_one():
     for i, pupil in enumerate(pupils()):
         for j, depth in enumerate(DEPTHS):
             one = optics.psf(pupil, WAVELENGTHS, 150e-6, depth, **VIEW)
-            np.testing.assert_array_equal(batch.psf[i, j], one.psf)
+            np.testing.assert_allclose(batch.psf[i, j], one.psf, rtol=1e-6)  # stacks round sums differently
             assert [plan.method for plan in one.plans] == [plan.method for plan in batch.plans[6 * i + 2 * j :][:2]]
 
 

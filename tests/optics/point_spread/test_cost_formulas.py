@@ -53,12 +53,6 @@ def test_a_window_costs_its_samples(dtype, symmetric):
     assert window_cost.window_bytes(unchecked) == 600 * cost.OUTPUT_ARRAYS * cost.ITEM_BYTES[dtype]
 
 
-def test_the_time_per_psf_of_a_population():
-    """5e-5 s, 2e-8 s per entry of a kernel of the pupil or of a side of the window, and 1.7e-7 s per sample."""
-    found = window_cost.population_seconds(40, Grid((20, 30), 1e-6))
-    assert found == pytest.approx(5e-5 + 2e-8 * (40 * 40 + 40 * 20 + 40 * 30) + 1.7e-7 * 600)
-
-
 @pytest.mark.parametrize("samples", [1, EFFORT.fewest - 1, EFFORT.fewest, EFFORT.few - 1, EFFORT.few, 10**6])
 def test_the_check_of_a_direct_sum(samples):
     """The check has twice as many nodes. It takes no more than a share of the sum's time, except in small windows."""

@@ -1,0 +1,76 @@
+"""Converging and diverging waves behind disks and rings, convolved with the kernel of a soft edge.
+
+A curved wave contains all directions from that of its centre to that of its rim. After the convolution, it contains
+only directions up to the stopband of the kernel. Light that leaves in other directions is removed, and light up to the
+passband, including the light that the hard edge diffracts, stays unchanged.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import ceil, log2, pi
+
+import numpy as np
+
+from optics.apertures.soft_edge import SoftEdge
+from optics.numerics.bessel import bessel_j
+from optics.numerics.interpolation import chebyshev_basis, chebyshev_points
+from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, stepped_up
+
+__all__ = ["curved_ring"]
+
+DIGITS = 4.0  # choice: digits of the table, which serves tolerances from 3e-4
+SPARE = 1.2  # choice: largest frequency relative to the stopband, beyond which the kernel's spectrum is a ripple
+STEP = 16  # choice: numbers of interpolation points are multiples of it, so that tables share their weights
+BESSEL_STEP = 0.02  # choice: step of the table of J₀
+
+
+def curved_ring(edge: SoftEdge, inner: float, curvature: float, levels: int) -> np.ndarray:
+    """Return a smoothed wave behind a ring, relative to the wave itself, at even steps of r², (levels,), complex.
+
+    The wave e^{iπ c r²} passes the opening between the radii `inner` and 1. Its convolution with the kernel, divided by
+    the wave, is 1 where the kernel changes nothing. Levels are in the middle of the steps from 0 to (1 + reach)².
+
+    curvature: c, the cycles per radius at the rim.
+    """
+    most, outermost, bend = SPARE * edge.stopband, 1 + edge.reach, abs(curvature) / 2
+    k, by_k = _rule(0.0, most, most * (1 + outermost))
+    r, by_r = _rule(inner, 1.0, most + bend)
+    at, by_at = _rule(0.0, edge.reach, 2 * edge.cycles + edge.beta / 4)
+    # Hankel transforms of the wave in the opening and of the kernel, whose product is transformed back.
+    wave = (by_r * r * np.exp(1j * pi * curvature * r * r)) @ _bessel_j0(r, k)
+    kernel = (by_at * edge.ring(at)) @ _bessel_j0(at, k)
+    count = STEP * ceil((pi * outermost * (most + bend * outermost) + 2 * DIGITS) / STEP)
+    square = (chebyshev_points(count) + 1) / 2 * outermost**2
+    both = 4 * pi * pi * by_k * k * wave * kernel
+    smooth = (_bessel_j0(np.sqrt(square), k) @ both) * np.exp(-1j * pi * curvature * square)
+    parts = np.stack([smooth.real, smooth.imag], axis=1).astype(np.float32)
+    return np.asarray((_weights(levels, count) @ parts).view(np.complex64)[:, 0])
+
+
+def _rule(first: float, last: float, cycles: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes and weights between two radii or frequencies."""
+    at, weight = gauss_legendre(gauss_legendre_count(stepped_up(cycles), DIGITS))
+    return first + (last - first) * at, (last - first) * weight
+
+
+@lru_cache(maxsize=16)
+def _weights(levels: int, count: int) -> np.ndarray:
+    """Return interpolation weights of Chebyshev points in the middle of even steps, (level, point)."""
+    return chebyshev_basis((2 * np.arange(levels) + 1) / levels - 1, count).astype(np.float32)
+
+
+def _bessel_j0(r: np.ndarray, k: np.ndarray) -> np.ndarray:
+    """Return J₀(2πkr), (r, k), by linear interpolation of a table, to within BESSEL_STEP²/16."""
+    place = np.outer(r, k * (2 * pi / BESSEL_STEP))
+    below = place.astype(np.int32)
+    known = _bessel_table(2.0 ** ceil(log2(place.max() + 2)))
+    start = known[below]
+    return np.asarray(start + (place - below) * (known[below + 1] - start))
+
+
+@lru_cache(maxsize=8)
+def _bessel_table(size: float) -> np.ndarray:
+    """Return J₀ at the multiples of BESSEL_STEP."""
+    parts = np.array_split(BESSEL_STEP * np.arange(int(size)), max(1, int(size) // 1024))
+    return np.concatenate([bessel_j(0, part) for part in parts])

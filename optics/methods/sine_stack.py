@@ -1,0 +1,285 @@
+"""Samples of several pupils at once, evenly spaced in sines as in `sine_samples`, with as many samples for each pupil.
+
+All arrays are of NumPy, and their first axis counts the pupils. It has length 1 if the light of several wavelengths or
+sources passes the same samples.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from optics.apertures.aperture import SoftAperture
+from optics.apertures.circular import SoftAnnulus
+from optics.apertures.curved_disk import curved_ring
+from optics.elements.light_stack import LightStack
+from optics.methods.diffraction_kernel import FAR, diffraction_kernel, near_field
+from optics.methods.sine_samples import MOST_SQUARE, MOST_STRETCH, RIM, SineSamples
+from optics.numerics.array_library import turned
+from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.precision import padded_for_packets, precision
+
+__all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines", "single_stack"]
+
+# Choices for tables of the transmittance against r²: number of values per cycle of the edge, and of smoothed waves.
+PER_CYCLE, SMOOTHED_LEVELS = 1000, 16384
+SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a few points
+
+
+@dataclass(frozen=True, eq=False)
+class SineGeometry:
+    """Points of pupils, and the sines of the rays from there to the centre of the window.
+
+    distance: distances of the window [m], (pupil,).
+    centre: centre (x, y) [m] of the window.
+    steepest: sines of the outermost samples with light, (pupil,).
+    elsewhere: sines at which factors along the other axis are evaluated, see `slow_factor.axis_factor`, (pupil,).
+    """
+
+    distance: np.ndarray
+    centre: tuple[float, float]
+    steepest: np.ndarray
+    elsewhere: np.ndarray
+
+    @cached_property
+    def _middle(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sines of the rays from the centres of the pupils to the centre of the window."""
+        none = np.zeros(len(self.distance))
+        return _sines(none, none, self.centre, self.distance)
+
+    def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sines of points of the pupils [m], minus those of the pupils' centres, (pupil, ...)."""
+        sx, sy = _sines(x, y, self.centre, _aligned(self.distance, x))
+        return sx - _aligned(self._middle[0], sx), sy - _aligned(self._middle[1], sy)
+
+    def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the points (x, y) [m] of the pupils in directions, see `directions`."""
+        sx, sy = s + _aligned(self._middle[0], s), t + _aligned(self._middle[1], t)
+        slant = _aligned(self.distance, sx) / np.sqrt(self._squared_cosine(sx, sy))
+        return sx * slant + self.centre[0], sy * slant + self.centre[1]
+
+    def _squared_cosine(self, sx: np.ndarray, sy: np.ndarray) -> np.ndarray:
+        most = _aligned(np.maximum(np.square(self.steepest), MOST_SQUARE), sx)
+        found: np.ndarray = 1 - np.minimum(sx * sx + sy * sy, most)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class SineStack(SineGeometry):
+    """Soft apertures on grids of sines.
+
+    at: sines along either axis minus those of the pupil's centre, (pupil, sample), evenly spaced.
+    edges: soft apertures, (pupil,).
+    radius: radii [m], (pupil,).
+    curvature: curvatures of waves that are smoothed with the edges, see `curved_ring`, (pupil,).
+    """
+
+    at: np.ndarray
+    edges: tuple[SoftAperture, ...]
+    radius: np.ndarray
+    curvature: np.ndarray
+
+    def smooth(self, reach: float) -> bool:
+        """Return whether paths to points up to `reach` [m] from the axis vary smoothly over all samples."""
+        return bool(max(self.steepest.max(), reach / self.distance.min()) <= SMOOTH_SINE)
+
+    @property
+    def pitch(self) -> np.ndarray:
+        """Spacing of the samples, (pupil,)."""
+        found: np.ndarray = (self.at[:, -1] - self.at[:, 0]) / (self.at.shape[1] - 1)
+        return found
+
+    @cached_property
+    def outermost(self) -> np.ndarray:
+        """Distances from the axis [m] beyond which the pupils are dark, (pupil,)."""
+        found: np.ndarray = (1 + np.array([edge.reach for edge in self.edges])) * self.radius
+        return found
+
+    def _sine2(self, dtype: str = "float64") -> np.ndarray:
+        """Return the squared sines of the angles between rays and axis, (pupil, y, x)."""
+        across, down = (np.square(self.at + part[:, None]).astype(dtype) for part in self._middle)
+        return np.asarray(across[:, None, :] + down[:, :, None])
+
+    def _cosine2(self, dtype: str = "float64") -> np.ndarray:
+        """Return the squared cosines of the angles between rays and axis, (pupil, y, x)."""
+        found: np.ndarray = 1 - self._sine2(dtype)
+        least = 1 - np.maximum(np.square(self.steepest), MOST_SQUARE)
+        if (found[:, [0, 0, -1, -1], [0, -1, 0, -1]].min(axis=1) < least).any():
+            np.maximum(found, least[:, None, None], out=found)
+        return found
+
+    @cached_property
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points (x, y) [m] of all samples, (pupil, y, x)."""
+        slant = self.distance[:, None, None] / np.sqrt(self._cosine2())
+        sx, sy = (part[:, None] for part in self._middle)
+        return (self.at + sx)[:, None, :] * slant + self.centre[0], (self.at + sy)[:, :, None] * slant + self.centre[1]
+
+    def arriving(self, stack: LightStack, dtype: str) -> np.ndarray:
+        """Return the contribution of each sample to the field at the middle of the window, (beam, y, x), complex.
+
+        It is the light behind the pupils, times the areas of the samples, times z/(λD²) (1/(kD) - i) e^{ik(D - ρ)}, up
+        to a constant phase.
+
+        dtype: type of the real and imaginary parts, in which the phase is rounded, "float32" or "float64".
+        """
+        size = self._sizes(dtype) / stack.wavelength[:, None, None].astype(dtype)
+        if any(beam.pupil.mask is not None for beam in stack.beams):
+            size = size * stack.amplitude(*self.points)
+        waves = self._waves(stack)
+        if (stack.wavelength / stack.distance).max() > 2 * np.pi * FAR:
+            far = self.distance[:, None, None] / np.sqrt(self._cosine2())
+            size = size * near_field(stack.wavelength[:, None, None], far)[0]
+        if not self.curvature.any():
+            return np.asarray(turned(size, waves, dtype))
+        found = turned(1.0, waves, dtype)
+        found *= size
+        return np.asarray(found)
+
+    @cached_property
+    def known(self) -> dict[Any, Any]:
+        """Arrays that do not depend on the light, for further PSFs with the same samples."""
+        return {}
+
+    def _sizes(self, dtype: str) -> np.ndarray:
+        """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x).
+
+        The transmittance of smoothed waves is complex.
+        """
+        if dtype not in self.known:
+            self.known[dtype] = self._new_sizes(dtype)
+        return np.asarray(self.known[dtype])
+
+    def _new_sizes(self, dtype: str) -> np.ndarray:
+        stretch = 1 / self._cosine2(dtype)
+        size = (self.distance * np.square(self.pitch))[:, None, None].astype(dtype) * stretch
+        found = np.empty(size.shape, np.result_type(dtype, np.complex64)) if self.curvature.any() else size
+        first: dict[tuple[int, float], int] = {}
+        kinds = zip(map(id, self.edges), self.curvature.tolist(), strict=True)
+        same = np.array([first.setdefault(kind, place) for place, kind in enumerate(kinds)])
+        for place in first.values():
+            own = slice(None) if len(first) == 1 else np.flatnonzero(same == place)
+            edge, radius = self.edges[place], self.radius[own, None, None]
+            if edge.rotationally_symmetric:
+                profile = _profile(edge, float(self.curvature[place]), dtype)
+                per_level = (len(profile) - 1) / ((1 + edge.reach) * radius) ** 2
+                if self.centre == (0.0, 0.0):  # r² = z² tan²θ
+                    level = (np.square(self.distance)[own, None, None] * per_level).astype(dtype) * stretch[own]
+                    level *= self._sine2(dtype)[own]
+                else:
+                    x, y = self.points
+                    level = (np.square(x[own]) + np.square(y[own])) * per_level
+                found[own] = size[own] * profile.take(level.astype(np.int32), mode="clip")
+            else:
+                x, y = self.points
+                found[own] = size[own] * _transmittance(edge, x[own] / radius, y[own] / radius)
+        return found
+
+    def _waves(self, stack: LightStack) -> np.ndarray:
+        """Return the paths through all samples to the middle of the window, in waves up to a constant, (beam, y, x).
+
+        Paths without fine detail are interpolated from a few points of the pupil.
+        """
+        count = stack.smooth_points
+        if count is None or count >= self.at.shape[1] or not self.smooth(0.0):
+            return self._paths(stack, *self.points)
+        side = self.at[:, [0, -1]]
+        nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
+        weight = even_weights(self.at.shape[1], count)
+        paths = self._paths(stack, *self.points_at(nodes[:, None, :], nodes[:, :, None]))
+        return np.asarray(weight @ paths @ weight.T)
+
+    def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the paths through points (x, y) [m], in waves up to a constant."""
+        return np.asarray(stack.waves(x, y) + self._to_middle(stack.wavelength[:, None, None], x, y)[1])
+
+    def _to_middle(self, wavelength: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the `diffraction_kernel` from points (x, y) [m] to the middle of the window."""
+        return diffraction_kernel(wavelength, self.distance[:, None, None], (x, y), self.centre)
+
+    def to_middle(self, wavelength: float | np.ndarray, dtype: str) -> np.ndarray:
+        """Return the factor between the light of samples and their contribution to the middle, (pupil, y, x), complex.
+
+        It is the factor in `arriving`, for light whose amplitude includes the areas of the samples.
+
+        wavelength: wavelength [m] in the medium, a number.
+        """
+        key = "to_middle", float(wavelength), dtype
+        if key not in self.known:
+            self.known[key] = turned(*self._to_middle(wavelength, *self.points), dtype)
+        return np.asarray(self.known[key])
+
+
+@lru_cache(maxsize=16)
+def single_stack(samples: SineSamples) -> SineStack:
+    """Return the samples of a single pupil as a stack of one. Many PSFs have the same samples, so it is cached."""
+    numbers = samples.distance, samples.steepest, samples.elsewhere, samples.edge.radius
+    distance, steepest, elsewhere, radius = (np.array([value]) for value in numbers)
+    edges = (samples.edge.aperture,)
+    return SineStack(distance, samples.centre, steepest, elsewhere, samples.at[None], edges, radius, np.zeros(1))
+
+
+def rim_sines(
+    outermost: np.ndarray, centre: tuple[float, float], distance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the largest sine of points on the rims, relative to the pupils' centres and along either axis, (pupil,).
+
+    The second result is the largest sine itself. The third one states for which pupils samples that are evenly spaced
+    in sines are even enough in the pupil.
+
+    outermost: radii [m] of the rims.
+    """
+    angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)
+    x, y = (outermost[:, None] * part for part in (np.cos(angle), np.sin(angle)))
+    rim = _sines(x, y, centre, distance[:, None])
+    middle = _sines(np.zeros(len(distance)), np.zeros(len(distance)), centre, distance)
+    steepest = np.hypot(*rim).max(axis=1)
+    half = np.max([np.abs(at - own[:, None]).max(axis=1) for at, own in zip(rim, middle, strict=True)], axis=0)
+    straight = (1 - np.square(middle[0]) - np.square(middle[1])) ** -1.5
+    squared = np.maximum(1 - np.square(steepest), 1e-200)
+    return half, steepest, (steepest < 1) & (squared**-1.5 <= MOST_STRETCH * straight)
+
+
+def _aligned(values: np.ndarray, to: np.ndarray) -> np.ndarray:
+    """Return one value per pupil with the axes of another array (pupil, ...)."""
+    return values.reshape(-1, *[1] * (to.ndim - 1))
+
+
+def _sines(
+    x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sines of the rays from the centre of the window to points (x, y) of the pupils."""
+    x, y = x - centre[0], y - centre[1]
+    slant = np.sqrt(x * x + y * y + distance * distance)
+    return x / slant, y / slant
+
+
+def _transmittance(edge: SoftAperture, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the transmittance of a soft aperture at points in units of its radius."""
+    types = precision("float64")
+    across, down = (types.Float64(padded_for_packets(part)) for part in (x, y))
+    return np.asarray(edge.transmittance(across, down, types).numpy().reshape(x.shape))
+
+
+@lru_cache(maxsize=64)
+def even_weights(samples: int, count: int) -> np.ndarray:
+    """Return interpolation weights of Chebyshev points at evenly spaced samples, (sample, point)."""
+    return np.ascontiguousarray(lagrange_basis(np.linspace(-1, 1, samples), chebyshev_points(count)).T)
+
+
+@lru_cache(maxsize=256)
+def _profile(edge: SoftAperture, curvature: float, dtype: str) -> np.ndarray:
+    """Return the transmittance in the middle of equal steps of r², up to the outermost radius, and 0 beyond.
+
+    dtype: type of real transmittances. The table of a smoothed wave has single precision.
+    """
+    if curvature and isinstance(edge, SoftAnnulus):
+        return np.append(curved_ring(edge.edge, edge.inner, curvature, SMOOTHED_LEVELS), 0)
+    types, levels = precision("float64"), 2 ** math.ceil(math.log2(PER_CYCLE * edge.stopband))
+    r = np.sqrt((np.arange(levels) + 0.5) / levels) * (1 + edge.reach)
+    found = edge.transmittance(types.Float64(r), types.Float64(np.zeros(levels)), types).numpy()
+    return np.append(found, 0.0).astype(dtype)

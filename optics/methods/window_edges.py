@@ -1,0 +1,268 @@
+"""Soft edges for samples of several pupils at coarse tolerances, and the numbers of samples that they need.
+
+Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
+width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
+diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. The softer edge only
+changes light far from the geometrical rays of the edge, where there is little light.
+
+If most light of a strongly curved wave misses the window, the wave itself is smoothed with the edge (`curved_disk`).
+This removes light in directions far from the window. The number of samples is then almost independent of the
+directions of the rays at the edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from optics.apertures.aperture import EDGE_REACH, SoftAperture
+from optics.apertures.circular import Annulus, Circle
+from optics.apertures.soft_edge import SoftEdge
+from optics.elements.light_stack import LightStack
+from optics.elements.wavefront import Zernike
+from optics.methods.window_rank import Derivatives
+from optics.numerics.grid import Grid
+
+__all__ = ["FINER", "WindowEdges"]
+
+# Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check.
+RIPPLES, RIPPLE_EXPONENT = (0.015, 0.004), 0.5
+# Choices for the passband of the soft edge, in cycles per radius: margin at a tolerance of 0.01, exponent of the
+# tolerance, and the largest passband of the check, relative to that of the samples.
+EDGE_CYCLES, EXPONENT, SHARPER = 3.0, -0.6, 2.0
+NEGLECTED = 3e-4  # choice: light that is neglected, as a share of all light, at a tolerance of 0.01
+# Choices: cycles around the middle of the window up to which light from the edge matters, and cycles by which
+# diffraction spreads the light of a ray.
+NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
+# Choices: the same spread for light behind maps, whose fine detail diffracts light away from its rays. Cycles at a
+# tolerance of 0.01, the same relative to those of the rays at the edge, and exponent of the tolerance.
+MAPPED_CYCLES, MAPPED_RIM_CYCLES, MAPPED_EXPONENT = 4.0, 3.0, -0.4
+# Choices: distance from the axis [radii] beyond which rays count as rays of the edge, and cycles of most of these rays,
+# relative to their median.
+RIM, RIM_CYCLES = 0.85, 1.2
+# Choices for PSFs that carry derivatives, to which points near the edge contribute as much as others. The soft edge is
+# then narrow: ripples as above, passband relative to the stopband; cycles per radius at a tolerance of 0.01, the same
+# relative to those of the rays at the edge, exponent of the tolerance, and cycles per cell between knots.
+CARRIED_RIPPLES, CARRIED_PASSBAND = (0.03, 0.002), 0.35
+CARRIED_CYCLES, CARRIED_RIM_CYCLES, CARRIED_EXPONENT, CELL_CYCLES = 7.6, 5.7, -0.4, 0.375
+EDGES = 4  # choice: number of sharpnesses of the edge per octave; equal ones share tables
+SMOOTHED_RIPPLE = 0.1  # choice: ripple for smoothed waves, whose brightest light it affects, relative to others
+# Choices: step of the curvature in cycles per radius, so that pupils share tables, and the least useful curvature.
+CURVATURE_STEP, LEAST_CURVATURE = 1.0, 3.0
+WORTH = 0.9  # choice: ratio of numbers of samples along an axis below which a smoothed wave saves time
+FINER = 2.0 ** (1 / 3)  # choice: density of the finer samples of the check, relative to that of the samples
+
+
+@dataclass(frozen=True, eq=False)
+class WindowEdges:
+    """Soft edges of several pupils for one window.
+
+    half: distance [m] from the middle of the window within which interpolation points lie.
+    tolerance: tolerances of the PSFs, (beam,).
+    derivatives: needs of derivatives; None if none are requested.
+    smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
+    """
+
+    stack: LightStack
+    window: Grid
+    half: float
+    tolerance: np.ndarray
+    derivatives: Derivatives | None = None
+    smoothed: bool = False
+
+    @cached_property
+    def curvature(self) -> np.ndarray:
+        """Curvatures of the waves that are smoothed with the edge, in cycles per radius at the rim, (beam,)."""
+        return self._choice[0]
+
+    @property
+    def density(self) -> np.ndarray:
+        """Numbers of samples per radius, which are also the numbers of cycles per radius that they resolve, (beam,)."""
+        return self._choice[1].density
+
+    @cached_property
+    def edges(self) -> list[SoftAperture]:
+        """Soft apertures of the samples, (beam,)."""
+        narrow = self._narrow(self.density, CARRIED_RIPPLES[0])
+        if self.derivatives is not None:
+            return narrow
+        return self._unless_mapped(self._wide(self._choice[1].passband, self._ripples(self.curvature)[0]), narrow)
+
+    @cached_property
+    def finer_edges(self) -> list[SoftAperture]:
+        """Soft apertures that are as sharp as the finer samples allow, (beam,)."""
+        narrow = self._narrow(FINER * self.density, CARRIED_RIPPLES[1])
+        if self.derivatives is not None:
+            return narrow
+        bands = self._choice[1]
+        passband = np.maximum(
+            FINER * self.density - bands.around - _transitions(self._ripples(self.curvature)[1]), bands.passband
+        )
+        wide = self._wide(np.minimum(passband, SHARPER * bands.passband), self._ripples(self.curvature)[1])
+        return self._unless_mapped(wide, narrow)
+
+    def _unless_mapped(self, wide: list[SoftAperture], narrow: list[SoftAperture]) -> list[SoftAperture]:
+        """Return wide soft edges, and narrow ones for maps: their fine detail sends light from the edge anywhere."""
+        choices = zip(self.stack.mapped.tolist(), narrow, wide, strict=True)
+        return [one if mapped else other for mapped, one, other in choices]
+
+    @cached_property
+    def _choice(self) -> tuple[np.ndarray, _Bands]:
+        """Curvatures, and the bands of the light."""
+        none = np.zeros(len(self.tolerance))
+        flat = self._bands(none)
+        if not self.smoothed or self.derivatives is not None:
+            return none, flat
+        able = self._round & ~self.stack.mapped
+        curvature = np.where(able & (np.abs(self._rim_curvature) >= LEAST_CURVATURE), self._rim_curvature, 0)
+        if not curvature.any():
+            return none, flat
+        curved = self._bands(curvature)
+        chosen = (curvature != 0) & (curved.density < WORTH * flat.density)
+        return np.where(chosen, curvature, 0), curved.where(chosen, flat)
+
+    @cached_property
+    def _round(self) -> np.ndarray:
+        """True for apertures that are disks or rings, (beam,)."""
+        return np.array([isinstance(beam.pupil.aperture, Circle | Annulus) for beam in self.stack.beams])
+
+    @cached_property
+    def _rim_curvature(self) -> np.ndarray:
+        """Mean cycles per radius of the rays at the rim, away from the axis, in steps, (beam,)."""
+        slopes, (along_x, along_y) = self.stack.slopes, self._to_middle
+        r2 = np.square(slopes.x) + np.square(slopes.y)
+        rim = r2 > RIM**2
+        outward = ((along_x * slopes.x + along_y * slopes.y)[:, rim] / r2[rim]).mean(axis=1)
+        return np.asarray(np.rint(outward / CURVATURE_STEP) * CURVATURE_STEP)
+
+    def _bands(self, curvature: np.ndarray) -> _Bands:
+        """Return the bands of waves that are smoothed with these curvatures, (beam,)."""
+        slopes, bend, cycles = self.stack.slopes, curvature[:, None], self._window_cycles
+        rest = [np.abs(part - bend * at) for part, at in zip(self._to_middle, (slopes.x, slopes.y), strict=True)]
+        along, r = np.maximum(*np.abs(self._to_middle)), np.hypot(slopes.x, slopes.y)
+        rim = np.median(np.maximum(*rest)[:, r > RIM], axis=1)
+        if self.derivatives is not None:
+            return self._carried(rim, cycles + self._reach(along))
+        # Light from the edge matters near the middle of the window, and other light in the whole window.
+        near = np.where(curvature != 0, cycles, np.minimum(cycles, NEAR_CYCLES)) + RIM_CYCLES * rim
+        passband = near + EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
+        seen = np.where(along <= (cycles + SPREAD_CYCLES)[:, None], np.abs(bend) * r, 0).max(axis=1)
+        passband = np.maximum(passband, seen)
+        stopband = passband + _transitions(self._ripples(curvature)[0])
+        reach = self._reach(np.where(np.abs(bend) * r > stopband[:, None], 0, along))
+        detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * np.median(along[:, r > RIM], axis=1)
+        spread = np.where(self.stack.mapped, detail * (self.tolerance / 0.01) ** MAPPED_EXPONENT, SPREAD_CYCLES)
+        density = self._masks + np.maximum(cycles + reach + spread, near + stopband)
+        return _Bands(np.maximum(density, np.where(self.stack.mapped, self._widest, 0)), passband, near)
+
+    def _carried(self, rim: np.ndarray, direct: np.ndarray) -> _Bands:
+        """Return the bands of light that carries derivatives.
+
+        rim: median cycles per radius of the rays at the edge, (beam,).
+        direct: cycles per radius that other light needs, (beam,).
+        """
+        # High modes grow outside the circle, so that their derivatives need a sharper edge.
+        fronts = [beam.pupil.wavefront for beam in self.stack.beams]
+        orders = np.array([front.order if isinstance(front, Zernike) else 0 for front in fronts])
+        cells = 0 if self.derivatives is None else self.derivatives.cells
+        sharp = CARRIED_CYCLES + CARRIED_RIM_CYCLES * rim + orders + cells * CELL_CYCLES
+        sharp = sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT
+        density = np.maximum(direct + sharp + self._masks, self._widest)
+        return _Bands(density, np.zeros_like(density), np.zeros_like(density))
+
+    @property
+    def _widest(self) -> np.ndarray:
+        """Cycles per radius with which the narrow edges of the check do not extend beyond EDGE_REACH, (beam,)."""
+        widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
+        return np.asarray(widest + self._window_cycles / 2)
+
+    @cached_property
+    def _masks(self) -> np.ndarray:
+        """Cycles per radius of the masks, (beam,)."""
+        return np.array([
+            0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(min(tolerance, 0.1), radius) * radius
+            for beam, radius, tolerance in zip(self.stack.beams, self.stack.radius, self.tolerance, strict=True)
+        ])  # fmt: skip
+
+    def _reach(self, along: np.ndarray) -> np.ndarray:
+        """Return the cycles per radius up to which nearly all light reaches, (beam,).
+
+        along: cycles per radius of rays, (beam, ray).
+        """
+        share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
+        last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
+        ordered = np.partition(along, np.unique(last), axis=1)
+        return np.asarray(np.take_along_axis(ordered, last[:, None], axis=1)[:, 0])
+
+    @cached_property
+    def _window_cycles(self) -> np.ndarray:
+        """Cycles per radius of the Fourier kernel at the sides of the window."""
+        stack = self.stack
+        found: np.ndarray = self.half * stack.radius / (stack.wavelength * stack.distance)
+        return found
+
+    @cached_property
+    def _to_middle(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
+        stack, slopes, window = self.stack, self.stack.slopes, self.window
+        radius, index, distance = (part[:, None] for part in (stack.radius, stack.index, stack.distance))
+        x, y = radius * slopes.x - window.centre[0], radius * slopes.y - window.centre[1]
+        scale = index / np.sqrt(x * x + y * y + distance * distance)
+        cycles = (stack.radius / stack.vacuum_wavelength)[:, None]
+        return (slopes.along_x + x * scale) * cycles, (slopes.along_y + y * scale) * cycles
+
+    def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ripples of the soft edges of the samples and of the finer samples, which fall in steps, (beam,)."""
+        share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0) ** RIPPLE_EXPONENT
+        share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
+        return RIPPLES[0] * share, RIPPLES[1] * share
+
+    def _wide(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
+        """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""
+        passband = 2.0 ** (np.ceil(EDGES * np.log2(passband) - 1e-9) / EDGES)
+        return self._soft(passband, passband + _transitions(ripples), ripples)
+
+    def _narrow(self, density: np.ndarray, ripple: float) -> list[SoftAperture]:
+        """Return soft apertures that are as narrow as a density of samples allows."""
+        stopband = np.maximum(density - self._window_cycles / 2, density / 2)
+        stopband = 2.0 ** (np.floor(EDGES * np.log2(stopband)) / EDGES)
+        return self._soft(CARRIED_PASSBAND * stopband, stopband, np.full(len(stopband), ripple))
+
+    def _soft(self, passband: np.ndarray, stopband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
+        columns = (part.tolist() for part in (passband, stopband, ripples))
+        beams = zip(self.stack.beams, *columns, strict=True)
+        return [beam.pupil.aperture.with_edge(*edge) for beam, *edge in beams]
+
+
+@dataclass(frozen=True, eq=False)
+class _Bands:
+    """Frequencies in cycles per radius, (beam,).
+
+    density: frequencies that the samples must resolve.
+    passband: passband of the soft edge.
+    around: distance between the frequencies of the edge and those of the light that it sends into the window.
+    """
+
+    density: np.ndarray
+    passband: np.ndarray
+    around: np.ndarray
+
+    def where(self, chosen: np.ndarray, other: _Bands) -> _Bands:
+        """Return these bands for chosen beams, and others for all other beams."""
+        pairs = (self.density, other.density), (self.passband, other.passband), (self.around, other.around)
+        return _Bands(*(np.where(chosen, own, their) for own, their in pairs))
+
+
+def _transitions(ripples: np.ndarray) -> np.ndarray:
+    """Return the smallest widths of the transition from passband to stopband, in cycles per radius.
+
+    The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to this one.
+    """
+    return np.array([_transition(ripple) for ripple in ripples.tolist()])
+
+
+@lru_cache(maxsize=64)
+def _transition(ripple: float) -> float:
+    return SoftEdge(0.0, 1.0, ripple).reach / EDGE_REACH

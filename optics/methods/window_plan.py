@@ -1,0 +1,158 @@
+"""Samples of several pupils at coarse tolerances: as few as the light in the window needs (`window_edges`)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from optics.apertures.aperture import SoftAperture
+from optics.elements.light_stack import LightStack
+from optics.methods.pupil_sampling import MOST_ACROSS
+from optics.methods.sine_stack import SineGeometry, SineStack, rim_sines
+from optics.methods.window_edges import FINER, WindowEdges
+from optics.methods.window_rank import Derivatives, WindowRays, window_ranks
+from optics.numerics.grid import Grid
+
+__all__ = ["TIGHTEST", "WindowPlan"]
+
+TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
+STEPS = 8  # choice: numbers of samples per octave; equal ones share arrays
+ELSEWHERE = 8  # choice: number of steps between 0 and the largest sine
+SHIFT = (math.sqrt(5) - 1) / 2  # choice: shift of the finer samples of the check in pitches, see `window_check`
+# Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
+PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 4e-4, 1.5e-8, 3e-8, 1.5e-10
+MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of the slow factor
+
+
+@dataclass(frozen=True, eq=False)
+class WindowPlan:
+    """Samples of several pupils for one window.
+
+    tolerance: tolerances of the PSFs, (beam,).
+    derivatives: needs of derivatives; None if none are requested.
+    smoothed: see `WindowEdges`.
+    """
+
+    stack: LightStack
+    window: Grid
+    tolerance: np.ndarray
+    derivatives: Derivatives | None = None
+    smoothed: bool = False
+
+    @property
+    def half(self) -> float:
+        """Distance [m] from the middle of the window within which interpolation points lie."""
+        return max(self.window.own_half_width, self.window.dx)
+
+    @cached_property
+    def edges(self) -> WindowEdges:
+        """Soft edges, and the densities of samples that they need."""
+        return WindowEdges(self.stack, self.window, self.half, self.tolerance, self.derivatives, self.smoothed)
+
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """Numbers n of samples between the middle and either end, (beam,); 0 if the method is not suitable.
+
+        A pupil has 2n + 1 samples along either axis.
+        """
+        suitable, across = self._rims[2] & self._finer_rims[2], self._rims[0]
+        needed = np.where(suitable, across / self._pitch(self.edges.density), 0)
+        within = suitable & (needed < MOST_ACROSS)
+        least = np.ceil(np.where(within, needed, 1) - 1e-9)
+        step = np.maximum(1, 2 ** np.floor(np.log2(least / STEPS)))
+        found = np.where(within, np.ceil(least / step) * step, 0).astype(int)
+        finer = 2 * self.finer_count(found) + 1
+        fits = np.maximum(self.ranks * (2 * found + 1), finer) <= math.sqrt(MOST_ENTRIES)
+        return np.where(fits & (self.ranks > 0), found, 0)
+
+    @staticmethod
+    def finer_count(count: np.ndarray) -> np.ndarray:
+        """Return the number of samples of the check between the middle and an end."""
+        return np.ceil(FINER * count + SHIFT).astype(int)
+
+    @property
+    def ranks(self) -> np.ndarray:
+        """Ranks of the slow factor over the window, (beam,); 0 if the method is not suitable."""
+        return self._ranks[0]
+
+    @property
+    def crossed(self) -> np.ndarray:
+        """True for sums that include `cross_term`, (beam,)."""
+        return self._ranks[1]
+
+    @cached_property
+    def _rays(self) -> WindowRays:
+        return WindowRays.from_stack(self.stack, self.window)
+
+    @cached_property
+    def _elsewhere(self) -> np.ndarray:
+        """Sines for `SineGeometry`, in steps of a share of the largest sine, so that PSFs can share arrays, (beam,)."""
+        step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
+        return np.asarray(np.rint(self._rays.mean_sine / step) * step)
+
+    @cached_property
+    def _ranks(self) -> tuple[np.ndarray, np.ndarray]:
+        steepest = np.minimum(self._rims[1], 1 - 1e-9)  # finite points, also for pupils without a rank
+        geometry = SineGeometry(self.stack.distance, self.window.centre, steepest, self._elsewhere)
+        return window_ranks(self.stack, geometry, self._rays, self.window, self.tolerance, self.derivatives)
+
+    def samples(self, places: np.ndarray) -> tuple[SineStack, SineStack]:
+        """Return the samples of some pupils, which have the same count, and the finer samples of the check.
+
+        places: indices of the beams.
+        """
+        count = int(self.counts[places[0]])
+        sets = (count, 0.0, self._rims, self.edges.edges), (
+            int(self.finer_count(np.array(count))), SHIFT, self._finer_rims, self.edges.finer_edges,
+        )  # fmt: skip
+        found = []
+        for many, shift, (half, steepest, _), edges in sets:
+            at = (half[places] / (many - shift))[:, None] * (np.arange(-many, many + 1) + shift)
+            geometry = self.stack.distance[places], self.window.centre, steepest[places], self._elsewhere[places]
+            own = tuple(edges[k] for k in places), self.stack.radius[places], self.edges.curvature[places]
+            found.append(SineStack(*geometry, at, *own))
+        return found[0], found[1]
+
+    @cached_property
+    def seconds(self) -> np.ndarray:
+        """Predicted times of single PSFs [s], (beam,)."""
+        return self._costs[0]
+
+    @cached_property
+    def bytes(self) -> np.ndarray:
+        """Predicted memory of single PSFs, (beam,)."""
+        return self._costs[1]
+
+    @cached_property
+    def _costs(self) -> tuple[np.ndarray, np.ndarray]:
+        across, (height, width) = 2 * self.counts + 1, self.window.shape
+        inner = self.ranks * across
+        products = (inner * inner * width + height * inner * width) * np.where(self.crossed, 2, 1)
+        samples = across**2 + (2 * self.finer_count(self.counts) + 1) ** 2
+        entries = np.where(self.ranks == 1, 0, inner * inner)
+        seconds = PER_PSF + samples * PER_SAMPLE + entries * PER_ENTRY + products * PER_PRODUCT
+        return seconds, 16 * (4 * inner * inner + inner * (height + 2 * width) + samples)
+
+    def _pitch(self, density: np.ndarray) -> np.ndarray:
+        """Return the largest spacing of sines at which a pupil has `density` samples per radius everywhere.
+
+        The distance of two points in the pupil is at most z/cos³θ times the distance of their sines.
+        """
+        steepest = np.minimum(self._rims[1], 1 - 1e-12)
+        found: np.ndarray = self.stack.radius * (1 - np.square(steepest)) ** 1.5 / (self.stack.distance * density)
+        return found
+
+    @cached_property
+    def _rims(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self._sines(self.edges.edges)
+
+    @cached_property
+    def _finer_rims(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self._sines(self.edges.finer_edges)
+
+    def _sines(self, edges: list[SoftAperture]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        outermost = (1 + np.array([edge.reach for edge in edges])) * self.stack.radius
+        return rim_sines(outermost, self.window.centre, self.stack.distance)
