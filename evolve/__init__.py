@@ -1,6 +1,16 @@
 """evolve: evolution of eyes and brains in the worlds of `sim`.
 
-This module lists the public names. Each name is imported on first use.
+run, resume                     start of a run and its completion; completion of an interrupted run
+Run                             an opened run directory: candidates, tables, figures, reports and replays
+Candidate                       a genome, its animal, and the outcome of training and evaluation
+RunConfig                       all settings of a run, with the sections EyeConfig, SearchConfig, LearningConfig,
+                                EvaluationConfig and CostsConfig
+GENES, Gene, GeneConfig         quantities that evolution can change, and their use in a run
+Genotype, Phenotype, develop    encoding of genes in a genome, eyes and brain of an animal, and development of a genome
+load_policy                     trained policy from a file
+ConfigError, RunError           errors in settings, and in operations on run directories
+
+Each name is imported on first use.
 """
 
 from __future__ import annotations

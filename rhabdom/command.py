@@ -21,7 +21,11 @@ _SAID = b"evolve: interrupted\n"
 
 
 def run_command() -> int:
-    """Run one command and return the exit code."""
+    """Run one command, with the arguments of this process, and return the exit code.
+
+    Raises:
+        SystemExit: help or the version was requested, or an argument is invalid; see `evolve.cli.main`.
+    """
     open_closed_streams()
     ours = threading.current_thread() is threading.main_thread()
     if ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -36,8 +40,8 @@ def run_command() -> int:
 def _interrupt(number: int, frame: FrameType | None) -> None:
     """Interrupt the program on Ctrl-C by an exception, or end the process if a module is being imported.
 
-    During an import, the exception might be raised while a library initialises itself. Python or the library might then
-    replace or suppress it.
+    If the exception were raised during an import, while a library initialises itself, Python or the library might
+    replace or suppress the exception.
     """
     if _imports(frame):
         _report()

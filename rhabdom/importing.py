@@ -28,8 +28,12 @@ HOME = _BESIDE if _BESIDE.is_dir() else _BESIDE.parents[1]  # the folder that co
 def come_first() -> None:
     """Make `import optics`, `import sim` and `import evolve` import rhabdom's packages.
 
-    `rhabdom.optics` then is the same module as `optics`. Python's path stays unchanged if the imports already find
-    rhabdom's packages. If they find packages of other projects, a warning names these projects.
+    `rhabdom.optics` is then the same module as `optics`. Python's path stays unchanged if the imports already find
+    rhabdom's packages.
+
+    Warns:
+        RuntimeWarning: without this function, the imports would find packages of other projects; the message names
+            these projects.
 
     Raises:
         ImportError: another `optics`, `sim` or `evolve` has already been imported; the message names it.
@@ -66,7 +70,7 @@ def namesakes() -> list[str]:
 
 
 def _place(spec: ModuleSpec | None) -> Path | None:
-    """Return the folder of a package or the file of a module."""
+    """Return the folder of a package or the file of a module; None if there is no such file."""
     if spec is None or spec.origin is None:
         return None
     path = Path(spec.origin).resolve()

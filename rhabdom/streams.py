@@ -38,7 +38,7 @@ def open_closed_streams() -> None:
 
 
 def repair_encodings() -> list[str]:
-    """Let stdout and stderr encode as UTF-8 if their encoding cannot encode text; return the replaced encodings."""
+    """Set the encoding of stdout and stderr to UTF-8 if their own cannot encode text; return the replaced encodings."""
     replaced = []
     for stream in (sys.stdout, sys.stderr):
         encoding, reconfigure = getattr(stream, "encoding", None), getattr(stream, "reconfigure", None)
@@ -96,7 +96,7 @@ def send_all_to_stderr() -> None:
 
 
 class OwnedStream:
-    """A text stream that writes to another one. Other code cannot close it, and its faults do not end the program.
+    """A text stream that writes to another stream. Other code cannot close it, and its faults do not end the program.
 
     After a fault, all further output is discarded.
 

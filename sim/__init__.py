@@ -1,15 +1,17 @@
 """rhabdom.sim: MuJoCo worlds, mirrored as spectral Mitsuba scenes and rendered for the eyes of many agents at once.
 
 Eyes, build_world, World            the eyes of an agent, and the built-in worlds
-Course                              a user-defined course for navigation
+Course, LayoutFamily                a user-defined course, or a family of random courses, for navigation
 TASKS                               names of the built-in tasks
-mirror, Mirror                      conversion of any MuJoCo model to a Mitsuba scene
+mirror, Mirror, MirrorWarning       conversion of any MuJoCo model to a Mitsuba scene
 BatchedRenderer                     renderer of all eyes of all worlds in one wavefront
 choose_fidelity, Fidelity           rendering accuracy, chosen to match the receptors' noise
 FidelityWarning                     warning that no level of fidelity is accurate enough
 ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in `optics`
-ModelRenderer, Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides return several mounts
-CompoundEye                         ommatidia with any viewing directions; hexagonal_patch, whole_head, hexagonal_rows
+ModelRenderer, Poses                renderer of eyes on any MuJoCo model, and the positions of its geoms in a batch
+Mount, fan, ring, both_sides        positions and directions of eyes on a model
+CompoundEye                         ommatidia with any viewing directions
+hexagonal_patch, whole_head, hexagonal_rows   viewing directions for a CompoundEye
 choose_model_fidelity               rendering accuracy for eyes on a model
 Task                                a user task for a robot with eyes, written for one world at a time
 BatchTask                           a user task written for arrays of all worlds, which runs faster
@@ -24,7 +26,7 @@ make_vec_env, make_env              environments of many worlds in one batch, or
 set_threads                         number of threads of Dr.Jit, torch, OpenMP and BLAS
 register_task                       registration of a user task under a Gymnasium id
 View, write_exr, read_exr           images of eyes in EXR files
-read_photograph, see_photograph     a photograph through an animal's eye, as a ReceptorMosaic
+read_photograph, see_photograph     a photograph, and its image in an animal's eye as a ReceptorMosaic
 """
 
 from __future__ import annotations

@@ -129,7 +129,7 @@ def blurred_view() -> str:
 
 
 def psfs(method: str) -> Iterator[tuple[str, str]]:
-    """Yield names and hashes of PSFs of random pupils, or of the refusal by the method."""
+    """Yield names and hashes of PSFs of random pupils; if the method refuses a pupil, hash the error type instead."""
     rng = np.random.default_rng(7)
     for case in range(PSFS):
         radius = rng.uniform(10e-6, 60e-6)

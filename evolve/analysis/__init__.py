@@ -5,7 +5,7 @@ white_light     WhiteLight: measures of an eye in white daylight
 fitness_parts   parts of fitness: task fitness and costs
 acuity          finest gratings that an animal resolves
 genealogy       a candidate's line of descent
-episode_failures  failures that ended training episodes, mostly of methods of a user task
+episode_failures  failures that ended episodes, mostly failures of methods of a user task
 vision          image quality and contrast of an animal's eyes, in comparison with a perfect lens
 recorder        recording of an episode that an animal plays
 held_out        episodes in the test set of layouts

@@ -11,9 +11,9 @@ __all__ = ["acuity_cpd", "acuity_vertical_cpd"]
 def acuity_cpd(phenotype: Phenotype) -> float:
     """Return the horizontal acuity: the frequency of the finest vertical grating that is resolved [cycles/degree].
 
-    It is 1 / (2 min(range/(n_eyes - 1), fov/width)), after Tiwary, Young et al. (2025). The first term is the angle
-    between neighbouring eyes, the second the angle between neighbouring receptors. With a single eye, or if all eyes
-    look in the same direction, only the second term counts, because no angle separates the eyes.
+    It is 1 / (2 min(range/(n_eyes - 1), fov/columns)), after Tiwary, Young et al. (2025). The first term is the angle
+    between neighbouring eyes, the second the angle between neighbouring columns of receptors. With a single eye, or if
+    all eyes look in the same direction, only the second term counts, because no angle separates the eyes.
     """
     between_receptors = phenotype.fov_deg / phenotype.resolution[1]
     if phenotype.n_eyes == 1 or phenotype.placement_range_deg == 0:
@@ -25,8 +25,9 @@ def acuity_cpd(phenotype: Phenotype) -> float:
 def acuity_vertical_cpd(phenotype: Phenotype) -> float:
     """Return the vertical acuity: the frequency of the finest horizontal grating that is resolved [cycles/degree].
 
-    It is 1 / (2 vertical fov/height). Square receptors have the same spacing as along the width, fov/width, and
-    rows of ommatidia are √3/2 times as far apart. Eyes are placed side by side, so their number has no effect.
+    It is 1 / (2 Δ), where Δ is the angle between neighbouring rows of receptors: vertical fov / rows. If receptors are
+    square, rows are as far apart as columns, fov/columns. Rows of ommatidia are √3/2 times as far apart as columns.
+    Eyes are placed side by side, so their number has no effect.
     """
     rows, columns = phenotype.resolution
     if phenotype.facet_diameter_um is not None:

@@ -44,18 +44,19 @@ class Episode:
     action: in [-1, 1], (t, number)
     reward: reward of each action, (t,)
     reward_terms: terms of the reward by name, (t,) each; 0 in steps in which the task did not return the term
-    counted: titles of table rows, by term: a row shows the number of steps in which the term is not 0; see
-    `sim.BatchTask`
+    counted: titles of table rows, by term; a row shows the number of steps in which the term is not 0 (see
+        `sim.BatchTask`)
     beside: other entries of the observation by name, (t, number) each, such as "contact" or "feels"
     seconds: duration of one action [s]
     solved: True if the episode counts as solved
     failure: message of the failure that ended the episode; None without a failure
     signals: receptor signals with noise, (t, eye, channel, height, width), without the outputs of motion detectors
-    perfect_signals: signals of the same receptors behind a perfect lens, without noise, in the same shape. For compound
-        eyes: signals of the ommatidia without noise
+    perfect_signals: signals of the same receptors behind a perfect lens, without noise, in the same shape; for compound
+        eyes, signals of the ommatidia without noise
     wavelengths_nm: wavelengths of the radiance's bands, (band,)
     radiance_frames: time steps at which radiance was recorded, (frame,)
-    radiance: radiance of the scene in front of each eye, on a finer grid, (frame, eye, band, y, x)
+    radiance: radiance of the scene in front of each eye, on a finer grid, (frame, eye, band, y, x), in units of
+        `sim.scene.lights`
     azimuths [rad], elevations_deg: viewing direction of each eye in the frame of its body, site or camera, (eye,)
     scene: shapes and poses of bodies, and poses of eyes
     position (t, 2) [m], heading (t,) [rad]: pose of the animal on the ground before the action
@@ -104,20 +105,23 @@ class Episode:
 
     @property
     def eyes(self) -> sim.Eyes:
-        """Design of the animal's eyes. Their directions and poses are in `azimuths` and `scene`."""
+        """Design of the animal's eyes. `azimuths` and `scene` contain their directions and poses."""
         return self.phenotype.eyes(self.eye)
 
     @property
     def gain(self) -> float:
-        """Factor 1/a² that compensates for the dimming by a pupil of relative aperture a."""
+        """Factor that compensates for the dimming by the pupil: 1 / signal of a white surface.
+
+        For a round pupil of relative aperture a, it is 1/a².
+        """
         return 1 / float(self.eyes.eye().white_signal)
 
     @property
     def objects(self) -> np.ndarray:
-        """Positions of the ground plan's objects before each action [m], (t, object, 3)."""
+        """Positions of the ground plan's objects before each action [m], (t, object, 3); no objects without a plan."""
         bodies = () if self.plan is None else self.plan.object_bodies
         return self.scene.positions[:, list(bodies)]
 
     def count(self, term: str) -> int:
-        """Return the number of actions in which a reward term was not 0."""
+        """Return the number of actions in which a reward term was not 0; 0 for a term that does not occur."""
         return int(np.count_nonzero(self.reward_terms[term])) if term in self.reward_terms else 0

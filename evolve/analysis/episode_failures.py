@@ -1,4 +1,4 @@
-"""Failures that ended training episodes, mostly of methods of a user task."""
+"""Failures that ended episodes of training or evaluation, mostly failures of methods of a user task."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ __all__ = ["EpisodeFailure", "episode_failure_lines", "episode_failures_of"]
 
 @dataclass(frozen=True)
 class EpisodeFailure:
-    """A kind of failure, which ended one or more episodes.
+    """A failure that ended one or more episodes of training or evaluation.
 
     said: message of the failure
-    episodes: number of episodes that it ended
+    episodes: number of episodes that ended with this message
     candidates: number of candidates with such episodes
     """
 
@@ -26,18 +26,21 @@ class EpisodeFailure:
 
 
 def episode_failures_of(candidates: Iterable[Candidate]) -> list[EpisodeFailure]:
-    """Return the failures that ended the candidates' training episodes, the most frequent failure first."""
-    episodes, lives = Counter[str](), Counter[str]()
+    """Return the failures that ended episodes of the candidates, the most frequent failure first."""
+    episodes, affected = Counter[str](), Counter[str]()
     for candidate in candidates:
         for said, number in candidate.episode_failures:
             episodes[said] += number
-            lives[said] += 1
+            affected[said] += 1
     ranked = sorted(episodes, key=lambda said: (-episodes[said], said))
-    return [EpisodeFailure(said, episodes[said], lives[said]) for said in ranked]
+    return [EpisodeFailure(said, episodes[said], affected[said]) for said in ranked]
 
 
 def episode_failure_lines(found: Sequence[EpisodeFailure]) -> list[str]:
-    """Return one line that summarises the failures; no line if there are none."""
+    """Return a list with one line that summarises the failures; [] if there are none.
+
+    found: failures, the most frequent first
+    """
     if not found:
         return []
     number, most = sum(one.episodes for one in found), found[0]

@@ -1,4 +1,4 @@
-"""Storage of episodes in npz archives. Files of the former format can be read, too.
+"""Storage of episodes in npz archives. Files of the older format can be read, too.
 
 Nothing in a file is executed when it is loaded.
 """
@@ -35,15 +35,18 @@ from sim.worlds.world import build_world
 __all__ = ["load_episode", "save_episode"]
 
 FORM = 2  # number of the current format
-# Maximum size of an unpacked episode [bytes]. An episode of 256 steps takes some megabytes; with images, about a
-# hundred.
+# Maximum size of an unpacked episode [bytes]. An episode of 256 steps takes some megabytes, and about 100 with images.
 MOST_BYTES = 2**31
 PARTS = {"scene": EpisodeScene, "plan": GroundPlan, "pictures": Pictures}
 BY_NAME = {"term": "reward_terms", "beside": "beside"}  # prefix of arrays -> attribute of Episode
 
 
 def save_episode(episode: Episode, path: Path | str) -> None:
-    """Write an episode as npz, completely or not at all: its arrays as arrays, and all other values as JSON."""
+    """Write an episode as npz, completely or not at all: its arrays as arrays, and all other values as JSON.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
     arrays: dict[str, Any] = {name: value for name, value in vars(episode).items() if isinstance(value, np.ndarray)}
     for prefix, name in BY_NAME.items():
         arrays |= {f"{prefix}_{key}": array for key, array in getattr(episode, name).items()}
@@ -71,10 +74,11 @@ def save_episode(episode: Episode, path: Path | str) -> None:
 
 
 def load_episode(path: Path | str) -> Episode:
-    """Load an episode that `save_episode` wrote, in the current or the former format.
+    """Load an episode that `save_episode` wrote, in the current or the older format.
 
     Raises:
-        ValueError: the file contains no episode; the message is one line that names the file.
+        ValueError: the file cannot be read, is too large, or contains no episode; the message is one line that names
+            the file.
     """
     try:
         arrays = _arrays(path)
@@ -87,7 +91,7 @@ def load_episode(path: Path | str) -> Episode:
         rest["reward_terms"] = {name: arrays.pop(f"term_{name}") for name in terms}
         return _of_first_form(rest, arrays) if form == 1 else _of_second_form(rest, arrays)
     except (OSError, EOFError, LookupError, TypeError, ValueError, AttributeError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{path} holds no episode: {error}") from error
+        raise ValueError(f"{path} contains no episode: {error}") from error
 
 
 def _of_second_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
@@ -104,9 +108,9 @@ def _of_second_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
 
 
 def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
-    """Return an episode that was stored in the former format.
+    """Return an episode that was stored in the older format.
 
-    The former format was only used for built-in tasks, and did not contain the scene. The world is therefore built
+    The older format was only used for built-in tasks, and does not contain the scene. The world is therefore built
     again.
     """
     if "course" not in rest.setdefault("world", {}):
@@ -140,14 +144,18 @@ def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
 
 
 def _checked_world(stored: Mapping[str, Any]) -> WorldConfig:
-    """Return the settings of a world, after a check that prevents extreme values such as a billion mazes."""
+    """Return the settings of a world, after a check that prevents extreme values such as a billion mazes.
+
+    Raises:
+        ConfigError: a value has the wrong type or is out of range.
+    """
     world = WorldConfig(**stored)
     check_values(world, prefix="world.")
     return world
 
 
 def _solved(goal: np.ndarray, adversary: np.ndarray, adversary_first: np.ndarray | None) -> bool:
-    """Return whether the first object reached was a goal.
+    """Return whether the first object that the animal reached was a goal; False if it reached none.
 
     goal, adversary: True for actions that reached a goal or an adversary, (t,)
     adversary_first: True for actions that reached an adversary before a goal, (t,); None if unknown
@@ -157,7 +165,12 @@ def _solved(goal: np.ndarray, adversary: np.ndarray, adversary_first: np.ndarray
 
 
 def _arrays(path: Path | str) -> dict[str, Any]:
-    """Return the arrays of an archive, which must be a regular file and unpack to at most `MOST_BYTES`."""
+    """Return the arrays of an archive by name.
+
+    Raises:
+        OSError: the file cannot be read, or is not a regular file.
+        ValueError: the archive would unpack to more than `MOST_BYTES`.
+    """
     with regular_files.opened(Path(path)) as content:
         with zipfile.ZipFile(content) as archive:
             size = sum(member.file_size for member in archive.infolist())

@@ -43,10 +43,10 @@ class EpisodeScene:
     ) -> EpisodeScene:
         """Return the scene of an episode.
 
-        model: the model
-        solids: its visible geoms
-        mounts: position and direction of each eye
+        model: MuJoCo model of the world
+        solids: visible geoms of the model
         poses: poses before each action; their first axis is time instead of worlds
+        mounts: position and direction of each eye
         """
         places, frames = zip(*(_eye(model, mount, poses) for mount in mounts), strict=True)
         kind, index = mounts[0].found_in(model)
@@ -65,7 +65,7 @@ class EpisodeScene:
 
 
 def _eye(model: mujoco.MjModel, mount: Mount, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-    """Return the position of the pupil (t, 3) and the frame (t, 3, 3) of an eye."""
+    """Return the position of an eye's pupil (t, 3) [m] and its frame (t, 3, 3) in world coordinates."""
     kind, index = mount.found_in(model)
     origin, turned = poses.frames(kind, index)
     place, frame = mount.local(kind)

@@ -11,7 +11,7 @@ __all__ = ["any_costs", "fitness_interval", "fitness_label", "fitness_text"]
 
 
 def any_costs(candidates: Iterable[Candidate]) -> bool:
-    """Return whether a candidate has costs."""
+    """Return whether at least one candidate has costs."""
     return any(candidate.costs for candidate in candidates)
 
 
@@ -32,7 +32,10 @@ def fitness_text(fitness: float, costs: float, shown: Callable[[float], str] = "
 def fitness_interval(candidate: Candidate) -> tuple[float, float]:
     """Return the 95 % bootstrap interval of a candidate's fitness, from the returns of its evaluation episodes.
 
-    Costs are exact, so they only shift the interval. It is (NaN, NaN) for a single episode.
+    Costs are exact, so they only shift the interval. The interval is (NaN, NaN) for a single episode.
+
+    Raises:
+        ValueError: the candidate failed, so it has no returns.
     """
     low, high = bootstrap_interval(candidate.returns)
     return low - candidate.costs, high - candidate.costs

@@ -14,8 +14,8 @@ __all__ = ["descent", "nearest_parent"]
 def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Candidate | None:
     """Return the recorded parent with the smallest Euclidean distance between genomes; None if no parent is recorded.
 
-    If several parents have the same distance, the earliest is returned. Candidates of CMA-ES have many parents, because
-    CMA-ES samples a generation around the mean of the better half of the previous generation.
+    If several parents have the same distance, the one with the lowest id is returned. Candidates of CMA-ES have many
+    parents, because CMA-ES samples a generation around the mean of the better half of the previous generation.
 
     known: candidates on record, by id
     """
@@ -25,7 +25,10 @@ def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Cand
 
 
 def descent(candidate: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Return a candidate's line of descent, from its first ancestor to the candidate itself."""
+    """Return a candidate's line of descent, from its first ancestor to the candidate itself.
+
+    candidates: candidates on record, among which the ancestors are searched
+    """
     known = {other.id: other for other in candidates}
     line = [candidate]
     while (parent := nearest_parent(line[-1], known)) is not None and parent not in line:

@@ -17,11 +17,14 @@ def held_out_episodes(
 
     candidate_id: id of the candidate; None: the best candidate
     seed: seed of the episodes
-    episodes: number of episodes; None: `evaluation.episodes`
+    episodes: number of episodes; None: the run's setting `evaluation.episodes`
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the run has no test set, or the user has not named the code of its task.
+        ConfigError: the run has no test set, or the user task was not named when the run was opened, or fails.
+        ValueError: `episodes` is below 1, or `seed` is negative.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        OSError: the policy's file cannot be read.
     """
     require_test_set(run.config)
     candidate = run.candidate(candidate_id)

@@ -51,14 +51,18 @@ def record(
     """Record one evaluation episode of a candidate. The same arguments give the same episode, bit for bit.
 
     candidate_id: id of the candidate; None: the best candidate
+    seed: seed of the episode
     radiance_every: number of actions between two recordings of the scene's radiance
     pictures: True to render images for display; for tasks without a ground plan, they are always rendered
     mode: "evaluation", or "test" for the layouts of the test set
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the mode is unknown, the run has no test set, or the user has not named the code of its task.
-        ValueError: radiance_every is not a whole number from 1 to 1,000,000.
+        ConfigError: the mode is unknown, the run has no test set, or the user task was not named when the run was
+            opened, or its module cannot be executed.
+        ValueError: `radiance_every` is not a whole number from 1 to 1,000,000.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        OSError: the policy's file cannot be read.
     """
     radiance_every = whole("every", radiance_every, 1, MOST_EVERY)
     if mode not in MODES:
@@ -73,10 +77,11 @@ def record(
 
 
 def trained_policy(run: Run, candidate: Candidate) -> EyePolicy:
-    """Return the policy of a candidate.
+    """Return the trained policy of a candidate.
 
     Raises:
-        RunError: the policy is missing or damaged.
+        RunError: the candidate failed, or its policy is missing or damaged.
+        OSError: the policy's file cannot be read, or is not a regular file.
     """
     path = run.policy_path(candidate.id)
     require_policy(candidate, path)
@@ -122,6 +127,8 @@ class Recorder:
         Raises:
             UnfitPolicy: the policy was trained with different eyes.
             TrainingDiverged: the policy's actions are not finite.
+            ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
         """
         animal, config = self.phenotype, self.config
         prepared = PreparedTask(animal_task(animal, config, self.mode))
@@ -156,10 +163,11 @@ class Recorder:
     def _perfect_views(
         self, prepared: PreparedTask, simulation: Simulation, poses: list[Poses], light: np.ndarray
     ) -> dict[str, Any]:
-        """Return the fields of an episode that are rendered behind a perfect lens.
+        """Return, by name, the fields of an episode that are rendered behind a perfect lens.
 
         These are the signals of the same receptors, and the radiance on a finer grid, in the same scenes and the same
-        light. Ommatidia have no counterpart behind a perfect lens, so their own signals without noise take this place.
+        light. Ommatidia have no counterpart behind a perfect lens. For compound eyes, the signals are those of the
+        ommatidia without noise.
         """
         own = self.phenotype.eyes(self.config.eye)
         perfect = own.with_perfect_lens()
@@ -220,7 +228,10 @@ def _model(physics: Any) -> mujoco.MjModel:
 def _play(
     policy: EyePolicy, worlds: EyesVecEnv, begun: _Beginning, pictures: bool
 ) -> tuple[list[Poses], dict[str, Any]]:
-    """Play one episode. Return the poses before each action, and the fields of `Episode` that this determines."""
+    """Play one episode. Return the poses before each action, and the fields of `Episode` that are then known, by name.
+
+    pictures: True to render images for display
+    """
     poses, rows, taken = list[Poses](), list[tuple[Any, ...]](), list[np.ndarray]()
     observation, infos, done, solved = begun.observation, [begun.info], False, None
     channels = worlds.renderer.eye.channels
@@ -253,7 +264,7 @@ def _play(
 
 
 def _on_ground(infos: list[Mapping[str, Any]]) -> dict[str, np.ndarray]:
-    """Return positions [m] and headings [rad] before each action, if the task's `info` contains them.
+    """Return positions [m] and headings [rad] before each action by name; {} if the task's `info` lacks them.
 
     These values are exact, in contrast to headings that are computed from rotation matrices.
     """

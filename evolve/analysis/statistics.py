@@ -37,7 +37,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 SPREAD = (0.1, 0.9)  # quantiles between which a population's spread is shown
 PERCENTILE_RESAMPLES = 2000
-RESAMPLED_AT_ONCE = 2**20  # largest number of samples that are drawn at once; it limits the memory
+RESAMPLED_AT_ONCE = 2**20  # maximum number of samples that are drawn at once, which limits the memory
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,9 @@ class GenerationStatistics:
 class Trajectory:
     """One quantity of the phenotypes over the generations. All arrays have the shape (generation,).
 
-    low, median, high: 10 % quantile, median and 90 % quantile in each population
+    generations: numbers of the generations
+    low, median, high: 10 % quantile, median and 90 % quantile in each population; NaN values are ignored, and the
+        result is NaN if all values are NaN
     best: value of the quantity in the best candidate so far; NaN before a candidate has succeeded
     """
 
@@ -76,7 +78,7 @@ class Trajectory:
 
 
 def succeeded(candidate: Candidate) -> bool:
-    """Return whether the candidate's training and evaluation were completed."""
+    """Return whether the candidate's training and evaluation were completed, with a finite fitness."""
     return candidate.failure is None and math.isfinite(candidate.fitness)
 
 
@@ -114,9 +116,11 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return a quantity over the generations: its spread in each population, and its value in the best candidate.
+    """Return a quantity over the generations: its quantiles in each population, and its value in the best candidate.
 
-    value: function that returns the quantity of a phenotype
+    Failed candidates also have a phenotype, so they belong to the populations.
+
+    value: function that returns the quantity of a phenotype; NaN if the phenotype lacks it
     """
     groups = by_generation(candidates)
     spread = np.array([_quantiles(np.array([value(c.phenotype) for c in members])) for _, members in groups])
@@ -143,8 +147,8 @@ def _quantiles(values: Floats) -> tuple[float, float, float]:
 def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str, float]:
     """Return the values of all genes that the phenotype expresses, by gene name.
 
-    Optical genes are present only if optics are on, and spectral genes only if receptors are inherited. For receptor
-    types that the animal lacks, the peak wavelengths are NaN.
+    Genes of a pupil are present only if the animal has one, and spectral genes only if they determine its receptors.
+    For receptor types that the animal lacks, the peak wavelengths are NaN.
 
     eye: settings of a run's eyes. Only genes that this run has are returned, such as an eighth of a symmetric relief's
         heights, or one side of a square eye. None: all values are returned
@@ -193,11 +197,13 @@ def bootstrap_interval(
     distribution, the 95 % interval contains the true mean in only about 88 % of cases. A single sample contains no
     information about the spread, so the result is (NaN, NaN).
 
+    samples: independent values, (sample,)
     statistic: function that is called as statistic(resamples, axis=1), such as np.mean
     level: confidence level of the interval
+    seed: seed of the resampling
 
     Raises:
-        ValueError: samples are missing or not finite, or the level is outside (0, 1).
+        ValueError: samples are missing, not finite or in half precision, or the level is outside (0, 1).
     """
     values = np.asarray(full_precision("samples", samples), dtype=np.float64)
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
@@ -218,6 +224,8 @@ def psnr(signals: NDArray[np.floating], reference: NDArray[np.floating], gain: f
     """Return the peak signal-to-noise ratio of `gain` x signals relative to a reference [dB].
 
     The peak is 1, the signal of a white surface in daylight. For equal images, the ratio is infinite.
+
+    signals, reference: images of the same shape
 
     Raises:
         ValueError: the shapes differ.

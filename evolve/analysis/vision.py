@@ -24,7 +24,7 @@ __all__ = ["Vision", "ssim", "vision"]
 
 SCENES = 16  # number of scenes; they are starts of episodes, and the same for all eyes
 RAYS = 16  # number of rays per receptor
-WINDOW = 7  # width of the window in which structural similarity is computed [receptors]
+WINDOW = 7  # [receptors] width of the window in which structural similarity is computed
 Floats = NDArray[np.floating]
 
 
@@ -32,7 +32,7 @@ Floats = NDArray[np.floating]
 class Vision:
     """Four measures of an eye. A measure that is undefined is NaN.
 
-    image_quality: area of the MTF above the noise, times throughput, in [0, 1]; see `optics.image_quality`
+    image_quality: area of the MTF above the noise floor, times throughput, in [0, 1]; see `optics.image_quality`
     contrast: MTF in white daylight at half the receptors' Nyquist frequency
     psnr_db: peak signal-to-noise ratio of the eye's image, relative to the image of a perfect lens [dB]. The eye's
         image is first scaled to the same brightness
@@ -51,7 +51,12 @@ UNDEFINED = Vision(math.nan, math.nan, math.nan, math.nan)
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
     """Return the measures of an animal's eyes in the run's task.
 
-    If their optics cannot be computed, all are NaN, and also for compound eyes.
+    All measures are NaN for compound eyes, and if the PSF cannot be computed accurately enough.
+
+    Raises:
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ValueError: the eyes that the task places differ from the animal's.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     medium = config.world.medium
     eye = animal.eye(config.eye, medium)
@@ -73,7 +78,13 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
 def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
     """Return noise-free signals of an animal's eyes twice: with their own optics, and behind a perfect lens.
 
-    Both arrays are (scene, eye, channel, height, width). The scenes are the same for all eyes of a task.
+    Both arrays are (scene, eye, channel, height, width). The scenes are the same for all animals in a task.
+
+    Raises:
+        ConfigError: see `vision`.
+        ValueError: see `vision`.
+        optics.AccuracyError: the PSF cannot be computed accurately enough.
+        optics.BackendError: see `vision`.
     """
     eyes, task = animal.eyes(config.eye), animal_task(animal, config)
     if (light := task.compared_light) is None:
@@ -93,7 +104,9 @@ def ssim(signals: Floats, reference: Floats) -> float:
 
     The measure is equation 13 of Wang et al. (2004), with equal weights in a square window and sample variances.
     Signals must range from 0 to 1. The window is 7 receptors wide; on narrower retinas, it is the largest odd number of
-    receptors that fits. The result is NaN if this is less than 3.
+    receptors that fits. The result is NaN if this number is less than 3.
+
+    signals, reference: images of the same shape
     """
     side = min(WINDOW, *signals.shape[-2:])
     window = side - (side + 1) % 2

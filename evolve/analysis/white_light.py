@@ -18,9 +18,11 @@ __all__ = ["WhiteLight", "eye_image_quality", "white_strehl"]
 
 @dataclass(frozen=True)
 class WhiteLight:
-    """An eye with its PSF in each band (`psf`) and in white daylight (`white`), from which all measures are computed.
+    """An eye with its PSF in each band (`psf`) and in white daylight (`white`), and measures of the eye.
 
-    Measures raise an optics.AccuracyError if they cannot be computed accurately enough.
+    Raises:
+        optics.AccuracyError: the PSF (in `from_eye`) or a measure (on access) cannot be computed accurately enough.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
 
     eye: optics.Eye
@@ -61,8 +63,10 @@ class WhiteLight:
 def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
     """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the maximum.
 
-    The reference is the PSF of the same aperture without aberrations at any wavelength, in the same light. Its maximum
+    The reference is the PSF in white daylight of the same aperture without aberrations at any wavelength. Its maximum
     is higher than that at the mean wavelength, because maxima are proportional to 1/λ².
+
+    psf: PSF of the eye in each band
     """
     try:
         return float(optics.strehl_ratio(daylight_psf(eye, psf))[0])
@@ -71,15 +75,16 @@ def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
 
 
 def eye_image_quality(phenotype: Phenotype, config: EyeConfig, medium: str = "air") -> float:
-    """Return `optics.image_quality` of the phenotype's eye in white daylight, in [0, 1].
+    """Return `optics.image_quality` of the phenotype's camera eye in white daylight, in [0, 1].
 
     The quality is averaged over frequencies up to the Nyquist frequency of the receptors. A perfect lens has contrast 1
     at all frequencies.
 
-    medium: medium of the run's worlds
+    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
 
     Raises:
-        optics.AccuracyError: the PSF cannot be computed.
+        optics.AccuracyError: the PSF cannot be computed accurately enough.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     eye = phenotype.eye(config, medium)
     assert isinstance(eye, optics.Eye)

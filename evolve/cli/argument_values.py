@@ -9,25 +9,37 @@ __all__ = ["every", "one_line", "searches", "seed"]
 MOST_SEARCHES = 100_000  # as in evolve.report.gene_drift, whose import takes seconds
 MOST_EVERY = 1_000_000  # as in evolve.analysis.recorder
 LONGEST_MESSAGE = 1800  # maximum number of characters of an error message
-LONGEST = 4000  # maximum number of digits; Python converts at most 4,300
+LONGEST = 4000  # maximum number of digits of an argument; Python converts at most 4,300
 
 
 def seed(text: str) -> int:
-    """Convert the text of an argument to a seed."""
+    """Return the seed in the text of an argument.
+
+    Raises:
+        ArgumentTypeError: the text is not a whole number, 0 or more.
+    """
     if not text.isdecimal() or len(text) > LONGEST:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number, 0 or more")
     return int(text)
 
 
 def every(text: str) -> int:
-    """Convert the text of an argument to a number of actions between two images."""
+    """Return the number of actions between two images, in the text of an argument.
+
+    Raises:
+        ArgumentTypeError: the text is not a whole number from 1 to MOST_EVERY.
+    """
     if not text.isdecimal() or len(text) > LONGEST or not 1 <= int(text) <= MOST_EVERY:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 1 to {MOST_EVERY:,}")
     return int(text)
 
 
 def searches(text: str) -> int:
-    """Convert the text of an argument to a number of searches, at least 2, because a p-value needs them."""
+    """Return the number of searches with random fitness, in the text of an argument.
+
+    Raises:
+        ArgumentTypeError: the text is not a whole number from 2 to MOST_SEARCHES.
+    """
     if not text.isdecimal() or len(text) > LONGEST or not 2 <= int(text) <= MOST_SEARCHES:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 2 to {MOST_SEARCHES:,}")
     return int(text)

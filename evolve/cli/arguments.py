@@ -20,19 +20,19 @@ SHELLS = ("bash", "zsh", "tcsh")
 FIRST = """\
 begin here:
   evolve doctor                              check the installation
-  evolve demo --open                         a finished run, to look at
-  evolve run detection --preset quick        evolve eyes, a few minutes
-  evolve list                                the runs under runs/
+  evolve demo --open                         show a finished run
+  evolve run detection --preset quick        evolve eyes in a few minutes
+  evolve list                                list the runs in the folder runs/
   evolve report runs/detection-quick-1 --open
-options and examples of a command: evolve run --help
+print the options and examples of a command: evolve run --help
 """
 EXAMPLES = {
     "run": """\
-  evolve run detection --preset quick                       a few minutes
+  evolve run detection --preset quick                       evolve eyes in a few minutes
   evolve run navigation --dry-run                           print genes, hours and disk space; start nothing
   evolve run detection --set search.generations=10 --out runs/first
-  evolve run foraging --from runs/first:12                  from an animal of another run
-  evolve run ant_seeks.py:AntSeeks --preset quick           a user task
+  evolve run foraging --from runs/first:12                  start from an animal of another run
+  evolve run ant_seeks.py:AntSeeks --preset quick           evolve eyes for a user task
 """,
     "demo": "  evolve demo --open\n  evolve demo --out elsewhere\n",
     "resume": "  evolve resume runs/first --open\n",
@@ -55,7 +55,7 @@ class Parser(argparse.ArgumentParser):
     """Argument parser whose error messages are one line, with a suggestion for a mistyped word."""
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        """Print help and the version as results of the command."""
+        """Print help or the version as a result of the command."""
         say(message, end="")
 
     def error(self, message: str) -> NoReturn:
@@ -130,18 +130,18 @@ def _add_runs(commands: Commands) -> None:
         "--from",
         dest="start_from",
         metavar="RUN[:ID]",
-        help="start from an animal of another run (default: the best one)",
+        help="use the genes of an animal of another run as start values (default of ID: the best animal)",
     )
     run.add_argument(
-        "--dry-run", action="store_true", help="print the plan with the hours and disk space it needs, then stop"
+        "--dry-run", action="store_true", help="print the genes, hours and disk space of the run, then stop"
     )
     resume = _command(commands, "resume", "run.resume", "continue an interrupted run", directory=True)
     _add_task(resume)
     for command in (run, resume):
-        told = command.add_mutually_exclusive_group()
-        told.add_argument("--json", action="store_true", help="print one line of JSON per event")
-        told.add_argument("--quiet", action="store_true", help="print nothing but errors")
-        command.add_argument("--open", action="store_true", help="open the report in a browser when it is written")
+        output = command.add_mutually_exclusive_group()
+        output.add_argument("--json", action="store_true", help="print one line of JSON per event")
+        output.add_argument("--quiet", action="store_true", help="print only errors")
+        command.add_argument("--open", action="store_true", help="open the report in a browser when it is complete")
         command.add_argument(
             "--executor",
             choices=("local", "dask"),
@@ -151,12 +151,12 @@ def _add_runs(commands: Commands) -> None:
         command.add_argument(
             "--scheduler", metavar="ADDRESS", help="address of the Dask scheduler, such as tls://host:8786"
         )
-        for name, whose in (("ca-file", "certificates to trust"), ("cert", "own certificate"), ("key", "private key")):
-            command.add_argument(f"--tls-{name}", type=Path, metavar="FILE", help=f"for a tls:// scheduler: {whose}")
+        for name, kind in (("ca-file", "CA certificates"), ("cert", "client certificate"), ("key", "client key")):
+            command.add_argument(f"--tls-{name}", type=Path, metavar="FILE", help=f"PEM file of the {kind} for tls://")
         command.add_argument(
             "--device",
             choices=("auto", "cpu", "cuda"),
-            help="where PSFs, eyes and rays are computed (default: RHABDOM_DEVICE, else cpu)",
+            help="device for PSFs, eyes and rays (default: environment variable RHABDOM_DEVICE, else cpu)",
         )
         command.add_argument(
             "--tensorboard", action="store_true", help="also write TensorBoard files to DIR/tensorboard"
@@ -164,13 +164,13 @@ def _add_runs(commands: Commands) -> None:
 
 
 def _add_settings(command: argparse.ArgumentParser) -> None:
-    """Add the arguments that determine the configuration of a run."""
+    """Add the arguments that determine the settings of a run."""
     command.add_argument(
         "task",
         metavar="TASK",
         nargs="?",
-        help="task to evolve for, or FILE.py:CLASS of a user task; not needed if the preset sets one (list: evolve "
-        "tasks)",
+        help="task for which eyes evolve, or FILE.py:CLASS of a user task; not needed if the preset sets a task (list: "
+        "evolve tasks)",
     )
     command.add_argument(
         "--preset",
@@ -179,9 +179,9 @@ def _add_settings(command: argparse.ArgumentParser) -> None:
         help="settings to start from: quick (minutes), paper (a day; default), or an experiment (list: evolve presets)",
     )
     command.add_argument("--scale", help="size of an experiment: laptop (hours on two cores; default) or paper (days)")
-    command.add_argument("--config", type=Path, metavar="FILE", help="TOML file of settings; overrides the preset")
+    command.add_argument("--config", type=Path, metavar="FILE", help="TOML file with settings; overrides the preset")
     command.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="one setting; overrides the file"
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="value of one setting; overrides the file"
     )
 
 
@@ -189,7 +189,7 @@ def _add_watching(commands: Commands) -> None:
     """Add the commands that show and compare runs."""
     status = _command(commands, "status", "status.status", "show the state of a run", directory=True)
     status.add_argument("--json", action="store_true", help="print JSON")
-    status.add_argument("--watch", action="store_true", help="print again at every change until the run ends")
+    status.add_argument("--watch", action="store_true", help="print the state after every change until the run ends")
     listing = _command(commands, "list", "status.listing", "list the runs in a directory")
     listing.add_argument(
         "directory", type=Path, nargs="?", default=Path("runs"), metavar="DIR", help="directory of runs (default: runs)"
@@ -202,42 +202,42 @@ def _add_watching(commands: Commands) -> None:
     compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with the fitness curves")
     drift = _command(commands, "drift", "drift.drift", "test which genes changed by more than chance would explain")
     drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="runs that differ only in their seeds")
-    many = "number of searches with random fitness, with which the runs are compared (default: 200)"
+    meaning = "number of searches with random fitness, with which the runs are compared (default: 200)"
     _add_damage(drift)
-    drift.add_argument("--searches", type=searches, default=200, metavar="N", help=many)
+    drift.add_argument("--searches", type=searches, default=200, metavar="N", help=meaning)
     drift.add_argument("--json", action="store_true", help="print JSON")
 
 
 def _add_products(commands: Commands) -> None:
     """Add the commands that write files from a run."""
     for name, meaning, out in (
-        ("replay", "play one episode of the best agent, and print the result", "FILE"),
+        ("replay", "play an episode of an agent, print the result, and write a page that shows it", "FILE"),
         ("report", "write the HTML report", "FILE"),
-        ("export", "write the best agent's views as spectral EXR files", "DIR"),
+        ("export", "write the views of an agent during an episode as spectral EXR files", "DIR"),
     ):
         product = _command(commands, name, f"products.{name}", meaning, directory=True)
         _add_task(product)
         if name != "report":
             product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
             product.add_argument("--seed", type=seed, default=0, help="seed of the episode (default: 0)")
-            shown, usual = ("write a file", 8) if name == "export" else ("with --rrd, record the scene", None)
-            said = f"{shown} every N actions (default: 8)"
-            product.add_argument("--every", type=every, default=usual, metavar="N", help=said)
+            action, usual = ("write a file", 8) if name == "export" else ("with --rrd, record the scene", None)
+            text = f"{action} every N actions (default: 8)"
+            product.add_argument("--every", type=every, default=usual, metavar="N", help=text)
         if name == "replay":
-            product.add_argument("--test", action="store_true", help="play in a layout of the family's test set")
+            product.add_argument("--test", action="store_true", help="play in a layout of the test set")
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
             product.add_argument("--mp4", action="store_true", help="also write a video with one frame per action")
         if name != "export":
             product.add_argument("--open", action="store_true", help="open the page in a browser")
         product.add_argument("--out", type=Path, metavar=out, help="output path (default: in the run directory)")
-        _add_voice(product)
-    demo = _command(commands, "demo", "demo.demo", "look at a finished run: report, replay and EXR files")
+        _add_output(product)
+    demo = _command(commands, "demo", "demo.demo", "write the report, replay and EXR files of a finished run")
     demo.add_argument(
         "--out", type=Path, metavar="DIR", default=Path("runs/demo"), help="output directory (default: runs/demo)"
     )
     demo.add_argument("--open", action="store_true", help="open the report in a browser")
-    _add_voice(demo)
+    _add_output(demo)
     add_photograph(_command(commands, "see", "see.through_eye", "show a photograph through an animal's eye"))
 
 
@@ -248,10 +248,10 @@ def _add_task(command: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_voice(command: argparse.ArgumentParser) -> None:
-    told = command.add_mutually_exclusive_group()
-    told.add_argument("--json", action="store_true", help="print JSON")
-    told.add_argument("--quiet", action="store_true", help="print nothing but errors")
+def _add_output(command: argparse.ArgumentParser) -> None:
+    output = command.add_mutually_exclusive_group()
+    output.add_argument("--json", action="store_true", help="print JSON")
+    output.add_argument("--quiet", action="store_true", help="print only errors")
 
 
 def _add_tables(commands: Commands) -> None:
@@ -277,7 +277,7 @@ def _add_tables(commands: Commands) -> None:
 def _command(
     commands: Commands, name: str, home: str, meaning: str, directory: bool = False
 ) -> argparse.ArgumentParser:
-    """Add a command that is implemented in evolve.cli.commands.<home>."""
+    """Add the command that the function `home` of `evolve.cli.commands` runs, and return its parser."""
     parser = commands.add_parser(
         name,
         help=meaning,
@@ -295,5 +295,5 @@ def _command(
 
 def _add_damage(command: argparse.ArgumentParser) -> None:
     command.add_argument(
-        "--before-damage", action="store_true", help="ignore a damaged record from the first damaged line on"
+        "--before-damage", action="store_true", help="ignore the first damaged line of a record and all later lines"
     )

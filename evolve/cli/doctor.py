@@ -61,9 +61,11 @@ for name in sys.argv[1:]:
 
 
 def unsupported(platform_name: str = sys.platform) -> str | None:
-    """Return a line of text if the operating system is not supported, else None.
+    """Return a message in one line if the operating system is not supported, else None.
 
     Processes and locks use features that only Linux and macOS have.
+
+    platform_name: value of `sys.platform`
     """
     if platform_name in ("linux", "darwin"):
         return None
@@ -71,11 +73,19 @@ def unsupported(platform_name: str = sys.platform) -> str | None:
 
 
 def examine() -> dict[str, object]:
-    """Return the findings by name.
+    """Examine the installation, and return the findings by name as JSON values.
 
-    The names are python, machine, packages, llvm (all libraries that were tested), variants, gpu, device, free_memory
-    [bytes] (None if unknown), light_cache (the folder, and why it is not writable, or None), notes, and good (True if
-    all works).
+    python: version of Python
+    machine: operating system, architecture and number of cores
+    gpu: name of the first NVIDIA GPU, or "none"
+    device: device for PSFs, eyes and rays, or the reason why it cannot be used
+    free_memory: free memory [bytes]; None if it is unknown
+    light_cache: folder of the light tables, and the error that prevents writing there (None if there is none)
+    packages: version of each package, or "not installed"
+    llvm: all LLVM libraries that were tested
+    variants: state of each variant of Mitsuba
+    notes: messages about the operating system, and about files that hide packages of rhabdom
+    good: True if all parts that `evolve run` needs work
     """
     chosen, tried = backend.find(cached=False)
     environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)
@@ -141,7 +151,7 @@ def _render(variants: list[str], environment: dict[str, str]) -> dict[str, str]:
 
 
 def print_findings(as_json: bool = False) -> int:
-    """Print the findings; return 0 if all parts that `evolve run` needs work, else 2."""
+    """Print the findings as text, or as JSON if `as_json` is True. Return 0 if `evolve run` can work, else 2."""
     findings = examine()
     if as_json:
         say(json.dumps(findings, indent=2))

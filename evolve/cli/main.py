@@ -1,8 +1,8 @@
 """The command `evolve`: parses the arguments and runs one of its subcommands.
 
-Errors that users can correct are printed as one line. The exit code is 0 after success, 1 after completion with
-failures, 2 if the input or the environment is wrong, and 130 after an interruption. Modules of subcommands are imported
-on use, so that help appears immediately.
+Errors that users can correct are printed as one line. The exit code is 0 after success, 1 if all candidates of a run or
+a validation script failed, 2 if the input or the environment is wrong, and 130 after an interruption. Modules of
+subcommands are imported on use, so that help appears immediately.
 """
 
 from __future__ import annotations
@@ -25,7 +25,13 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one subcommand and return the exit code."""
+    """Run one subcommand and return the exit code.
+
+    arguments: arguments of the command line without the command's name; None: those of this process
+
+    Raises:
+        SystemExit: help or the version was requested, or an argument is invalid; see `evolve.cli.arguments.parse`.
+    """
     given = list(sys.argv[1:] if arguments is None else arguments)
     open_closed_streams()
     replaced = repair_encodings()
@@ -42,7 +48,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _outcome(arguments: Sequence[str]) -> int:
-    """Run one subcommand and return the exit code. Errors that users can correct are printed as one line."""
+    """Run one subcommand and return the exit code. Errors that users can correct are printed as one line.
+
+    Raises:
+        BrokenPipeError: the program that reads the output has ended.
+    """
     try:
         try:
             return _code(arguments)

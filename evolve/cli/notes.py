@@ -15,9 +15,9 @@ OWN = ("optics", "sim", "evolve")
 
 @contextmanager
 def notes() -> Iterator[None]:
-    """Show rhabdom's warnings as notes while a command runs. Warnings of other packages keep Python's format.
+    """Print rhabdom's warnings as notes within the context. Warnings of other packages keep Python's format.
 
-    Each text is shown once. A command may build the same world several times, for example for training and for a
+    Each text is printed once. A command may build the same world several times, for example for training and for a
     replay, and each time a different line of code may issue the same warning. Python's own filter does not suppress
     these repetitions.
     """

@@ -28,7 +28,7 @@ from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
 
-# Number of rollouts in a measurement. With fewer than three, the times for start, step and pass cannot be computed
+# Number of rollouts in a measurement. From fewer than three, the times for start, step and pass could not be computed
 # separately. PLAYS evaluations follow the last rollout: one for the learning curve, and one for the fitness.
 ROLLOUTS, PLAYS = 3, 2
 
@@ -60,7 +60,7 @@ class Pace:
         return self.rung_s(config.learning, 0, config.learning.total_steps)
 
     def rung_s(self, learning: LearningConfig, begin: int, end: int) -> float:
-        """Return the time [s] for a rung, the part of training from `begin` to `end` steps, and for its evaluations."""
+        """Return the time [s] for one rung (training from `begin` to `end` steps) and for its evaluations."""
         plays = -(-(end - begin) // learning.eval_interval) + 1
         return self.start_s + self.training_s(learning, begin, end) + plays * self.play_s
 
@@ -76,8 +76,11 @@ class Pace:
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
     """Return the pace of the slowest worker for each animal. All workers measure at the same time.
 
+    animals: animals that are trained for the measurement, by name
+    workers: number of worker processes
+
     Raises:
-        BackendError: Dr.Jit does not work on this machine.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         ConfigError: the user task fails or has several mounts that no animal would use, or an animal cannot be
             evaluated on this machine, for example because its eyes cannot be computed. The message names the animal and
             the reason.
@@ -93,13 +96,13 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
                 for warning in check.result():
                     warnings.warn(warning, stacklevel=2)
             with interrupts_held():
-                lives = [
-                    pool.submit(_short_life, config, animals[name], seed, Path(folder) / str(seed))
+                trials = [
+                    pool.submit(_timed_training, config, animals[name], seed, Path(folder) / str(seed))
                     for seed, name in enumerate(tried)
                 ]
-            for name, life in zip(tried, lives, strict=True):
+            for name, trial in zip(tried, trials, strict=True):
                 try:
-                    paces[name].append(life.result())
+                    paces[name].append(trial.result())
                 except ValueError as error:
                     raise ConfigError(f"an animal like the {name} one cannot be evaluated here: {error}") from error
     except BrokenProcessPool as error:
@@ -111,7 +114,7 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of processes. If an exception leaves the context, they are terminated instead of awaited.
 
-    Jobs must be submitted while interrupts are held, so that only the parent receives Ctrl-C.
+    Jobs must be submitted within `interrupts_held`, so that only the parent receives Ctrl-C.
     """
     context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
     with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
@@ -133,13 +136,16 @@ def _slowest(paces: list[Pace]) -> Pace:
     )
 
 
-def _short_life(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
+def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
-    policy: path for the trained policy. Its folder belongs to the parent, which removes it after Ctrl-C, too.
+    The first update has all passes over the samples, and the second update may have only half as many. The time of a
+    pass follows from the difference between the times of the two updates.
 
-    The first update has the full number of passes over the samples, and the second may have only half of it. The time
-    of a pass follows from the difference between the times of the two updates.
+    policy: path for the trained policy. Its folder belongs to the parent process, which removes it even after Ctrl-C
+
+    Raises:
+        ValueError: the animal cannot be evaluated; the message states the reason.
     """
     short = _with_short_rollouts(config.learning)
     rollout = short.n_envs * short.n_steps

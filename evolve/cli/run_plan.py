@@ -25,10 +25,10 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["RunPlan", "steps_each"]
 
-# Allowance for the report. For comparison, `evolve report` writes 0.6 MB for a run with eight candidates.
+# [bytes] Allowance for the report. For comparison, `evolve report` writes 0.6 MB for a run with eight candidates.
 REPORT_BYTES = 5_000_000
-# Values for the exported episode, copied from evolve.analysis.recorder because importing this module would load torch.
-# A test checks that they are equal.
+# Number of actions, actions per EXR file, and pixels along the longer side, for the exported episode. They are copied
+# from evolve.analysis.recorder, whose import would load torch. A test checks that they are equal.
 EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60
 
 
@@ -36,7 +36,10 @@ EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60
 class RunPlan:
     """Plan of a run.
 
-    paces: measured paces, by name of the animal in `animals`; empty if they have not been measured
+    config: settings of the run
+    directory: run directory
+    workers: number of worker processes
+    paces: measured paces, by name of the animal in `animals`; {} if they have not been measured
     """
 
     config: RunConfig
@@ -49,7 +52,13 @@ class RunPlan:
         return cls(config, directory, config.workers or cores())
 
     def measured(self) -> RunPlan:
-        """Return the plan with the paces of this machine, which are measured in a few seconds."""
+        """Return the plan with the paces of this machine, which are measured in a few seconds.
+
+        Raises:
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            ConfigError: an animal cannot be evaluated on this machine; see `measure_pace`.
+            ExecutorError: a worker process died.
+        """
         paces = measure_pace(self.config, self.animals, self.workers)
         return RunPlan(self.config, self.directory, self.workers, paces)
 
@@ -62,9 +71,9 @@ class RunPlan:
 
     @property
     def hours(self) -> dict[str, float]:
-        """Predicted wall time of the run [h], for each of the animals.
+        """Predicted wall time of the run [h] for each animal with a measured pace, by its name.
 
-        It is assumed that all candidates take the same time as this animal and complete their training.
+        The prediction assumes that all candidates take the same time as this animal and complete their training.
         """
         search, learning = self.config.search, self.config.learning
         if search.steady_state:
@@ -81,7 +90,10 @@ class RunPlan:
 
     @property
     def disk_bytes(self) -> int:
-        """Predicted size of policies, record, report and EXR files [bytes], computed for the larger of the animals."""
+        """Predicted size of policies, record, report and EXR files [bytes], for the larger of the two animals.
+
+        The prediction requires measured paces.
+        """
         policy = max(pace.policy_bytes for pace in self.paces.values())
         pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
         lines = evaluations(self.config.search) * self._line_bytes()
@@ -143,7 +155,7 @@ class RunPlan:
         return [*lint(self.config), *(["the disk is too small for this run"] if short else [])]
 
     def record(self) -> dict[str, Any]:
-        """Return the plan as JSON values."""
+        """Return the plan as JSON values; predictions are {} or None if the paces have not been measured."""
         config = self.config
         opening = {g.name: config.genome[g.name].opens_at for g in Genotype(config.genome).open_genes}
         return {
@@ -164,7 +176,7 @@ class RunPlan:
 def steps_each(config: RunConfig) -> str:
     """Return the number of steps of a training run as text.
 
-    If it was rounded up to whole rollouts, the text also contains the configured number.
+    If the number was rounded up to whole rollouts, the text also contains the configured number.
     """
     learning = config.learning
     trained = trained_steps(learning, 0, learning.total_steps)

@@ -1,7 +1,7 @@
 """Scalars of a run for TensorBoard: fitness over the generations, learning curves of training runs, and genes.
 
 TensorBoard's own writer writes them to the folder `tensorboard/` of the run directory. All scalars follow from the
-record, so the files are deleted and written again when a run is continued.
+record, so the files are deleted and written again when a run is resumed.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class TensorBoardWriter:
             writer.close()
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        """Do nothing while a candidate trains, because only values in the record are written."""
+        """Do nothing while a candidate trains, because only scalars from the record are written."""
 
     def evaluated(self, candidate: Candidate) -> None:
         """Write the scalars of a candidate after each rung of its training.

@@ -12,10 +12,10 @@ __all__ = ["Waiting"]
 
 
 class Waiting:
-    """Progress bar over steps of unknown duration. It is used as a context manager.
+    """Progress bar over steps of unknown duration, a context manager.
 
     steps: number of steps
-    shown: True to show the bar
+    shown: True to show the bar, if the output is a terminal
     out: output stream; None: stderr
     """
 
@@ -51,7 +51,7 @@ class Waiting:
             self._progress.stop()
 
     def step(self, text: str) -> None:
-        """Start the next step."""
+        """Start the next step, described by `text`."""
         self._done += 1
         self.within(text, 0.0)
 

@@ -11,7 +11,7 @@ eye_checks     checks of the settings of eyes
 layout_checks  checks of the settings of layouts
 lint           warnings about settings that are allowed but odd
 relief_starts  start values for the genes of a pupil's relief
-formats        formats of config.toml, and conversion of former ones
+formats        formats of config.toml, and conversion of older ones
 square_eyes    settings of square eyes, which have one gene for height and width
 task_choice    TaskChoice: a task, and its code if the user has named it
 task_card      TaskCard: properties of a task that are known without executing it

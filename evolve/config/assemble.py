@@ -41,7 +41,7 @@ from evolve.genome.genes import (
 __all__ = ["assemble", "from_text", "from_toml", "to_toml"]
 
 Tree = dict[str, Any]
-# Genes that exist only with a certain setting: kind of eyes, setting and its value.
+# Genes that exist only with a certain setting. For each gene: the kind of eyes, the setting and its value.
 OF_SETTINGS = {
     RHABDOM: ("with rhabdoms", "eye.rhabdoms", "true"),
     VERTICAL: ("whose height evolves", "eye.vertical_fov", "gene"),
@@ -61,9 +61,10 @@ def assemble(
     starts: Source | None = None,
     scale: str | None = None,
 ) -> RunConfig:
-    """Return a run's configuration, assembled from all sources. `task` and `assignments` override the others.
+    """Return a run's configuration, assembled from all sources. Settings without a source have their default values.
 
-    task: one of TASKS, or FILE.py:CLASS; None: the task that the preset or the file names
+    task: one of TASKS, or FILE.py:CLASS, which overrides the other sources; None: the task that the preset, the file or
+        an assignment names
     preset: name of a preset; None: no preset
     file: TOML file with settings; None: no file
     assignments: settings such as "search.population=8"
@@ -71,33 +72,33 @@ def assemble(
     scale: scale of a preset that has several, one of SCALES; None: "laptop"
 
     Raises:
-        ConfigError: a key is unknown, a value has the wrong type or is out of range, settings contradict each other, or
-            the file cannot be read. The message is one line that names the key, the value, the allowed values, and the
-            location of the setting.
+        ConfigError: no source names a task; or a task, preset, scale or key is unknown; or a value has the wrong type
+            or is out of range; or settings contradict each other; or a file cannot be read. The message is one line
+            that names the key, the value, the allowed values, and the location of the setting.
     """
     choice = None if task is None else TaskChoice.named(task)
     code = None if choice is None else choice.code
-    asked = [_user_settings(read_toml(file), code)] if file is not None else []
+    above = [_user_settings(read_toml(file), code)] if file is not None else []
     if starts is not None:
-        asked.append(starts)
-    asked += [_user_settings(read_assignment(text), code) for text in assignments]
+        above.append(starts)
+    above += [_user_settings(read_assignment(text), code) for text in assignments]
     if choice is not None:
-        asked.append(Source("", dict(choice.settings)))
-    return replace(_assembled(preset_sources(preset, scale), asked), code=code)
+        above.append(Source("", dict(choice.settings)))
+    return replace(_assembled(preset_sources(preset, scale), above), code=code)
 
 
-def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
-    """Return the configuration from the preset's sources `below`, the task and the sources `asked`.
+def _assembled(below: list[Source], above: list[Source]) -> RunConfig:
+    """Return the configuration from the preset's sources `below`, the task's default settings, and the sources `above`.
 
-    The sources `asked` override the settings of the task and the preset.
+    The sources `above` override the settings of the task and the preset.
     """
-    known_task = [source.tree["task"] for source in (*below, *asked) if "task" in source.tree]
+    known_task = [source.tree["task"] for source in (*below, *above) if "task" in source.tree]
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
     of_task = task_defaults(known_task[-1])
     # A preset for this task overrides the task's settings, but they override a general preset.
     made_for_it = any(source.tree.get("task") == known_task[-1] for source in below)
-    layers = [of_task, *below, *asked] if made_for_it else [*below, of_task, *asked]
+    layers = [of_task, *below, *above] if made_for_it else [*below, of_task, *above]
     trees = [_checked(source) for source in layers]
     try:
         return _build(trees, layers)
@@ -106,14 +107,21 @@ def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
 
 
 def from_toml(path: Path) -> RunConfig:
-    """Return the configuration from a file that `to_toml` wrote in the current format or in a former one."""
+    """Return the configuration from a file that `to_toml` wrote, in the current format or an older one.
+
+    Raises:
+        ConfigError: the file cannot be read, or a setting is invalid; see `assemble`.
+    """
     return _read_back(read_toml(path))
 
 
 def from_text(text: bytes | str, name: str = "config.toml") -> RunConfig:
-    """Return the configuration from TOML text; see `from_toml`.
+    """Return the configuration from TOML text that `to_toml` wrote, in the current format or an older one.
 
     name: name of the text in error messages
+
+    Raises:
+        ConfigError: the text is not valid TOML, or a setting is invalid; see `assemble`.
     """
     return _read_back(parsed_toml(text, name))
 
@@ -124,10 +132,10 @@ def _read_back(written: Source) -> RunConfig:
 
 
 def _user_settings(source: Source, code: TaskCode | None) -> Source:
-    """Return the settings of a user's file, which may be the config.toml of another run.
+    """Return the settings of a user's file or option `--set`. The file may be the config.toml of another run.
 
-    The file must have a format whose settings still have the same meaning. It cannot select a user task, because only
-    the command line may name code that is executed.
+    Its format must be one whose settings still have the same meaning. A file cannot select a user task, because only
+    the command line or a call may name code that is executed.
     """
     if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(
@@ -157,9 +165,10 @@ def to_toml(config: RunConfig) -> str:
 
 
 def _checked(source: Source) -> Tree:
-    """Return the settings of a source after checking keys and values. Settings of gene groups are expanded to genes.
+    """Return the settings of a source after a check of keys and values. Settings of gene groups are expanded to genes.
 
-    Error messages name the source and the line.
+    Raises:
+        ConfigError: a key or a value is invalid; the message names the source and, if known, the line.
     """
     try:
         return {key: _checked_entry(key, value) for key, value in source.tree.items()}
@@ -174,8 +183,8 @@ def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
 
     If several sources contain a setting, the location is that of the effective value.
     """
-    won = [next((at for s in reversed(list(layers)) if (at := s.place(key))), None) for key in error.keys]
-    places = list(dict.fromkeys(place for place in won if place))
+    effective = [next((at for s in reversed(list(layers)) if (at := s.place(key))), None) for key in error.keys]
+    places = list(dict.fromkeys(place for place in effective if place))
     return f" ({'; '.join(places)})" if places else ""
 
 
@@ -203,7 +212,7 @@ def _checked_entry(key: str, value: Any) -> Any:
 
 
 def _checked_genome(section: Tree) -> Tree:
-    """Return the settings of each gene, after checking them.
+    """Return the settings of each gene after a check.
 
     Settings of a cluster or family apply to all its genes. Settings of a smaller group override those of a larger one.
     """
@@ -241,7 +250,11 @@ def _merge(below: Tree, above: Tree) -> Tree:
 
 
 def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
-    """Check that animals with these eyes have the genes that a source names individually, not through a group."""
+    """Check that animals with these eyes have the genes that a source names individually, not through a group.
+
+    Raises:
+        ConfigError: a gene does not exist for these eyes or in this task.
+    """
     for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
             raise ConfigError(no_such_side(name, eye), f"genome.{name}", "eye.square")
@@ -265,9 +278,9 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
 
 
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
-    """Return the RunConfig from checked trees. Later trees override earlier ones, and defaults fill the gaps."""
-    asked = _merged(trees)
-    eye, card = EyeConfig(**asked.get("eye", {})), card_of(asked["task"])
+    """Return the RunConfig from the checked trees of `layers`. Later trees override earlier ones and the defaults."""
+    merged = _merged(trees)
+    eye, card = EyeConfig(**merged.get("eye", {})), card_of(merged["task"])
     assert card is not None  # guaranteed by `_checked`
     table = {name: gene for name, gene in eye.genes.items() if card.has_gene(name)}
     layers = [with_square_eyes(source, eye) for source in layers]

@@ -30,9 +30,9 @@ MOST_LISTED = 36  # maximum number of words listed in a message; all genes or ta
 
 
 class ConfigError(ValueError):
-    """Error for an invalid setting. The message is one line with the key, the value and the allowed values.
+    """A setting or an argument is invalid. The message is one line that names it, its value and the allowed values.
 
-    keys: dotted names of the settings that caused the error; callers use them to find where each was set
+    keys: dotted names of the settings that caused the error; callers use them to find where each setting was made
     """
 
     def __init__(self, message: str, *keys: str) -> None:
@@ -41,7 +41,9 @@ class ConfigError(ValueError):
 
 
 def check_value(cls: type, name: str, value: Any, key: str) -> Any:
-    """Return `value` after checking it and converting it to the type of the field `name` of `cls`.
+    """Return a setting's value after a check, converted to the type of the field `name` of the dataclass `cls`.
+
+    Integers are converted for fields of type float, and NumPy numbers to Python numbers.
 
     key: dotted name of the setting, for the error message
 
@@ -59,7 +61,9 @@ def check_value(cls: type, name: str, value: Any, key: str) -> Any:
 
 
 def check_values(settings: Any, names: Iterable[str] | None = None, prefix: str = "") -> None:
-    """Check all settings of a frozen dataclass, or only those in `names`.
+    """Check all settings of a frozen dataclass, or only those in `names`, and convert NumPy numbers in place.
+
+    prefix: beginning of the settings' dotted names in messages, such as "eye."
 
     Raises:
         ConfigError: see `check_value`.
@@ -70,7 +74,10 @@ def check_values(settings: Any, names: Iterable[str] | None = None, prefix: str 
 
 
 def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
-    """Return `value` after checking and converting it for "open", "low", "high", "start" or "opens_at" of a gene.
+    """Return the value of a gene's setting after a check, converted to bool, int or float.
+
+    name: the setting: "open", "low", "high", "start" or "opens_at"
+    key: dotted name of the setting, for the error message
 
     Raises:
         ConfigError: see `check_value`.
@@ -83,10 +90,11 @@ def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
 
 
 def check_gene_use(gene: Gene, use: GeneConfig) -> None:
-    """Check that a gene's search range is not empty and contains its start value.
+    """Check that a gene's start value is valid and, if the gene is open, that its search range contains this value.
 
     Raises:
-        ConfigError: the range is empty or does not contain the start value.
+        ConfigError: the start value is NaN or outside the gene's valid range, or the search range of an open gene is
+            empty or does not contain the start value.
     """
     key = f"genome.{gene.name}"
     if use.start not in gene.range or math.isnan(use.start):
@@ -118,7 +126,11 @@ def suggestion(word: Any, known: Iterable[str]) -> str:
 
 
 def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:
-    """Return `value` if it has the type `kind` and lies in `valid`. Integers are accepted for floats."""
+    """Return `value` if it has the type `kind` and lies in `valid`. Integers are converted if `kind` is float.
+
+    Raises:
+        ConfigError: the value has another type or lies outside the range.
+    """
     names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
     shown = str(value).lower() if isinstance(value, bool) else quoted(value)
     allowed = names[kind] if valid is None else f"{names[kind]} in {valid}"
@@ -136,7 +148,7 @@ def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> A
 
 
 def quoted(value: Any) -> str:
-    """Return a value as text for a message, on one line."""
+    """Return a value as text for a message, on one line and with at most SHOWN characters before "..."."""
     try:
         whole = repr(value) if isinstance(value, str) else shown(value)
     except ValueError:  # more digits than Python converts to text

@@ -17,7 +17,10 @@ PRICES = Interval(0, 1000)
 
 @dataclass(frozen=True)
 class CostsConfig:
-    """Prices in units of fitness. The search maximises task fitness minus costs."""
+    """Prices in units of fitness. The search maximises task fitness minus costs.
+
+    `RunConfig` checks the values, and `evolve config schema` describes each field.
+    """
 
     per_receptor: float = setting(
         0.0, PRICES, "price of a receptor; a position with several receptor types has one receptor of each type"
@@ -37,7 +40,10 @@ class CostsConfig:
 
 
 def receptor_count(animal: Phenotype, eye: EyeConfig) -> int:
-    """Return the number of receptors in all eyes of an animal, which is its number of signals in a frame."""
+    """Return the number of receptors in all eyes of an animal, each receptor type counted separately.
+
+    This is also the number of signals in a frame.
+    """
     rows, columns = animal.resolution
     types = eye.receptors if animal.lambda_max_nm is None else animal.lambda_max_nm
     return animal.n_eyes * rows * columns * receptors_of(types).channels
@@ -46,6 +52,7 @@ def receptor_count(animal: Phenotype, eye: EyeConfig) -> int:
 def neuron_count(animal: Phenotype) -> int:
     """Return the number of neurons in the hidden layers of the actor.
 
-    The critic is used only in training. The encoders belong to the eyes, and `costs.per_eye` is their price.
+    The critic has no price, because only training uses it. The encoders have none either, because they belong to the
+    eyes, whose price is `costs.per_eye`.
     """
     return animal.layers * animal.neurons

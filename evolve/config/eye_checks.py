@@ -10,7 +10,7 @@ from evolve.genome.genes import INHERITED
 from optics.spectra.receptor_dynamics import ADAPTATIONS, LEAST_EVENT, MOTION
 from optics.spectra.receptors import RECEPTORS
 
-# Settings of receptors with memory, and settings that have an effect only with another one.
+# IN_TIME: settings of receptors with memory. NEEDED: settings that have an effect only with another setting.
 IN_TIME = ("latency_ms", "adaptation", "adaptation_ms", "event_threshold", "motion_detectors", "motion_ms", "frames")
 NEEDED = {"adaptation_ms": "adaptation", "motion_ms": "motion_detectors"}
 # Settings of camera eyes, which compound eyes do not have.
@@ -19,19 +19,19 @@ OF_CAMERAS = (
     *("receptor_pitch", "rhabdoms", "rhabdom_length", "head_radius", "receptor_width", "temporal_order"),
 )
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
-# Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
-# no light, and above the upper limit it has hundreds of modes.
+# Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. A rhabdom below the lower limit guides almost
+# no light, and one above the upper limit has hundreds of modes.
 LEAST_STEP, MOST_STEP = 0.2, 0.5
-# [lx s] smallest allowed exposure. A receptor that sees a white surface through a pupil with relative aperture 1 then
-# absorbs some 30 photons. With fewer photons, the approximation of shot noise fails.
+# [lx s] smallest allowed exposure. With this exposure, a receptor that sees a white surface through a pupil with
+# relative aperture 1 absorbs some 30 photons. For fewer photons, the approximation of shot noise fails.
 LEAST_EXPOSURE = 2e-4
 
 
 def check_eye(eye: EyeConfig) -> None:
-    """Check the names, the light, the rhabdoms and the temporal settings of eyes.
+    """Check the settings of eyes: names, light, compound eyes, rhabdoms and receptors with memory.
 
     Raises:
-        ConfigError: a name is unknown, or settings contradict each other.
+        ConfigError: a name is unknown, settings contradict each other, or a changed setting has no effect.
     """
     names = {"receptors": (*RECEPTORS, INHERITED), "vertical_fov": VERTICAL_FOVS}
     for name, known in {**names, "adaptation": ADAPTATIONS, "motion_detectors": MOTION}.items():
@@ -44,12 +44,16 @@ def check_eye(eye: EyeConfig) -> None:
 
 
 def _check_light(eye: EyeConfig) -> None:
-    """Check that light is not too weak, and that the integration time is changed only if there is shot noise."""
+    """Check that the light is strong enough, and that the integration time is changed only if there is shot noise.
+
+    Raises:
+        ConfigError: one of these conditions is not met.
+    """
     light, default = eye.illuminance, EyeConfig.integration_time
     if 0 < light * eye.integration_time < LEAST_EXPOSURE:
         raise ConfigError(
             f"eye.illuminance = {light:g}, eye.integration_time = {eye.integration_time:g}: too few photons; "
-            f"must be at least {LEAST_EXPOSURE:g} lx s together, or eye.illuminance 0, no shot noise",
+            f"their product must be at least {LEAST_EXPOSURE:g} lx s, or eye.illuminance 0, no shot noise",
             *("eye.illuminance", "eye.integration_time"),
         )
     if light == 0 and eye.integration_time != default:
@@ -61,7 +65,11 @@ def _check_light(eye: EyeConfig) -> None:
 
 
 def _check_compound(eye: EyeConfig) -> None:
-    """Check that settings of camera eyes and of compound eyes are changed only for eyes that have them."""
+    """Check that compound eyes have optics, and that settings are changed only for the kind of eyes that has them.
+
+    Raises:
+        ConfigError: one of these conditions is not met.
+    """
     default = EyeConfig()
     if not eye.compound and eye.facet_area != default.facet_area:
         raise ConfigError(
@@ -78,9 +86,12 @@ def _check_compound(eye: EyeConfig) -> None:
 
 
 def _check_rhabdoms(eye: EyeConfig) -> None:
-    """Check that eyes with rhabdoms have optics and a plausible numerical aperture.
+    """Check that eyes with rhabdoms have optics, and that the numerical aperture of rhabdoms is plausible.
 
-    Also check that settings of rhabdoms are changed only if receptors are rhabdoms.
+    Also check that settings of rhabdoms are changed only if they have an effect.
+
+    Raises:
+        ConfigError: one of these conditions is not met.
     """
     default = EyeConfig()
     for name in RHABDOMS if not (eye.rhabdoms or eye.compound) else ():
@@ -107,7 +118,13 @@ def _check_rhabdoms(eye: EyeConfig) -> None:
 
 
 def _check_time(eye: EyeConfig) -> None:
-    """Check that settings of receptors with memory are changed only if they have an effect."""
+    """Check that settings of receptors with memory are changed only if they have an effect.
+
+    Also check that a threshold for events is large enough, and that there is no adaptation in addition to it.
+
+    Raises:
+        ConfigError: one of these conditions is not met.
+    """
     default = EyeConfig()
     changed = [name for name in IN_TIME if getattr(eye, name) != getattr(default, name)]
     if changed and eye.temporal_order == 0:

@@ -1,18 +1,18 @@
-"""Formats of a run's config.toml, and conversion of former formats.
+"""Formats of a run's config.toml, and conversion of older formats.
 
 1   Files of this format do not state a format number. The task "navigation" is a maze, and `learning.rays_per_eye`
     limits the number of rays in training.
 2   The task "navigation" is a course, the task "maze" is a maze, and `learning.rays_per_receptor` limits the number of
-    rays in training. Pupils are rotated by 180° from the axes of the OSA. They remain so if the run is continued
-    (`eye.pupil_turned`).
+    rays in training. Pupils are rotated by 180° relative to the axes that the Optical Society of America (OSA) has
+    standardised. If such a run is continued, its pupils remain rotated (`eye.pupil_turned`).
 3   This is the current format. Pupils have the axes of the OSA.
 
 In files of formats 1 and 2, some settings may be missing. Without `learning.least_epochs`, the number of passes per
 update is constant. Without `search.active`, CMA-ES also learns from the worse candidates. Without
-`world.encoded_textures`, the textures of user tasks are as MuJoCo's compiler resolves them.
+`world.encoded_textures`, MuJoCo's compiler decides which textures of user tasks contain linear light.
 
-A run of a former format can be opened, replayed and reported; its settings keep their original meaning. Runs of format
-1 cannot be continued, because light is computed differently.
+Runs of older formats can be opened, replayed and reported; their settings keep the original meaning. Runs of format 1
+cannot be continued, because light is now computed differently.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Tree = dict[str, Any]
 
 
 def format_of(tree: Mapping[str, Any]) -> int:
-    """Return the format of a run's config.toml.
+    """Return the format of a run's config.toml, whose content is `tree`; 1 if it states none.
 
     Raises:
         ConfigError: the format is unknown.
@@ -47,7 +47,11 @@ def format_of(tree: Mapping[str, Any]) -> int:
 
 
 def upgraded(tree: Mapping[str, Any]) -> Tree:
-    """Return the settings of a run after converting them from the run's format to the current one."""
+    """Return the settings of a run, converted from their format to the current one.
+
+    Raises:
+        ConfigError: the format is unknown.
+    """
     number = format_of(tree)
     now = {key: value for key, value in tree.items() if key != "format"}
     if isinstance(learning := now.get("learning"), dict):
@@ -62,7 +66,13 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
 
 
 def in_own_axes(tree: Mapping[str, Any], number: int) -> Tree:
-    """Return settings with pupils in the axes of this format: those of formats 1 and 2 are rotated by 180°."""
+    """Return settings in which pupils have the same axes as before.
+
+    In formats 1 and 2, pupils are rotated by 180°. Settings of these formats get `eye.pupil_turned` = True, unless they
+    contain this setting.
+
+    number: format of the settings
+    """
     eye = tree.get("eye", {})
     if number > 2 or not isinstance(eye, dict):
         return dict(tree)
@@ -78,5 +88,5 @@ def _learning_then(learning: Tree, number: int) -> Tree:
 
 
 def task_then(task: Any) -> Any:
-    """Return the current name of the task that a file of format 1 names."""
+    """Return the current name of a task in a file of format 1."""
     return "maze" if task == "navigation" else task

@@ -21,9 +21,9 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 
 
 def check_layouts(world: WorldConfig) -> None:
-    """Check the settings of layouts: names, sizes, and that settings without effect have their defaults.
+    """Check the names and sizes in the settings of layouts, and that settings without effect have their defaults.
 
-    Settings of random families have no effect on fixed layouts, and the other way round.
+    Settings of random families have no effect on fixed layouts, and settings of fixed layouts none on random families.
 
     Raises:
         ConfigError: a name is unknown, a size is even, or a changed setting has no effect.

@@ -19,14 +19,17 @@ LEAST_ERROR = 1e-3
 
 
 def lint(config: RunConfig) -> list[str]:
-    """Return all warnings, one line each."""
+    """Return warnings about settings that are allowed but odd, one line each; [] if there are none."""
     return [*idle_genes(config), *idle_starts(config), *idle_settings(config), *coarse_bands(config)]
 
 
 def coarse_bands(config: RunConfig) -> list[str]:
-    """Return a warning if the error of the signals due to few spectral bands exceeds a receptor's noise.
+    """Return a warning if the error of signals, which is due to few spectral bands, exceeds a receptor's noise.
+
+    The result is a list with one line, or [].
 
     The error is computed for the measured spectra of the task's world, and for white and black in the run's medium.
+    Without a medium, it is not computed for user tasks, whose reflectances are unknown, nor for grey worlds.
     """
     if config.card.grey is not False and config.world.medium == AIR:  # reflectances are unknown, or grey
         return []
@@ -57,14 +60,17 @@ def coarse_bands(config: RunConfig) -> list[str]:
 
 
 def _most_light(config: RunConfig) -> float:
-    """Return the signal of a white surface behind the widest pupil of any animal (1 without a pupil)."""
+    """Return the signal of a white surface behind the widest pupil of any animal.
+
+    The unit is the signal behind a pupil with relative aperture 1. A perfect lens and compound eyes have the signal 1.
+    """
     if not config.eye.optics or config.eye.compound:
         return 1.0
     return highest("relative_aperture", config.genome) ** 2
 
 
 def _doublings(bands: int) -> list[int]:
-    """Return `bands` and its repeated doublings below 64, the number of bands of the reference."""
+    """Return `bands`, and its repeated doublings as long as they are below 64, the reference's number of bands."""
     return [bands * 2**k for k in range(6) if k == 0 or bands * 2**k < 64]
 
 
@@ -122,8 +128,8 @@ def idle_settings(config: RunConfig) -> list[str]:
     notes, search, eye = [], config.search, config.eye
     for name, gene in config.genes.items():
         use, alike = config.genome[name], [other for other in config.genes.values() if other.cluster == gene.cluster]
-        # If all genes of a cluster have the same value, it was set for the whole cluster, but only its open genes need
-        # it. The closed genes then cause no warning.
+        # If `opens_at` is the same for all genes of a cluster, it was probably set for the whole cluster, for the sake
+        # of its open genes. The frozen genes then cause no warning.
         together = {config.genome[other.name].opens_at for other in alike} == {use.opens_at}
         if use.opens_at and not use.open and not gene.default.open and not together:
             notes.append(f"genome.{name}.opens_at has no effect: the gene is frozen; set genome.{name}.open = true")

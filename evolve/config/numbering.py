@@ -9,7 +9,12 @@ __all__ = ["Place", "generation_ids"]
 
 @dataclass(frozen=True)
 class Place:
-    """Place of a candidate in a search: number `index` of `generation`, and `id` in the run. All start from 0."""
+    """Place of a candidate in a search. All numbers count from 0.
+
+    id: number of the candidate in the run
+    generation: number of its generation
+    index: number of the candidate in its generation
+    """
 
     id: int
     generation: int
@@ -22,5 +27,5 @@ class Place:
 
 
 def generation_ids(generation: int, population: int) -> range:
-    """Return the ids of a generation's candidates."""
+    """Return the ids of a generation's candidates; every generation has `population` candidates."""
     return range(generation * population, (generation + 1) * population)

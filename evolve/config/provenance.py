@@ -32,7 +32,7 @@ class Source:
     def place(self, key: str) -> str | None:
         """Return the location of `key` in this source, such as "mine.toml, line 7"; None if the source does not set it.
 
-        key: dotted name. A gene's setting may also be set for its cluster or family
+        key: dotted name. A setting of a gene counts as set if the source sets it for the gene's cluster or family
         """
         for path in _spellings(key):
             if not _holds(self.tree, path):
@@ -43,9 +43,10 @@ class Source:
 
 
 def _spellings(key: str) -> Iterator[list[str]]:
-    """Yield the parts of the key.
+    """Yield the parts of a dotted key.
 
-    For a gene, then yield the parts of the same key for each group that contains the gene, the smallest group first.
+    If the key belongs to a gene, also yield its parts with each group of this gene in the gene's place, the smallest
+    group first.
     """
     path = key.split(".")
     yield path
@@ -55,7 +56,7 @@ def _spellings(key: str) -> Iterator[list[str]]:
 
 
 def _line_of(text: str, path: list[str]) -> int | None:
-    """Return the number of the last line of a setting; None if some value spans more lines than LONGEST_VALUE.
+    """Return the number of a setting's last line; None if a value in the text spans more lines than LONGEST_VALUE.
 
     tomllib does not report line numbers. If the first n lines contain the setting, any larger number of lines also
     contains it. Bisection therefore finds the smallest n.

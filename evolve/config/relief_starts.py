@@ -74,7 +74,7 @@ def no_such_gene(name: str, eye: EyeConfig) -> str:
     points = eye.relief_points
     if eye.relief_symmetric and name in doe_names(points):
         own = ", ".join(_relief_genes(eye))
-        return f"genome.{name}: a symmetric relief has other genes ({own}); set eye.relief_symmetric = false for any"
+        return f"genome.{name}: a symmetric relief has other genes ({own}); set eye.relief_symmetric = false for all"
     return f"genome.{name}: the relief has {points} x {points} genes; set eye.relief_points for more"
 
 

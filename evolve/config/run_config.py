@@ -59,11 +59,18 @@ class RunConfig:
     """All settings that determine the outcome of a run, and the number of its processes.
 
     task: one of TASKS, or FILE.py:CLASS of a user task
-    code: code of the user task, if the user has named the task in the command or call; code that only a file names is
-        never executed
+    seed: seed of search, training and evaluation
+    workers: number of worker processes; 0: one per core
+    task_sha256: SHA-256 of a user task's file; "" for a built-in task
+    genome: use of each gene of the animals, by name
+    code: code of the user task, if the user has named the task in the command or call; else None. The code of a task
+        that is named only in a file is never executed
+
+    The other fields are sections of settings; the classes of the sections describe them.
 
     Raises:
-        ConfigError: settings contradict each other.
+        ConfigError: a value is invalid or out of range, settings contradict each other, or a changed setting has no
+            effect. The message is one line.
     """
 
     task: str
@@ -116,6 +123,11 @@ class RunConfig:
             raise ConfigError(message, *keys)
 
     def _check_task(self) -> None:
+        """Check the genes and settings that only some tasks have, and the frames of receptors with memory.
+
+        Raises:
+            ConfigError: the task lacks a gene or a changed setting, or does not allow this number of frames.
+        """
         for name in OPTIONAL_GENES:
             if name in self.genome and not self.card.has_gene(name):
                 raise ConfigError(
@@ -135,7 +147,13 @@ class RunConfig:
         check_layouts(self.world)
 
     def _check_settings(self, keys: tuple[str, ...]) -> None:
-        """Check that the task has these settings, or that they have their default values."""
+        """Check that each of these settings has its default value, unless the task has this setting.
+
+        keys: dotted names of settings
+
+        Raises:
+            ConfigError: a setting that the task lacks has another value.
+        """
         for key in keys:
             section, name = key.split(".")
             default = getattr(SECTIONS[section], name)
@@ -146,7 +164,11 @@ class RunConfig:
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_clusters(self) -> None:
-        """Check that at least one gene is open, and that no gene is open that the run does not use."""
+        """Check that at least one gene is open, and that no gene is open that the run does not use.
+
+        Raises:
+            ConfigError: one of these conditions is not met.
+        """
         genes = [gene for name, gene in self.genes.items() if self.genome[name].open]
         opened = {
             cluster: [f"genome.{gene.name}.open" for gene in genes if gene.cluster == cluster] for cluster in CLUSTERS
@@ -170,6 +192,11 @@ class RunConfig:
         """Check the settings of successive halving.
 
         It requires whole generations, and its first rung must be at least one rollout long.
+
+        rollout: number of steps in a rollout
+
+        Raises:
+            ConfigError: one of these conditions is not met.
         """
         search = self.search
         if search.rungs == 1:
@@ -188,7 +215,11 @@ class RunConfig:
             )
 
     def _check_phases(self) -> None:
-        """Check that every open gene opens before the run ends, and that at least one opens at its start."""
+        """Check that every open gene opens before the run ends, and that at least one opens at the start of the run.
+
+        Raises:
+            ConfigError: one of these conditions is not met.
+        """
         opening = {name: use.opens_at for name, use in self.genome.items() if use.open}
         for name, generation in opening.items():
             if generation >= self.search.generations:
@@ -204,7 +235,7 @@ class RunConfig:
             )
 
     def __repr__(self) -> str:
-        """Return a short description, because the run has some 150 settings."""
+        """Return a short description, because there are some 150 settings."""
         search, steps = self.search, self.learning.total_steps
         plan = f"{search.generations} generations x {search.population} candidates x {steps:,} steps"
         return f"<RunConfig {self.task}, seed {self.seed}, {plan}>"
@@ -233,7 +264,8 @@ class RunConfig:
         """Return this configuration with the code of its task, named as "FILE.py:CLASS".
 
         Raises:
-            ConfigError: the run has no user task, the class has another name, or the file has changed.
+            ConfigError: the run has no user task, the class has another name, or the file cannot be read or has
+                changed.
         """
         return replace(self, code=self.choice.read(named))
 

@@ -1,4 +1,7 @@
-"""Sections of a run's configuration. Each setting is defined with its default, valid range and effect."""
+"""Sections of a run's configuration. Each setting is defined with its default, valid range and effect.
+
+The dataclasses do not check their values; `RunConfig` checks them.
+"""
 
 from __future__ import annotations
 
@@ -28,13 +31,13 @@ FAMILY = "family"  # value of world.layouts
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """Settings of the worlds in which animals are trained and evaluated."""
+    """Settings of the worlds for training and evaluation of animals. `evolve config schema` describes each field."""
 
     mazes: int = setting(1, Interval(1, 32), "number of mazes in the task maze; an episode begins in any of them")
     unseen: bool = setting(
         False,
         None,
-        "evaluate in mazes that training does not use; no test set, since selection and early stopping use them, too",
+        "evaluate in mazes that training does not use; early stopping and selection use them, so they are no test set",
     )
     course: str = setting("short", None, "navigation's course: short, or long (twice the length, half the actions)")
     evaluation_course: str = setting("short", None, "navigation's course in evaluation")
@@ -47,7 +50,7 @@ class WorldConfig:
     family_seed: int = setting(0, Interval(0, 2**63 - 1), "seed of a family; the same layouts for all candidates")
     training_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for training")
     selection_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for selection")
-    test_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for final figures")
+    test_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for final results")
     layout_rows: int = setting(13, Interval(7, 31), "cells of a family's layouts along y, outer walls included; odd")
     layout_columns: int = setting(39, Interval(15, 99), "cells of a family's layouts along x; odd")
     path_width: int = setting(3, Interval(1, 3), "width of the paths of a family's courses [cells]: 1 or 3")
@@ -63,7 +66,7 @@ class WorldConfig:
     least_light: float = setting(
         1.0,
         Interval(1e-6, 1),
-        "lowest light level, relative to daylight; each episode draws its level between this and 1",
+        "lowest light level, relative to daylight; the level of each episode is drawn between this and 1",
     )
 
     medium: str = setting(
@@ -92,14 +95,17 @@ class WorldConfig:
 
     @property
     def test(self) -> dict[str, Any]:
-        """Arguments of `sim.build_world` that define the worlds of final results ("test").
+        """Arguments of `sim.build_world` that define the worlds of final results.
 
-        Without a family of layouts, these are the worlds in which fitness is evaluated.
+        These are the test layouts of a family. Without a family, they are the worlds in which fitness is evaluated.
         """
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return height of walls, medium, and the set `name` of layouts, as arguments of `sim.build_world`."""
+        """Return the height of walls, the medium, and the set `name` of layouts, as arguments of `sim.build_world`.
+
+        name: "training", "selection" or "test"
+        """
         layouts = None
         if self.layouts == FAMILY:
             from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need
@@ -119,7 +125,7 @@ class WorldConfig:
 
 @dataclass(frozen=True)
 class SearchConfig:
-    """Settings of the search: optimizer, population and successive halving."""
+    """Settings of the search, such as optimizer and population. `evolve config schema` describes each field."""
 
     population: int = setting(16, Interval(2, 10_000), "candidates per generation")
     generations: int = setting(50, Interval(1, 100_000), "generations")
@@ -135,7 +141,9 @@ class SearchConfig:
         False, None, "propose a new candidate as soon as one has been evaluated; if false, generation by generation"
     )
     rungs: int = setting(
-        1, Interval(1, 10), "rungs of a training run; only the better candidates continue after a rung; 1: no halving"
+        1,
+        Interval(1, 10),
+        "rungs (stages) of successive halving; only the better candidates continue after a rung; 1: no halving",
     )
     promoted: float = setting(
         0.5,
@@ -146,7 +154,7 @@ class SearchConfig:
 
 @dataclass(frozen=True)
 class LearningConfig:
-    """Settings of the training of each candidate by PPO."""
+    """Settings of the training of each candidate by PPO. `evolve config schema` describes each field."""
 
     total_steps: int = setting(1_000_000, Interval(1, 10**10), "number of agent steps in a training run")
     n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated in parallel")
@@ -156,7 +164,7 @@ class LearningConfig:
     least_epochs: int = setting(
         3,
         Interval(1, 1000),
-        "minimum number of passes, reached after the step size has halved; n_epochs or more: constant number of passes",
+        "minimum number of passes; they start to fall after the step size has halved; n_epochs or more: no fall",
     )
     learning_rate: float = setting(
         3e-3,
@@ -166,7 +174,7 @@ class LearningConfig:
     decay_after: int = setting(
         75_000,
         Interval(1, 10**10),
-        "steps after which learning slows down as 1/steps: first Adam's step size falls to half, then the passes fall",
+        "steps after which step size x passes falls as 1/steps: first Adam's step size falls to half, then the passes",
     )
     gamma: float = setting(0.9, Interval(0, 1), "discount per step")
     gae_lambda: float = setting(
@@ -186,25 +194,27 @@ class LearningConfig:
     rays_per_receptor: float = setting(
         8.0,
         Interval(0, 4096, open_low=True),
-        "maximum number of rays, or areas, per receptor and frame during training and its evaluations",
+        "maximum number of rays, or areas, per receptor and frame in training and in its evaluations",
     )
     least_return: float = setting(
         0.0, Interval(-1e6, 0), "a training episode is truncated when its return falls to this value; 0: never"
     )
-    eval_interval: int = setting(50_000, Interval(1, 10**10), "training steps between evaluations")
-    patience: int = setting(5, Interval(1, 10**6), "evaluations without improvement before training stops")
+    eval_interval: int = setting(50_000, Interval(1, 10**10), "training steps between evaluations of the policy")
+    patience: int = setting(5, Interval(1, 10**6), "evaluations without improvement after which training stops")
 
 
 @dataclass(frozen=True)
 class WiringConfig:
     """Settings of the connections between the receptors of an eye and its encoder.
 
+    `evolve config schema` describes each field.
+
     `pool_side` has no effect along an axis with fewer receptors, and `repeat_side` none along an axis with more.
     """
 
     shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")
     pool_side: int = setting(
-        0, Interval(0, 256), "signals are averaged to a grid of this many rows and columns before the encoder; 0: never"
+        0, Interval(0, 256), "signals are averaged on a grid of this many rows and columns before the encoder; 0: never"
     )
     repeat_side: int = setting(
         0,
@@ -218,7 +228,7 @@ DIRECT = WiringConfig()  # each receptor is an input of its eye's own encoder
 
 @dataclass(frozen=True)
 class EvaluationConfig:
-    """Settings of the evaluation of fitness."""
+    """Settings of the evaluation of fitness. `evolve config schema` describes each field."""
 
     episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the task fitness")
 

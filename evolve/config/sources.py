@@ -41,7 +41,7 @@ def preset_names() -> list[str]:
 
 
 def preset_about(name: str) -> dict[str, Any]:
-    """Return the name, task, scales and purpose of a preset.
+    """Return a preset's "name", "task", "scales" (names) and "about" (its purpose).
 
     The task is None if the preset can be used with any task. The purpose is the first sentence of the preset's file.
     """
@@ -54,10 +54,13 @@ def preset_about(name: str) -> dict[str, Any]:
 
 
 def preset_sources(name: str | None, scale: str | None) -> list[Source]:
-    """Return the sources of a preset: its settings, then its scale, whose settings override them; [] for None.
+    """Return the sources of a preset: its settings, then its scale, whose settings override them.
+
+    name: name of the preset; None: no preset, and the result is []
+    scale: name of the scale; None: the first of SCALES, if the preset has several scales
 
     Raises:
-        ConfigError: the preset or the scale is unknown.
+        ConfigError: the preset or the scale is unknown, or the preset has only one scale.
     """
     if name is None:
         return []
@@ -69,7 +72,7 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
     settings = Source(f"preset {name}", tree, text)
     if not scales:
         if scale is not None:
-            raise ConfigError(f"scale {quoted(scale)}: preset {name} comes in one scale only")
+            raise ConfigError(f"scale {quoted(scale)}: preset {name} has only one scale")
         return [settings]
     chosen = scale or SCALES[0]
     if not isinstance(chosen, str) or chosen not in scales:
@@ -78,18 +81,21 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
 
 
 def task_defaults(task: Any) -> Source:
-    """Return the default settings of a task from evolve/config/tasks/TASK.toml; none if the file is missing."""
+    """Return the default settings of a task from evolve/config/tasks/TASK.toml.
+
+    The source has no settings if the task is not a built-in one or has no such file.
+    """
     file = resources.files("evolve") / "config" / "tasks" / f"{task}.toml"
     known = isinstance(task, str) and task in TASKS
     return Source("", tomllib.loads(file.read_text(encoding="utf-8")) if known and file.is_file() else {})
 
 
 def read_toml(path: Path) -> Source:
-    """Read a TOML file.
+    """Return the settings in a TOML file. Keys and values are not checked.
 
     Raises:
-        ConfigError: the file cannot be read or parsed. The message is one line that names the file and, if known, the
-            line in it.
+        ConfigError: the file cannot be read or parsed, or is too large. The message is one line that names the file
+            and, if known, the line in it.
     """
     try:
         with path.open("rb") as file:
@@ -102,12 +108,12 @@ def read_toml(path: Path) -> Source:
 
 
 def parsed_toml(text: bytes | str, name: str) -> Source:
-    """Parse TOML text.
+    """Return the settings in TOML text. Keys and values are not checked.
 
     name: name of the text in error messages
 
     Raises:
-        ConfigError: the text is not valid TOML; see `read_toml`.
+        ConfigError: the text is not valid TOML, or a key has too many parts; see `read_toml`.
     """
     try:
         text = text.decode("utf-8") if isinstance(text, bytes) else text
@@ -128,12 +134,12 @@ def _first_line(error: Exception) -> str:
 
 
 def read_assignment(text: str) -> Source:
-    """Return the source {"search": {"population": 8}} for the text "search.population=8".
+    """Return the source with the setting {"search": {"population": 8}} for the text "search.population=8".
 
-    The value is parsed as TOML. A word without quotation marks is accepted as text.
+    The value is parsed as TOML. A value that is not valid TOML, such as a word without quotation marks, is text.
 
     Raises:
-        ConfigError: the text has another form.
+        ConfigError: the text has another form, or contains several settings.
     """
     key, equals, value = (part.strip() for part in text.partition("="))
     parts = key.split(".")

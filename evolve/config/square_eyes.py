@@ -1,4 +1,4 @@
-"""Square eyes have one gene for both sides. Equal settings of height and width apply to this gene."""
+"""Settings of square eyes, which have one gene for both sides. Equal settings of both sides apply to this gene."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """Return the source with settings that suit square eyes, which have a single gene for height and width.
+    """Return the source, with settings of height and width converted to those of square eyes' single gene.
 
-    For square eyes, equal settings of height and width become the settings of this gene.
+    If eyes are not square, the source is returned unchanged. Equal settings of height and width become those of the
+    single gene. Unequal settings are kept, and `no_such_side` explains the error that follows from them.
 
     A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes, the task's
     settings of height and width are ignored, and the preset's width applies to both sides.
@@ -32,7 +33,7 @@ def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
 
 
 def no_such_side(name: str, eye: EyeConfig) -> str:
-    """Return a message that explains why these eyes lack a gene."""
+    """Return a message that explains why these eyes lack the gene for one side, or for both sides."""
     if eye.square:
         return f"genome.{name}: square eyes have the gene {SIDE} for both sides; set it, or eye.square = false"
     return f"genome.{name}: only square eyes have this gene, others have {' and '.join(SIDES)}; set eye.square = true"

@@ -1,4 +1,4 @@
-"""Properties of a task that are known without executing its code. Settings, warnings, tables and titles use them."""
+"""Properties of a task that are known without executing its code. Checks, warnings, tables and titles use them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ OF_SLIDING_AGENTS = (
 )
 OF_MAZES = ("world.mazes", "world.unseen")
 OF_COURSES = ("world.course", "world.evaluation_course")
-PATH_WIDTH = "world.path_width"  # of a family's courses
+PATH_WIDTH = "world.path_width"  # setting of a family's courses
 OF_FAMILY = (
     *("world.family_seed", "world.training_layouts", "world.selection_layouts", "world.test_layouts"),
     *("world.layout_rows", "world.layout_columns", "world.layout_actions", "world.selection_set"),

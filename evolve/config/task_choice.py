@@ -28,10 +28,14 @@ class TaskChoice:
 
     @classmethod
     def named(cls, said: str) -> TaskChoice:
-        """Return the task that a command names. The file of a user task is read but not executed.
+        """Return the task that a command or call names. The file of a user task is read but not executed.
+
+        The name of a built-in task is not checked here; see `card`.
+
+        said: name of a built-in task, or "FILE.py:CLASS"
 
         Raises:
-            ConfigError: the file or class does not exist, or the file is not valid Python.
+            ConfigError: the file of a user task cannot be read or is not valid Python, or the class does not exist.
         """
         if not names_code(said):
             return cls(said)
@@ -78,7 +82,7 @@ class TaskChoice:
         """Read the code of this task from the file that the user names as "FILE.py:CLASS".
 
         Raises:
-            ConfigError: this task has no code, the class has another name, or the file has changed.
+            ConfigError: this task has no code, the class has another name, or the file cannot be read or has changed.
         """
         if not self.sha256:
             raise ConfigError(f"--task {named}: this run's task, {self.label}, is built in: leave --task out")

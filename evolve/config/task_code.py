@@ -48,7 +48,8 @@ class TaskCode:
         """Read the code of "FILE.py:CLASS". The file is parsed but not executed.
 
         Raises:
-            ConfigError: the file or class does not exist, or the file is not valid Python. The message is one line.
+            ConfigError: the file cannot be read, is too large or is not valid Python, or the class does not exist. The
+                message is one line.
         """
         place, _, name = named.partition(".py:") if ".py:" in named else (named.removesuffix(".py"), "", "")
         file = Path(f"{place}.py")
@@ -81,7 +82,11 @@ def names_code(said: Any) -> bool:
 
 
 def _parsed(file: Path, content: bytes) -> tuple[str, list[str]]:
-    """Return the text of a file and the names of its classes."""
+    """Return the text of a file and the names of its top-level classes.
+
+    Raises:
+        ConfigError: the content is not UTF-8 text or not valid Python.
+    """
     try:
         text = content.decode("utf-8").replace("\r\n", "\n")
         tree = ast.parse(text, str(file))

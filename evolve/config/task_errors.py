@@ -10,9 +10,10 @@ MODULE = "rhabdom_task_"  # beginning of the names of modules that execute a use
 
 
 def error_in_task(error: BaseException) -> str | None:
-    """Return the message of an error in one line, with the method, line and file; None if no user task raised it.
+    """Return the message of an error in one line, with the method, line and file of a user task.
 
-    The place is the innermost line of the user's file. Python calls the module itself "<module>".
+    The line is the innermost one of the user's file in the traceback. If the error occurred outside any method, no
+    method is named. If the traceback contains no line of a user's file, the result is None.
     """
     place, trace = None, error.__traceback__
     while trace is not None:

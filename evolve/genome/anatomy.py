@@ -1,11 +1,11 @@
-"""Space constraints of eyes and receptors, and repair of gene values for which they would overlap.
+"""Space constraints of eyes and receptors, and repair of gene values for which eyes or receptors would overlap.
 
 Eyes sit on the equator of a head of radius `eye.head_radius`, and an eye is as wide as its retina. The angle between
 neighbouring eyes is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with receptors,
 which are at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is instead the
 number of receptors along its width times this pitch. Height takes no space on the head, but receptors are also at
-least `eye.receptor_width` high. A repair changes genes as little as possible. Costs (`evolve.config.costs`) apply to
-the repaired animal, in addition to these constraints.
+least `eye.receptor_width` high. The repair changes genes as little as possible. Costs (`evolve.config.costs`) are
+computed for the repaired animal.
 """
 
 from __future__ import annotations
@@ -28,12 +28,18 @@ SLACK = 1e-9  # tolerance for rounding errors: eyes in contact must not count as
 
 
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
-    """Return the width of a retina with this number of receptors along its width [m]. The eye has the same width."""
+    """Return the width of a retina with this number of receptors along its width [m]. The eye has the same width.
+
+    sizes: settings of the eyes, here and in the other functions
+    """
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
 
 
 def vertical_fov(values: Values, sizes: EyeConfig) -> float | None:
-    """Return an eye's vertical field of view [deg]; None for square receptors."""
+    """Return an eye's vertical field of view [deg]; None for square receptors.
+
+    values: value of each gene, by name
+    """
     gene = {"receptors": None, "horizontal": "fov_deg", "gene": VERTICAL}[sizes.vertical_fov]
     return None if gene is None else values[gene]
 
@@ -41,6 +47,8 @@ def vertical_fov(values: Values, sizes: EyeConfig) -> float | None:
 def receptor_side(resolution: tuple[float, float], fov_deg: float, vertical: float | None, sizes: EyeConfig) -> float:
     """Return the shorter side of a receptor [m].
 
+    resolution: numbers of receptors along the height and along the width of the eye
+    fov_deg: horizontal field of view [deg]
     vertical: vertical field of view [deg]; None for square receptors
     """
     rows, columns = resolution
@@ -51,18 +59,22 @@ def receptor_side(resolution: tuple[float, float], fov_deg: float, vertical: flo
 
 
 def sides(values: Values) -> tuple[int, int]:
-    """Return the numbers of receptors along the height and along the width of an eye."""
+    """Return the numbers of receptors along the height and along the width of an eye.
+
+    values: value of each gene, by name
+    """
     height, width = (SIDE, SIDE) if SIDE in values else SIDES
     return int(values[height]), int(values[width])
 
 
 def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
-    """Return the gene values after the repair of overlaps; genes stay within their searched ranges.
+    """Return the gene values after the repair of overlaps.
 
-    If receptors are too narrow, their number is reduced. Rhabdoms are narrowed to the width of a receptor. If eyes
-    overlap, they are spread over a larger part of the head. If the searched range of their placement is too small for
-    this, the number of eyes is reduced. If the width of an eye depends on the number of its receptors, the numbers of
-    eyes and of receptors are instead reduced in the same proportion.
+    If receptors are too narrow, their number along the width is reduced. `_with_high_receptors` repairs receptors that
+    are not high enough. If eyes overlap, they are spread over a larger part of the head. If the searched range of their
+    placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number of its
+    receptors, the numbers of eyes and of receptors are instead reduced in the same proportion. Rhabdoms are narrowed to
+    the shorter side of a receptor; all other genes stay within their searched ranges.
 
     For compound eyes, see `evolve.genome.head_surface`.
 
@@ -88,10 +100,11 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 
 
 def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
-    """Return the genes that change so that receptors are at least `eye.receptor_width` high.
+    """Return new values of genes, by name, with which receptors are at least `eye.receptor_width` high.
 
-    The number of rows is reduced. If the lowest number does not fit, the vertical field of view grows up to its highest
-    value. If that is not enough, the horizontal field shrinks, which makes a retina of the same width higher.
+    The number of rows is reduced. If the lowest number does not fit and the vertical field of view is a gene, this
+    field grows up to its highest value. If that is not enough, the horizontal field shrinks, which makes a retina of
+    the same width higher. For square receptors, the result is {}.
     """
     vertical = vertical_fov(values, sizes)
     if vertical is None:
@@ -109,9 +122,11 @@ def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values
 
 @dataclass(frozen=True)
 class _RowsThatFit:
-    """Rows of receptors of at least `eye.receptor_width` on a retina with this number of columns.
+    """Test of whether rows of receptors, each at least `eye.receptor_width` high, fit on a retina.
 
-    square: True if the number of columns equals the number of rows
+    columns: number of receptors along the width
+    square: True if the number of columns equals the number of rows, and `columns` is ignored
+    sizes: settings of the eyes
     """
 
     columns: float
@@ -119,7 +134,7 @@ class _RowsThatFit:
     sizes: EyeConfig
 
     def _least_ratio(self, rows: float) -> float:
-        """Return the least height of the retina, divided by its width, for this number of rows."""
+        """Return the smallest height of a retina with this number of rows, divided by its width."""
         width = retina_width(rows if self.square else self.columns, self.sizes)
         return rows * self.sizes.receptor_width / width
 
@@ -141,8 +156,8 @@ def _degrees(tangent: float) -> float:
     return math.degrees(2 * math.atan(tangent))
 
 
-def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
-    """Return the numbers of eyes and receptors that fit, are at least `least`, and are closest to `asked`.
+def _thinned(wanted: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
+    """Return the numbers of eyes and of receptors along the width that fit and are closest to `wanted`.
 
     The distance between two pairs of numbers is the sum of the squared logarithms of their ratios. With this distance,
     the repair halves both numbers rather than dividing one of them by four. If the repair always reduced the same
@@ -151,8 +166,11 @@ def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pa
 
     The required space depends on the number of gaps between eyes, eyes - 1. The ratio is therefore computed from the
     mean of the numbers of eyes and of gaps, eyes - 0.5. This preserves the proportion of eyes to receptors best.
+
+    wanted, least: numbers of eyes and receptors before the repair, and their smallest allowed values
+    range_deg: angle over which the eyes may be spread [deg]
     """
-    (eyes, receptors), (fewest_eyes, fewest) = asked, least
+    (eyes, receptors), (fewest_eyes, fewest) = wanted, least
     counts = range(int(fewest), int(receptors) + 1)
     fitting = [(min(eyes, float(_most_eyes(range_deg, count, sizes))), float(count)) for count in counts]
     allowed = [fit for fit in fitting if fit[0] >= fewest_eyes]

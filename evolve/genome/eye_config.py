@@ -16,19 +16,25 @@ AUTO = "auto"  # value of a setting whose number is chosen automatically
 
 
 def setting(default: Any, valid: Interval | None, meaning: str) -> Any:
-    """Return a dataclass field whose metadata contain the valid range and the meaning of the setting."""
+    """Return a dataclass field whose metadata contain the valid range and the meaning of the setting.
+
+    valid: valid range of a number; None if it has none, or the value is not a number
+    """
     return field(default=default, metadata={"valid": valid, "meaning": meaning})
 
 
 @dataclass(frozen=True)
 class EyeConfig:
-    """Settings shared by all eyes of a run."""
+    """Settings shared by all eyes of a run. `RunConfig` checks the values.
+
+    `evolve config schema` prints the range, the default and the meaning of each field, which its metadata contain.
+    """
 
     optics: bool = setting(True, None, "see through the pupil and its relief; if false, through a perfect lens")
     sensor_width: float = setting(
         200e-6, Interval(1e-6, 1e-2), "width of the retina [m], unless receptor_pitch determines it"
     )
-    noise_sigma: float = setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal of white]")
+    noise_sigma: float = setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise, in signals of white")
     illuminance: float = setting(
         0.0, Interval(0, 1e6), "illuminance of the scene [lx], which determines shot noise; 0: no shot noise"
     )
@@ -56,7 +62,7 @@ class EyeConfig:
     rays_per_receptor: float | str = setting(
         AUTO,
         Interval(0, 4096, open_low=True),
-        "rays traced per receptor and frame; auto: the minimum that the noise allows, or areas",
+        "rays traced per receptor and frame; auto: area sampling, or the fewest rays that the noise allows",
     )
     square: bool = setting(
         False, None, "eyes are square: the gene resolution replaces resolution_height and resolution_width"
@@ -64,8 +70,8 @@ class EyeConfig:
     vertical_fov: str = setting(
         VERTICAL_FOVS[0],
         None,
-        "an eye's vertical field of view; receptors: that of square receptors; horizontal: as wide as the horizontal "
-        "one; gene: from the gene vertical_fov_deg",
+        "an eye's vertical field of view; receptors: that of square receptors; horizontal: equal to the horizontal "
+        "field of view; gene: from the gene vertical_fov_deg",
     )
     receptor_pitch: float = setting(
         0.0,
@@ -127,7 +133,7 @@ class EyeConfig:
     frames: int = setting(
         0,
         Interval(0, 1000),
-        "frames rendered per action for receptors with memory; 0: the minimum that the noise allows",
+        "frames rendered per action for receptors with memory; 0: the fewest that the noise allows",
     )
 
     @property

@@ -41,7 +41,7 @@ __all__ = [
 
 Cluster = Literal["morphological", "optical", "neural", "spectral"]
 CLUSTERS: tuple[Cluster, ...] = ("morphological", "optical", "neural", "spectral")
-FAMILIES = ("doe", "lambda_max")  # prefixes of genes of the same kind: heights of the relief, and peaks of pigments
+FAMILIES = ("doe", "lambda_max")  # beginnings of names of similar genes: heights of the relief, peaks of pigments
 # Number of points along one side of a relief. The names of its genes have one digit for the row and one for the column.
 RELIEF_POINTS = Interval(4, 9)
 SIDE = "resolution"  # gene of square eyes, which replaces the two genes SIDES
@@ -51,7 +51,7 @@ VERTICAL = "vertical_fov_deg"  # gene of eyes whose height evolves
 TIME_CONSTANT = "time_constant_ms"  # gene of eyes whose receptors integrate over time
 FACETS = ("acute_zone", "facet_diameter_um", "f_number", "rhabdom_length_um")  # genes of compound eyes
 OPTIONAL = (RHABDOM, VERTICAL, TIME_CONSTANT, *FACETS)  # genes that exist only with certain settings of eyes
-OF_PUPILS = ("relative_aperture", "refractive_index", "dispersion", "aperture_shape")  # with the relief's heights
+OF_PUPILS = ("relative_aperture", "refractive_index", "dispersion", "aperture_shape")  # genes of pupils, and "doe_*"
 TILT = "elevation_deg"  # gene that exists only in user tasks; in built-in tasks eyes look along the floor
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
@@ -62,9 +62,10 @@ LAMBDA_MAX: Mapping[str, float] = {f"lambda_max_{i}_nm": peak for i, peak in enu
 
 @dataclass(frozen=True)
 class GeneConfig:
-    """Use of one gene in a run.
+    """Use of one gene in a run. Values are in the unit of the gene.
 
-    The search varies an open gene within [low, high], beginning at `start`. A frozen gene has the value `start`.
+    The search varies an open gene within [low, high], beginning at `start`. A frozen gene (`open` is False) has the
+    value `start`.
 
     opens_at: first generation in which the search varies the gene; before it, the gene has the value `start`
     """
@@ -77,18 +78,32 @@ class GeneConfig:
 
 
 def lowest(name: str, uses: Mapping[str, GeneConfig]) -> float:
-    """Return the lowest value that a gene can have in a run."""
+    """Return the lowest value that a gene can have in a run.
+
+    uses: use of each gene in the run, by name
+    """
     return uses[name].low if uses[name].open else uses[name].start
 
 
 def highest(name: str, uses: Mapping[str, GeneConfig]) -> float:
-    """Return the highest value that a gene can have in a run."""
+    """Return the highest value that a gene can have in a run.
+
+    uses: use of each gene in the run, by name
+    """
     return uses[name].high if uses[name].open else uses[name].start
 
 
 @dataclass(frozen=True)
 class Gene:
-    """One gene, with its valid values (`range`) and its default use in a run (`default`)."""
+    """One gene, a quantity that evolution can change.
+
+    cluster: one of CLUSTERS
+    kind: "real" or "integer"
+    range: valid values in any run
+    default: use of the gene in a run whose settings do not mention it
+    unit: unit of the values; "" for a number without a unit
+    meaning: description for tables and messages
+    """
 
     name: str
     cluster: Cluster
@@ -100,14 +115,14 @@ class Gene:
 
     @property
     def mutation(self) -> str:
-        """Kind of mutation that the optimizer "mutation" applies.
-
-        Other optimizers sample a distribution that they adapt.
-        """
+        """Kind of mutation that the optimizer "mutation" applies: "Gaussian" for real genes, "±1" for integer genes."""
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Return the gene's value at the coordinate u in [0, 1]. Values of an integer gene occupy equal intervals."""
+        """Return the gene's value at the coordinate u in [0, 1]. Values of an integer gene occupy equal intervals.
+
+        use: use of the gene in a run; the coordinates 0 and 1 correspond to `use.low` and `use.high`
+        """
         if self.kind == "real":
             return use.low + u * (use.high - use.low)
         return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)
@@ -122,7 +137,7 @@ class Gene:
         """Return the coordinate u after one mutation.
 
         The coordinate of a real gene changes by `normal` times sigma and is reflected at 0 and 1. The value of an
-        integer gene changes by `step` and is clipped to its range.
+        integer gene changes by `step` and is clipped to [low, high].
         """
         if self.kind == "integer":
             value = self.decode(u, use) + step
@@ -141,9 +156,9 @@ def gene_table(
 ) -> Mapping[str, Gene]:
     """Return all genes by name, in the order of the genome.
 
-    The relief has relief_points² genes. If it is symmetric, it has only the genes of an eighth of its area. Square eyes
-    have one gene for both sides.
-
+    relief_points: number of relief genes along one side; the relief has relief_points² genes
+    relief_symmetric: True if the relief has only the genes of an eighth of its area
+    square: True if eyes are square and have one gene for both sides
     optional: genes of OPTIONAL that the animals have
     pupils: True if eyes have a pupil with a relief, and not facets
     """
@@ -166,7 +181,7 @@ def _body() -> list[Gene]:
     return [
         gene("n_eyes", INTEGER, (1, 32), (1, 16, 1), "", "number of eyes around the body"),
         gene("placement_range_deg", REAL, (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
-        _held(gene(TILT, REAL, (-90, 90), (-60, 60, 0), "deg", "elevation of the eyes; only in user tasks")),
+        _frozen(gene(TILT, REAL, (-90, 90), (-60, 60, 0), "deg", "elevation of the eyes; only in user tasks")),
         gene("fov_deg", REAL, (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
         gene(VERTICAL, REAL, (1, 170), (1, 100, 45), "deg", "an eye's vertical field of view"),
         gene("resolution_height", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
@@ -182,19 +197,20 @@ def _optics(relief_points: int) -> list[Gene]:
     shapes = ", ".join(f"{number} {name}" for number, name in enumerate(APERTURE_SHAPES))
     last = len(APERTURE_SHAPES) - 1
     return [
-        # Below 0.01 (a radius of 1 µm in an eye 200 µm wide), the pupil would be about as narrow as the wavelength of
-        # light.
+        # A pupil below 0.01 (a radius of 1 µm in an eye 200 µm wide) would be about as narrow as a wavelength.
         gene("relative_aperture", REAL, (0.01, 1), (0.01, 1, 0.5), "", "pupil diameter / retina width"),
         *(
             gene(f"doe_{i}{j}", REAL, (0, 1), (0, 1, 0.5), "relief height", f"relief control point ({i}, {j})")
             for i, j in places
         ),
         gene("refractive_index", REAL, (1, 2), (1, 2, 1.5), "", "index of the relief's material, at 588 nm"),
-        # Glasses have values from 1/90 to 1/20. A material with the value 0 has no dispersion.
-        _held(gene("dispersion", REAL, (0, 0.1), (0, 0.05, 0), "1 / Abbe number", "fall of the index with wavelength")),
-        _held(gene("aperture_shape", INTEGER, (0, last), (0, last, 0), "", f"pupil: {shapes}")),
+        # Glasses have values from 1/90 to 1/20. The value 0 means no dispersion.
+        _frozen(
+            gene("dispersion", REAL, (0, 0.1), (0, 0.05, 0), "1 / Abbe number", "fall of the index with wavelength")
+        ),
+        _frozen(gene("aperture_shape", INTEGER, (0, last), (0, last, 0), "", f"pupil: {shapes}")),
         # Rhabdoms thinner than 0.8 µm guide almost no red light, and those wider than 10 µm have a hundred modes.
-        _held(gene(RHABDOM, REAL, (0.8, 10), (1, 6, 2), "µm", "diameter of rhabdoms, at most a receptor's width")),
+        _frozen(gene(RHABDOM, REAL, (0.8, 10), (1, 6, 2), "µm", "diameter of rhabdoms, at most a receptor's width")),
         # Facets of small wasps are 5 µm wide, and those of dragonflies 80 µm.
         gene("facet_diameter_um", REAL, (4, 100), (8, 40, 20), "µm", "width of a facet; all facets fit on the head"),
         gene("f_number", REAL, (1, 10), (1.5, 4, 2), "", "focal length of a facet in air / its width"),
@@ -206,10 +222,10 @@ def _brain() -> list[Gene]:
     gene = partial(_gene, "neural")
     return [
         # Photoreceptors of fast flies in bright light have 3 ms, and those of toads in the dark have seconds.
-        _held(gene(TIME_CONSTANT, REAL, (0.1, 10_000), (1, 500, 20), "ms", "time constant of the receptors' filter")),
+        _frozen(gene(TIME_CONSTANT, REAL, (0.1, 10_000), (1, 500, 20), "ms", "time constant of the receptors' filter")),
         gene("memory_frames", INTEGER, (1, 32), (1, 10, 5), "frames", "frames that the brain sees"),
         gene("neurons", INTEGER, (1, 512), (1, 512, 64), "", "neurons in each hidden layer"),
-        _held(gene("layers", INTEGER, (1, 4), (1, 4, 2), "", "hidden layers of actor and critic")),
+        _frozen(gene("layers", INTEGER, (1, 4), (1, 4, 2), "", "hidden layers of actor and critic")),
     ]
 
 
@@ -221,9 +237,9 @@ def _spectra() -> list[Gene]:
     """
     gene, most = partial(_gene, "spectral"), len(LAMBDA_MAX)
     return [
-        _held(gene("receptor_types", INTEGER, (1, most), (1, most, 3), "", "types of receptor, one channel each")),
+        _frozen(gene("receptor_types", INTEGER, (1, most), (1, most, 3), "", "types of receptor, one channel each")),
         *(
-            _held(gene(name, REAL, (330, 700), (330, 650, start), "nm", f"peak of receptor type {i}'s pigment"))
+            _frozen(gene(name, REAL, (330, 700), (330, 650, start), "nm", f"peak of receptor type {i}'s pigment"))
             for i, (name, start) in enumerate(LAMBDA_MAX.items())
         ),
     ]
@@ -238,12 +254,16 @@ def _gene(
     unit: str,
     meaning: str,
 ) -> Gene:
-    """Return a gene that is open by default; `search` is (low, high, start) of its default use."""
+    """Return a gene that is open by default.
+
+    valid: (low, high) of the valid values
+    search: (low, high, start) of the default use
+    """
     low, high, start = map(float, search)
     return Gene(name, cluster, kind, Interval(*valid), GeneConfig(True, low, high, start), unit, meaning)
 
 
-def _held(gene: Gene) -> Gene:
+def _frozen(gene: Gene) -> Gene:
     """Return a copy of the gene that is frozen by default."""
     return replace(gene, default=replace(gene.default, open=False))
 
@@ -254,7 +274,7 @@ ALL_GENES: Mapping[str, Gene] = _all_genes(int(RELIEF_POINTS.high))  # genes of 
 
 @lru_cache(maxsize=1024)
 def group_members(name: str) -> tuple[str, ...]:
-    """Return the names of the genes in a cluster or family, or the gene of this name; () for an unknown name."""
+    """Return the names of the genes in a cluster or family; (name,) for the name of a gene, () for an unknown name."""
     return tuple(gene for gene in ALL_GENES if name in (gene, *groups_of(gene)))
 
 

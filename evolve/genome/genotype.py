@@ -20,21 +20,25 @@ class Genotype:
     """Encoding of gene values in one run: the open genes, their order in the genome, and their ranges.
 
     A gene that opens in a later generation has a place in the genome from the first generation, with its start value.
+
+    uses: use of each gene of the animals, by name
     """
 
     uses: Mapping[str, GeneConfig]
 
     @cached_property
     def open_genes(self) -> tuple[Gene, ...]:
+        """Open genes, in the order of the genome."""
         return tuple(gene for name, gene in ALL_GENES.items() if name in self.uses and self.uses[name].open)
 
     @property
     def dimension(self) -> int:
+        """Number of open genes, which is the length of a genome."""
         return len(self.open_genes)
 
     @property
     def start(self) -> NDArray[np.float64]:
-        """Genome with the start values of all genes, (dimension,)."""
+        """Genome with the start values of the open genes, (dimension,)."""
         uses = self.uses
         return np.array([gene.encode(uses[gene.name].start, uses[gene.name]) for gene in self.open_genes])
 
@@ -48,10 +52,13 @@ class Genotype:
         return np.array([i for i, g in enumerate(self.open_genes) if self.uses[g.name].opens_at <= generation], np.intp)
 
     def decode(self, genome: NDArray[np.float64]) -> dict[str, float]:
-        """Return the values of all genes, both open and frozen. Coordinates outside [0, 1] are clipped.
+        """Return the values of all genes by name, both open and frozen. Coordinates outside [0, 1] are clipped.
+
+        genome: coordinates, (dimension,)
 
         Raises:
-            ValueError: the length of `genome` is not `dimension`, or a coordinate is not finite.
+            ValueError: the length of `genome` is not `dimension`, a coordinate is not finite, or the coordinates are in
+                half precision.
         """
         genome = np.asarray(full_precision("genome", genome), dtype=np.float64)
         if genome.shape != (self.dimension,) or not np.all(np.isfinite(genome)):

@@ -1,10 +1,9 @@
 """Space constraints of compound eyes: their facets share the surface of the head.
 
 A facet of the width D is a hexagon with the area (√3/2) D². All facets of all eyes have at most the area
-`eye.facet_area` together. Facets touch each other, so the local radius of an eye's surface is R = D/Δφ by construction,
-and D is never larger than R Δφ. In an acute zone, Δφ is smaller, and the surface is flatter. Eyes are less than 180
-degrees high in Mercator's projection, which `sim.hexagonal_rows` uses, because ommatidia would otherwise crowd near the
-poles.
+`eye.facet_area` together. Facets touch each other, so the local radius of an eye's surface is R = D/Δφ, where Δφ is the
+interommatidial angle. In an acute zone, Δφ is smaller, and the surface is flatter. Eyes are at most 180 degrees high in
+Mercator's projection, which `sim.hexagonal_rows` uses, because ommatidia would otherwise crowd near the poles.
 """
 
 from __future__ import annotations
@@ -23,30 +22,30 @@ Values = dict[str, float]
 Uses = Mapping[str, GeneConfig]
 DIAMETER = "facet_diameter_um"
 COUNTS = ("n_eyes", *SIDES)  # genes whose product is the number of facets
-HEXAGON = math.sqrt(3) / 2  # area of a hexagon, divided by its squared width; distance of rows of neighbours
-HIGHEST_DEG = 180.0  # height of an eye in Mercator's projection
+HEXAGON = math.sqrt(3) / 2  # area of a hexagon / its squared width, and distance of rows / distance of columns
+HIGHEST_DEG = 180.0  # maximum height of an eye in Mercator's projection
 SLACK = 1 + 1e-9  # tolerance for rounding errors
 
 
 def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     """Return the gene values after the repair of facets that do not fit on the head.
 
-    The numbers of eyes, rows and columns and the width of the facets are reduced. Among all combinations that fit and
-    lie within the searched ranges, the repair chooses the one for which the sum of the squared logarithms of their
-    ratios to the genes' values is smallest. No quantity is therefore reduced in preference to the others. Rhabdoms are
-    narrowed to the width of a facet.
+    The repair reduces the numbers of eyes, rows and columns and the width of the facets. For each combination of these
+    four quantities, take the logarithms of their ratios to the genes' values, and sum their squares. Among all
+    combinations that fit and lie within the searched ranges, the repair chooses the one with the smallest sum. No
+    quantity is therefore reduced in preference to the others. Rhabdoms are narrowed to the width of a facet.
 
     values: value of each gene, by name
     uses: searched range of each gene, by name
     """
     counts = [np.arange(lowest(name, uses), values[name] + 1) for name in COUNTS]
     eyes, rows, columns = np.meshgrid(*counts, indexing="ij")
-    room = 1e6 * np.sqrt(sizes.facet_area / (HEXAGON * eyes * rows * columns))
-    widths = np.minimum(values[DIAMETER], room)
+    widest = 1e6 * np.sqrt(sizes.facet_area / (HEXAGON * eyes * rows * columns))
+    widths = np.minimum(values[DIAMETER], widest)
     fits = (widths * SLACK >= lowest(DIAMETER, uses)) & (_height(rows, columns, values["fov_deg"]) <= HIGHEST_DEG)
-    asked = zip((eyes, rows, columns, widths), (*COUNTS, DIAMETER), strict=True)
-    moved = sum(np.log(values[name] / found) ** 2 for found, name in asked)
-    best = np.unravel_index(int(np.argmin(np.where(fits, moved, np.inf))), fits.shape)
+    reduced = zip((eyes, rows, columns, widths), (*COUNTS, DIAMETER), strict=True)
+    distances = sum(np.log(values[name] / found) ** 2 for found, name in reduced)
+    best = np.unravel_index(int(np.argmin(np.where(fits, distances, np.inf))), fits.shape)
     numbers = {name: float(found[best]) for name, found in zip(COUNTS, (eyes, rows, columns), strict=True)}
     width = float(widths[best])
     return {**values, **numbers, DIAMETER: width, RHABDOM: min(values[RHABDOM], width)}

@@ -10,7 +10,7 @@ __all__ = ["Interval"]
 
 @dataclass(frozen=True)
 class Interval:
-    """The numbers from `low` to `high`, without `low` itself if `open_low` is True."""
+    """The finite numbers from `low` to `high`, without `low` itself if `open_low` is True."""
 
     low: float
     high: float = math.inf

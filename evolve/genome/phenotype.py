@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 __all__ = ["FORMER_ENCODER", "Phenotype", "develop", "repaired"]
 
-ANNULUS_INNER = 0.5  # inner radius of an annulus, in pupil radii
+ANNULUS_INNER = 0.5  # inner radius of an annulus / its outer radius
 SLIT_ASPECT = 4.0  # height of an upright slit divided by its width
-# The width of the encoders (the first layers, one per eye) is proportional to that of the brain, so that small brains
-# have small encoders. A brain of 64 neurons has encoders of 16. Wider encoders take longer to compute, and did not
-# learn faster (docs/measurements/learning.md).
+# The number of neurons of the encoders (the first layers, one per eye) is proportional to that of the brain's layers,
+# so that small brains have small encoders. A brain of 64 neurons has encoders of 16. Wider encoders take longer to
+# compute, and animals with them did not learn faster (docs/measurements/learning.md).
 NEURONS_PER_FEATURE = 4
 OMITTED = (TIME_CONSTANT, *FACETS)  # fields that a record contains only if they have a value
 FORMER_ENCODER = 16  # width of the encoders of animals whose record does not state it
@@ -46,20 +46,32 @@ class Settings(Protocol):
 class Phenotype:
     """The eyes and the brain of an animal.
 
-    If optics is off (eyes have a perfect lens), `relative_aperture`, `relief` and `refractive_index` are all None.
-    `relief` contains N x N heights in [0, 1], row-major (y, x). For N = 4 they are control points of a bicubic B-spline
-    patch; for larger N they are heights at cell centres, interpolated by a cubic spline.
-    `aperture_shape` is an index into APERTURE_SHAPES, and `dispersion` the inverse of the relief's Abbe number.
-    `elevation_deg` is the elevation of the eyes. It is None in built-in tasks, in which eyes look along the floor.
-    `rhabdom_diameter_um` is the diameter of the rhabdoms. If it is None, receptors are squares that absorb all incident
-    light.
-    `encoder` is the width of the brain's first layers, of which there is one for each eye.
-    `lambda_max_nm` are the wavelengths at which the pigments of the receptor types absorb most. If it is None, the
-    setting `eye.receptors` of the run determines the receptors.
-    `vertical_fov_deg` is the vertical field of view. If it is None, receptors are square.
-    `time_constant_ms` is the time constant of the receptors. If it is None, they have no memory, and records omit it.
-    `facet_diameter_um`, `f_number`, `rhabdom_length_um` and `acute_zone` describe compound eyes, whose `resolution` is
-    in ommatidia. If they are None, the eyes are camera eyes, and records omit them.
+    n_eyes: number of eyes
+    placement_range_deg: arc over which the eyes are spread [deg]
+    fov_deg: an eye's horizontal field of view [deg]
+    resolution: numbers of receptors or ommatidia along the height and along the width of an eye
+    relative_aperture: pupil diameter / retina width
+    relief: N x N heights in [0, 1] of the maximum `eye.relief_height`, row-major (y, x). For N = 4 they are control
+        points of a bicubic B-spline patch; for larger N they are heights at cell centres that a cubic spline
+        interpolates
+    refractive_index: index of the relief's material at 588 nm
+    memory_frames: number of frames that the brain sees
+    neurons, layers: neurons in each hidden layer, and number of hidden layers, of actor and critic
+    aperture_shape: index into APERTURE_SHAPES
+    dispersion: 1 / Abbe number of the relief's material; 0: no dispersion
+    lambda_max_nm: wavelengths at which the pigments of the receptor types absorb most [nm]; None: the setting
+        `eye.receptors` of the run determines the receptors
+    encoder: number of neurons in each of the brain's first layers, of which there is one for each eye
+    elevation_deg: elevation of the eyes [deg]; None in built-in tasks, in which eyes look along the floor
+    rhabdom_diameter_um: diameter of the rhabdoms [µm]; None: receptors are squares that absorb all incident light
+    vertical_fov_deg: an eye's vertical field of view [deg]; None: receptors are square
+    time_constant_ms: time constant of the receptors [ms]; None: they have no memory
+    facet_diameter_um, rhabdom_length_um: width of the facets and length of the rhabdoms of compound eyes [µm]
+    f_number: focal length of a facet in air / its width
+    acute_zone: density of ommatidia in the middle of a compound eye / mean density
+
+    If eyes have a perfect lens or are compound eyes, `relative_aperture`, `relief` and `refractive_index` are None. The
+    last four fields are None for camera eyes. If they or `time_constant_ms` are None, records omit them.
     """
 
     n_eyes: int
@@ -86,7 +98,10 @@ class Phenotype:
     acute_zone: float | None = None
 
     def ommatidium(self, eye: EyeConfig) -> optics.Ommatidium | None:
-        """Return the ommatidium of compound eyes; None for camera eyes. The facet is a lens with one curved surface."""
+        """Return the ommatidium of compound eyes, whose facet is a lens with a curved front; None for camera eyes.
+
+        eye: settings of the eyes of a run, here and in the other methods
+        """
         import optics
 
         if self.facet_diameter_um is None or self.f_number is None or self.rhabdom_length_um is None:
@@ -138,7 +153,7 @@ class Phenotype:
         return self._guide(min(1e-6 * self.rhabdom_diameter_um, side), eye, eye.rhabdom_length or None)
 
     def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
-        """Return the pupil of the eyes; None for a perfect lens."""
+        """Return the pupil of the eyes; None for a perfect lens and for compound eyes."""
         import optics
 
         if self.relative_aperture is None or self.relief is None or self.refractive_index is None:
@@ -154,7 +169,11 @@ class Phenotype:
         )
 
     def eyes(self, eye: EyeConfig) -> sim.Eyes:
-        """Return the eyes for the simulation."""
+        """Return the eyes for the simulation.
+
+        Raises:
+            ValueError: a field is outside the range that `sim.Eyes` allows.
+        """
         import optics
         import sim
 
@@ -179,7 +198,13 @@ class Phenotype:
         )
 
     def eye(self, eye: EyeConfig, medium: str = "air") -> optics.Eye | sim.CompoundEye:
-        """Return one eye in the medium of a run's worlds, one of `MEDIA_OF_WORLDS`: optics and retina, or facets."""
+        """Return one eye in the medium of a run's worlds: a camera eye or a compound eye.
+
+        medium: one of `MEDIA_OF_WORLDS`, in which a camera eye is immersed; it does not change a compound eye
+
+        Raises:
+            ValueError: the medium is unknown, or a field is outside the range that `sim.Eyes` allows.
+        """
         import optics
         import sim
 
@@ -187,7 +212,10 @@ class Phenotype:
         return found if isinstance(found, sim.CompoundEye) else optics.immersed(found, optics.turbid_medium(medium))
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values for a run file."""
+        """Return the fields by name, as values that JSON can represent, for a run's record.
+
+        The last four fields and `time_constant_ms` are omitted if they are None.
+        """
         found = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
         return {name: value for name, value in found.items() if value is not None or name not in OMITTED}
 
@@ -203,9 +231,15 @@ class Phenotype:
 
 
 def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
-    """Return the phenotype of a genome with the settings of a run. Gene values with which eyes overlap are repaired.
+    """Return the phenotype of a genome with the settings of a run. Overlaps of eyes and receptors are repaired.
 
     Every genome with the right number of finite coordinates has a phenotype.
+
+    genome: coordinates of the open genes in [0, 1], (gene,); coordinates outside are clipped
+    config: settings of the run, such as a `RunConfig`
+
+    Raises:
+        ValueError: the number of coordinates differs from the number of open genes, or a coordinate is not finite.
     """
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics and not config.eye.compound
@@ -236,14 +270,18 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
 
 
 def repaired(genome: NDArray[np.float64], config: Settings) -> tuple[str, ...]:
-    """Return the names of the genes whose values the repair of overlaps changes; () for a genome without overlaps."""
-    asked = Genotype(config.genome).decode(genome)
-    fits = fitted(asked, config.genome, config.eye)
-    return tuple(name for name, value in asked.items() if fits[name] != value)
+    """Return the names of the genes whose values the repair of overlaps changes; () for a genome without overlaps.
+
+    Raises:
+        ValueError: the genome is invalid; see `develop`.
+    """
+    values = Genotype(config.genome).decode(genome)
+    fits = fitted(values, config.genome, config.eye)
+    return tuple(name for name, value in values.items() if fits[name] != value)
 
 
 def _aperture(shape: str) -> Any:
-    """Return the aperture of a named shape, in units of its radius."""
+    """Return the aperture with a name in APERTURE_SHAPES, scaled to the radius 1."""
     import optics
 
     if shape == "circle":

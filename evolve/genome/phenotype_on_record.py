@@ -21,10 +21,13 @@ LARGEST_COUNT = 4096  # largest allowed count in a field that has no gene
 
 
 def checked_fields(record: Any, names: Iterable[str]) -> dict[str, Any]:
-    """Return the fields of a phenotype, converted to the types of `Phenotype`.
+    """Return the fields of a phenotype by name, converted to the types of `Phenotype`.
+
+    names: names of all fields; a record may lack some of them
 
     Raises:
-        ValueError: a field is unknown, has another type, or lies outside its range. The message names the field.
+        ValueError: the record is not a mapping, a field is unknown, has another type or lies outside its range, or only
+            some of the fields of a pupil or of facets are None. The message names the field.
     """
     if not isinstance(record, Mapping):
         raise ValueError("phenotype: must be a table of its fields")
@@ -59,7 +62,11 @@ def _checked(name: str, value: Any) -> Any:
 
 
 def _of_gene(gene: str, key: str, value: Any) -> float | int:
-    """Return a value after checking it against the range of its gene. A field without a gene must be a count."""
+    """Return a value after a check against the range of its gene. A field without a gene must be a count.
+
+    Raises:
+        ValueError: the value has another type or lies outside the range.
+    """
     valid = ALL_GENES[gene].range if gene in ALL_GENES else Interval(1, LARGEST_COUNT)
     if gene not in ALL_GENES or ALL_GENES[gene].kind == "integer":
         return whole_number(value, key, int(valid.low), int(valid.high))

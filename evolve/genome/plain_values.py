@@ -26,7 +26,9 @@ def parsed(text: str | bytes) -> Any:
 
 
 def whole_number(value: Any, name: str, low: int, high: int) -> int:
-    """Return `value` if it is an integer within the range.
+    """Return `value` if it is an integer from `low` to `high`.
+
+    name: name of the value in messages
 
     Raises:
         ValueError: the value has another type or lies outside the range.
@@ -37,7 +39,10 @@ def whole_number(value: Any, name: str, low: int, high: int) -> int:
 
 
 def real(value: Any, name: str, valid: Interval) -> float:
-    """Return `value` as a float if it is a number within the range; rounding errors at its ends are allowed.
+    """Return `value` as a float if it is a number within the range. A float may exceed the range by rounding errors.
+
+    name: name of the value in messages
+    valid: the range; both ends belong to it, even if `open_low` is True
 
     Raises:
         ValueError: the value has another type or lies outside the range.
@@ -51,6 +56,8 @@ def real(value: Any, name: str, valid: Interval) -> float:
 
 def listed(value: Any, name: str, least: int, most: int) -> list[Any]:
     """Return `value` if it is a list with `least` to `most` entries.
+
+    name: name of the list in messages
 
     Raises:
         ValueError: the value has another type, or the list is too short or too long.

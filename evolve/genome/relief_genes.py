@@ -25,6 +25,8 @@ def representatives(points: int, symmetric: bool) -> list[str]:
 
     A symmetric relief does not change under reflection and rotation by 90°, so an eighth of its heights determines all
     of them. Only the genes of this eighth exist. Without symmetry, each height has its own gene.
+
+    points: number of heights along one side of the relief
     """
     if not symmetric:
         return doe_names(points)
@@ -35,8 +37,10 @@ def representatives(points: int, symmetric: bool) -> list[str]:
 def refined(relief: Floats, points: int) -> Floats:
     """Return the surface of a 4 x 4 patch as points x points heights at cell centres, (points²,).
 
-    The conversion is exact, because the patch is a single bicubic polynomial. The cubic spline through its heights
-    therefore reproduces it.
+    The conversion is exact: the patch is a single bicubic polynomial, which the cubic spline through its heights
+    reproduces. A relief that already has points x points heights is returned unchanged.
+
+    relief: heights in row-major order (y, x), of any shape
 
     Raises:
         ValueError: the relief has neither 4 x 4 nor points x points heights.
@@ -51,7 +55,7 @@ def refined(relief: Floats, points: int) -> Floats:
 
 
 def _basis(t: Floats) -> Floats:
-    """Return the values of the four uniform cubic B-splines in one knot interval, (t, 4).
+    """Return the values of the four uniform cubic B-splines at positions t in one knot interval [0, 1], (t, 4).
 
     Source: Piegl & Tiller, The NURBS Book, ch. 2.
     """

@@ -1,4 +1,4 @@
-"""Runs from Python and in notebooks. They use the same code and the same files as the command `evolve`.
+"""Start and analysis of runs from Python and in notebooks, with the same code and files as the command `evolve`.
 
 run_from_python  evolve.run: start and complete a run; evolve.resume: complete an interrupted run
 opened_run       evolve.Run: an opened run directory, to analyse or resume the run

@@ -37,9 +37,10 @@ class CallbackWatcher:
 
 @dataclass(frozen=True)
 class Callbacks:
-    """Watchers of a run that was started from Python.
+    """Functions that a run from Python calls, and display of its progress.
 
-    They are the callbacks and, if `progress` is True, a progress bar or lines on stderr.
+    callbacks: functions that are called as callback(run, candidate) after every evaluated candidate
+    progress: True to show a progress bar, or lines if stderr is not a terminal
 
     Raises:
         ConfigError: the callbacks are not a list of functions.
@@ -57,8 +58,10 @@ class Callbacks:
         """Continue a locked run to its end. If a callback raises an exception, the run stops and can be resumed.
 
         Raises:
-            RunError: the record cannot be written, or the search proposes other candidates than those on record.
-            ExecutorError: no candidate can be evaluated.
+            RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
+            ExecutorError: no worker can evaluate candidates.
+            ConfigError: the optimizer is unknown, or cannot be used here.
+            OSError: a file of the run cannot be read or written.
         """
         with voices(patient=True):
             carry_on(run, self._watched)

@@ -28,7 +28,12 @@ def eye_picture(phenotype: Phenotype, config: EyeConfig, medium: str = "air") ->
     The PSF is drawn on a logarithmic scale, with the outline of a receptor. For a perfect lens, only the fields of view
     are drawn. For compound eyes, the acceptance function is drawn instead of relief and PSF.
 
-    medium: medium of the run's worlds
+    phenotype, config: the animal, and the settings of its run's eyes
+    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
+
+    Raises:
+        optics.AccuracyError: the PSF cannot be computed accurately enough.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     eye = phenotype.eye(config, medium)
     count = 2 if isinstance(eye, CompoundEye) else 1 if eye.pupil is None else 3

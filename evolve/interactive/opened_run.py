@@ -36,7 +36,11 @@ __all__ = ["OpenedCandidate", "OpenedRun"]
 
 @dataclass(frozen=True, repr=False)
 class OpenedCandidate(Candidate):
-    """A candidate of an opened run, with the settings that all eyes of the run have in common."""
+    """A candidate of an opened run, with the settings that are needed to show its eyes.
+
+    eye: settings shared by all eyes of the run
+    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
+    """
 
     eye: EyeConfig = field(default_factory=EyeConfig)
     medium: str = "air"
@@ -55,7 +59,15 @@ class OpenedCandidate(Candidate):
         return Candidate(**{f.name: getattr(self, f.name) for f in fields(Candidate)}).to_line()
 
     def show_eye(self) -> Figure:
-        """Return a figure of the eyes' fields of view around the head, and of the relief and PSF of the pupil."""
+        """Return a figure of the eyes' fields of view around the head, and of the relief and PSF of the pupil.
+
+        For a perfect lens, only the fields of view are drawn. For compound eyes, the acceptance function is drawn
+        instead of relief and PSF.
+
+        Raises:
+            optics.AccuracyError: the PSF cannot be computed accurately enough.
+            optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        """
         from evolve.interactive.eye_picture import eye_picture
 
         return eye_picture(self.phenotype, self.eye, self.medium)
@@ -69,7 +81,7 @@ class OpenedRun(Run):
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate with the highest fitness (the earliest of equals); None before a candidate has succeeded."""
+        """Candidate with the highest fitness, or the earliest of several; None before a candidate has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 
@@ -77,7 +89,7 @@ class OpenedRun(Run):
         """Return the candidate with this id; if the id is None, the best candidate.
 
         Raises:
-            RunError: the candidate has not been evaluated, or, for None, no candidate has succeeded.
+            RunError: no evaluated candidate has this id, or, for None, no candidate has succeeded.
         """
         return OpenedCandidate.of_run(super().candidate(candidate_id), self)
 
@@ -90,6 +102,7 @@ class OpenedRun(Run):
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ValueError: the eyes that the task places differ from those of the candidate.
+            OSError: the policy's file cannot be read.
         """
         from evolve.analysis.recorder import trained_policy
         from evolve.learning.animal_task import with_phenotype
@@ -107,7 +120,10 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: the run has no test set, or the user has not named the code of its task.
+            ConfigError: the run has no test set, or the user task was not named when the run was opened, or fails.
+            ValueError: `episodes` is below 1, or `seed` is negative.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            OSError: the policy's file cannot be read.
         """
         from evolve.analysis.held_out import held_out_episodes
 
@@ -117,12 +133,14 @@ class OpenedRun(Run):
         """Continue an interrupted run to its end. A finished run stays unchanged. See `evolve.run` for the arguments.
 
         Raises:
-            LockedError: another process works on the run.
-            RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or
-                the run has a format that is too old to be continued.
+            LockedError: another process is working on the run.
+            RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, its
+                format is too old, or the search proposes candidates that differ from those on record.
             ConfigError: the user task was not named when the run was opened, or fails at its start; or callbacks are
                 not functions.
-            BackendError: Dr.Jit cannot find a usable LLVM library.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            ExecutorError: no worker can evaluate candidates.
+            OSError: a file of the run cannot be read or written.
         """
         watchers = Callbacks(callbacks, progress)
         with resuming(self) as unfinished:
@@ -130,20 +148,23 @@ class OpenedRun(Run):
                 watchers.carry_on(self)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a table with one row per candidate: its outcome, and the values of all genes that it expresses."""
+        """Return a table with one row per candidate: its outcome, its acuities, and the values of its genes.
+
+        For a failed candidate, fitness, task fitness and costs are NaN, and `failure` contains the reason.
+        """
         return candidate_table(self.candidates)
 
     def drift(self, searches: int = 200) -> pd.DataFrame:
         """Return a table that compares the last generations of the run with simulated searches with random fitness.
 
-        There is a row for each open gene, for the acuity, and for the number of receptors. It contains the mean of the
-        run, the median and the 95 % range of the searches with random fitness, and the p-value of the run's mean.
+        There is a row for each open gene, for the acuity, and for the number of receptors. Each row contains the mean
+        of the run, the median and the 95 % range of the searches, and the p-value of the run's mean.
 
         searches: number of searches with random fitness
 
         Raises:
             RunError: no generation is complete yet.
-            ValueError: `searches` is below 2.
+            ValueError: `searches` is below 2 or above 100,000.
         """
         from evolve.interactive.table import drift_table
         from evolve.report.gene_drift import drift_of
@@ -151,11 +172,11 @@ class OpenedRun(Run):
         return drift_table(drift_of([self], searches))
 
     def plot_fitness(self, axes: Axes | None = None) -> Axes:
-        """Plot fitness over the generations: all candidates, the median of each generation, and the best so far.
+        """Plot fitness over the generations, and return the axes.
 
-        Return the axes.
+        The plot shows all successful candidates, the median of each generation, and the best fitness so far.
 
-        axes: axes to draw on; None: new ones
+        axes: axes to draw on; None: new axes
         """
         from matplotlib import pyplot
         from matplotlib.ticker import MaxNLocator
@@ -178,6 +199,9 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the best candidate's policy is missing or damaged.
+            ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            OSError: a file cannot be read or written.
         """
         from evolve.report.write import write
 
@@ -207,8 +231,10 @@ class OpenedRun(Run):
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set,
-                or the code of the user task has not been named when the run was opened.
+                or the user task was not named when the run was opened, or fails.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            OSError: a file cannot be read or written.
         """
         from evolve.report.replay import write_replay
 
@@ -223,14 +249,15 @@ class OpenedRun(Run):
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
-        every: number of actions from one file to the next
+        every: number of actions from one recorded moment to the next
         out: folder of the files; None: `exr` in the run directory
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, or the code of the user task has not been named when the run was
-                opened.
+            ConfigError: an argument is invalid, or the user task was not named when the run was opened, or fails.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
+            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            OSError: a file cannot be read or written.
         """
         from evolve.report.exr_export import export_run
 
@@ -241,14 +268,22 @@ class OpenedRun(Run):
 
 
 def _seed(seed: Any) -> int:
-    """Return the seed of an episode after a check."""
+    """Return the seed of an episode after a check.
+
+    Raises:
+        ConfigError: `seed` is not a whole number, or is negative.
+    """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ConfigError(f"seed = {quoted(seed)}: must be a whole number, 0 or more")
     return int(seed)
 
 
 def _path(out: Any) -> Path | None:
-    """Return the path of a file or folder after a check."""
+    """Return the path of a file or folder after a check; None for None.
+
+    Raises:
+        ConfigError: `out` is not a path.
+    """
     if not isinstance(out, str | os.PathLike | NoneType):
         raise ConfigError(f"out = {quoted(out)}: must be a path")
     return None if out is None else Path(out)

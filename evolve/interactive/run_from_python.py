@@ -36,21 +36,25 @@ def run(
     A run that was started from Python has the same files as one that was started with the command. `evolve status`,
     `evolve resume` and `evolve report` can therefore be used with both.
 
-    task: task for which eyes evolve: a name, or "FILE.py:CLASS" of a user task; None: the task that the preset names
+    task: task for which eyes evolve: a name, or "FILE.py:CLASS" of a user task; None: the task that the preset or the
+        settings name
     preset: settings to start from: "quick" (minutes), "paper" (a day), or an experiment
     settings: settings by dotted name, such as {"search.generations": 2, "seed": 1}; they override all other settings
     config: TOML file with settings, which override those of the preset
-    scale: size of an experiment: "laptop" or "paper"
-    start_from: "RUN:ID" of an animal of another run, whose genes are the start values
-    out: run directory; None: runs/TASK-PRESET-N
+    scale: scale of an experiment: "laptop" or "paper"; None: "laptop"
+    start_from: "RUN:ID" of an animal of another run, whose genes are the start values; None: the default values
+    out: run directory; None: runs/TASK-PRESET-N, with the first free number N
     callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
         the run
     progress: True to print the progress to stderr
 
     Raises:
-        ConfigError: a setting or an argument is invalid; the message is one line.
-        RunError: the directory is not empty, or cannot be written.
-        BackendError: Dr.Jit cannot find a usable LLVM.
+        ConfigError: a setting or an argument is invalid, or the user task fails; the message is one line.
+        RunError: the directory is not empty or cannot be written, or the animal of `start_from` does not exist.
+        LockedError: another process is creating a run in the directory.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        ExecutorError: no worker can evaluate candidates.
+        OSError: a file of the run cannot be read or written.
     """
     _check(task=task, preset=preset, settings=settings, config=config, scale=scale, start_from=start_from, out=out)
     watchers = Callbacks(callbacks, progress)
@@ -75,7 +79,8 @@ def resume(
 
     directory: directory of a run that was started with the command or from Python
     task: "FILE.py:CLASS" if the run has a user task, whose code runs only if you name it here; else None
-    before_damage: True to continue from the lines of the record before the first damaged one; a copy is kept
+    before_damage: True to continue from the lines of the record before the first damaged line, and to keep a copy of
+        the damaged record
     callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
         the run
     progress: True to print the progress to stderr
@@ -83,9 +88,12 @@ def resume(
     Raises:
         ConfigError: an argument or the configuration is invalid, or the user task has not been named, has changed or
             fails; the message is one line.
-        RunError: the run does not exist or has a former format, or its record is damaged or cannot be written.
-        LockedError: another process works on the run.
-        BackendError: Dr.Jit cannot find a usable LLVM.
+        RunError: the run does not exist, its format is too old, its record is damaged or cannot be written, or the
+            search proposes candidates that differ from those on record.
+        LockedError: another process is working on the run.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        ExecutorError: no worker can evaluate candidates.
+        OSError: a file of the run cannot be read.
     """
     _check(directory=directory, task=task)
     opened = OpenedRun.open(directory, task, before_damage)
@@ -106,7 +114,7 @@ RIGHT: Mapping[str, tuple[Any, str]] = {
 
 
 def _check(**given: Any) -> None:
-    """Check the types of arguments, by name.
+    """Check the types of the arguments in `given`, by their names.
 
     Raises:
         ConfigError: an argument has the wrong type.
@@ -122,8 +130,11 @@ def _toml(value: Any) -> str:
 
     The text is written as JSON, because JSON and TOML write numbers, texts, true and false in the same way. NumPy
     values are converted to Python values.
+
+    Raises:
+        ConfigError: the value is neither a number, nor text, nor true or false.
     """
     try:
         return json.dumps(value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value)
     except TypeError:
-        raise ConfigError(f"settings hold {quoted(value)}: must be numbers, texts, true or false") from None
+        raise ConfigError(f"settings contain {quoted(value)}: must be numbers, texts, true or false") from None

@@ -17,7 +17,7 @@ SHOWN = 12  # number of the latest generations that are shown
 
 
 def run_as_html(run: Run) -> Html:
-    """Return a summary of a run and of its latest generations."""
+    """Return HTML tables of a run's progress and best fitness, and of its latest generations."""
     facts = {
         "task": run.config.task,
         "candidates": f"{len(run.candidates)} of {run.config.candidates} evaluated",
@@ -31,7 +31,7 @@ def run_as_html(run: Run) -> Html:
 
 
 def animal_as_html(candidate: Candidate) -> Html:
-    """Return a summary of a candidate's outcome and phenotype."""
+    """Return an HTML table with a candidate's outcome, eyes and brain."""
     animal = candidate.phenotype
     height, width = animal.resolution
     facts = {

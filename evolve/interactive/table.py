@@ -23,8 +23,9 @@ OUTCOME = ("generation", "index", *FITNESS, "success_rate", "steps", "seconds", 
 def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
     """Return a table with one row per candidate, indexed by its id.
 
-    The columns are the outcome, the acuities [cycles/degree], and the values of all genes that the animal expresses.
-    For a failed candidate, fitness, task fitness and costs are NaN, and `failure` contains the reason.
+    The columns are the outcome, the acuities [cycles/degree], and the values of all genes that an animal expresses.
+    Genes that an animal lacks are NaN. For a failed candidate, fitness, task fitness and costs are NaN, and `failure`
+    contains the reason.
     """
     import pandas as pd
 

@@ -1,6 +1,6 @@
 """Adam on a single vector of all weights. A step therefore needs only a few operations, not a few for each tensor.
 
-torch.optim would need ten times more calls. Its first use also imports torch's compiler, which takes seconds in
+torch.optim would need ten times as many calls. Its first use also imports torch's compiler, which takes seconds in
 every worker process.
 """
 
@@ -19,14 +19,17 @@ EPSILON = 1e-5  # the value that stable-baselines3 uses in PPO
 class Adam:
     """Adam (Kingma and Ba 2015, algorithm 1), with the interface that stable-baselines3 needs.
 
-    All parameters are views of one vector, and all gradients are views of another. They must therefore be changed in
+    All parameters become views of one vector, and all gradients views of another. They must therefore be changed in
     place.
+
+    parameters: parameters to optimise
+    lr: step size
     """
 
     def __init__(self, parameters: Iterable[nn.Parameter], lr: float) -> None:
         self.parameters = list(parameters)
         self.param_groups: list[dict[str, Any]] = [{"lr": lr, "params": self.parameters}]
-        # Not torch.cat, which imports torch's compiler on the "meta" device of `load_policy`.
+        # torch.cat is avoided, because it imports torch's compiler on the "meta" device of `load_policy`.
         self.values = self.parameters[0].new_empty(sum(p.numel() for p in self.parameters), requires_grad=False)
         self.gradient = torch.zeros_like(self.values)
         self.mean, self.square = torch.zeros_like(self.values), torch.zeros_like(self.values)
@@ -55,7 +58,7 @@ class Adam:
         self.values.addcdiv_(self.mean, spread, value=-self.param_groups[0]["lr"] / unbias_mean)
 
     def state_dict(self) -> dict[str, Tensor | int]:
-        """Return the state that later steps need in addition to the parameters."""
+        """Return the state that later steps need in addition to the parameters: "mean", "square" and "steps"."""
         return {"mean": self.mean, "square": self.square, "steps": self.steps}
 
     @torch.no_grad()

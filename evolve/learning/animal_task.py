@@ -1,4 +1,4 @@
-"""The run's task with one animal in it. No other module converts a task's name to an object."""
+"""Task of a run with one animal in it. No other module converts a task's name to an object."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def animal_task(
         task = with_phenotype(executed_task(code, config.world.encoded_textures), phenotype, config, eyes)
         return batched(task).in_mode(mode)
     eyes, layout = eyes or phenotype.eyes(config.eye), getattr(config.world, mode)
-    asked = requested_fidelity(config.eye.rays_per_receptor, eyes)
-    built_in = task_of(build_world(config.task, **layout), mode, eyes=eyes, fidelity=asked or AUTO)
+    fidelity = requested_fidelity(config.eye.rays_per_receptor, eyes)
+    built_in = task_of(build_world(config.task, **layout), mode, eyes=eyes, fidelity=fidelity or AUTO)
     built_in.vary = config.world.vary
     return built_in
 
@@ -62,7 +62,7 @@ def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes
     """Return a user task with this animal in it.
 
     The eyes are rendered with the run's setting `eye.rays_per_receptor`. If this setting is "auto", the task's own
-    fidelity is used.
+    fidelity is used, with the run's number of bands. A medium other than air replaces the task's own.
 
     eyes: eyes that replace the animal's own
 

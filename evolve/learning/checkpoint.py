@@ -23,8 +23,8 @@ class Checkpoint:
     """State of a training run.
 
     steps: number of training steps so far
-    curve: (steps, mean return of the evaluation episodes) at each evaluation so far
-    unit: unit of rewards, by which the learner's rewards are divided
+    curve: (steps, mean return) of each evaluation so far
+    unit: number by which the learner divides rewards
     now: current values of all tensors that learning changes
     best: values of the same tensors at the evaluation with the highest mean return
     adam: state of the optimizer: mean, square, steps
@@ -42,6 +42,9 @@ def save_checkpoint(checkpoint: Checkpoint, path: Path, owner: Mapping[str, Any]
     """Write a checkpoint as safetensors, completely or not at all. Numbers are stored in its metadata.
 
     owner: the training run from which the checkpoint comes, see `TrainingRung.owners`
+
+    Raises:
+        OSError: the file cannot be written.
     """
     parts = {"now": checkpoint.now, "best": checkpoint.best, "adam": checkpoint.adam}
     tensors = {
@@ -61,8 +64,8 @@ def load_checkpoint(path: Path, owner: Mapping[str, Any]) -> Checkpoint | None:
     Nothing in the file is executed.
 
     Raises:
-        CheckpointError: the file is damaged, or belongs to another owner.
-        StrangeFileError: the path is a link, FIFO or directory.
+        CheckpointError: the file is damaged or unreadable, or belongs to another owner.
+        StrangeFileError: the path is a link, FIFO or directory, or the file is too large.
     """
     found = read_owned(path, owner)
     if found is None:
@@ -85,7 +88,11 @@ def load_checkpoint(path: Path, owner: Mapping[str, Any]) -> Checkpoint | None:
 
 
 def _require_possible(checkpoint: Checkpoint) -> None:
-    """Check that training can have ended in this state."""
+    """Check that training can have ended in this state.
+
+    Raises:
+        CheckpointError: the steps, the learning curve or the unit of rewards are impossible.
+    """
     at = [0, *(steps for steps, _ in checkpoint.curve)]
     if at != sorted(set(at)) or not 0 < checkpoint.steps == at[-1]:
         raise CheckpointError("its steps and its learning curve are impossible")

@@ -1,6 +1,6 @@
-"""Files of checkpoints: each contains its owner and a checksum. Files that cannot be used are set aside.
+"""Files of checkpoints: each contains its owner and a checksum. Files that cannot be used are renamed.
 
-The owner is the training run from which the checkpoint comes, see `TrainingRung.owner`. This module does not import
+The owner is the training run from which the checkpoint comes, see `TrainingRung.owners`. This module does not import
 torch, so that the main process can check a file before a worker loads it.
 """
 
@@ -18,7 +18,7 @@ from evolve.store.regular_files import StrangeFileError, read, sync_folder
 
 __all__ = ["CheckpointError", "CheckpointWarning", "metadata_of", "owned", "read_owned", "set_aside"]
 
-LENGTH_BYTES = 8  # size of the number at the start of a safetensors file, which is the length of its header [bytes]
+LENGTH_BYTES = 8  # [bytes] size of the number at the start of a safetensors file, which is the length of its header
 ENTRY = "training"  # entry of the metadata with all numbers; safetensors writes several entries in random order
 BLANK = "0" * 64  # text that stands in for the checksum while it is computed
 OTHERS = {"rung": "another rung", "ends": "rungs of other lengths", "settings": "other settings"}
@@ -29,11 +29,13 @@ class CheckpointError(ValueError):
 
 
 class CheckpointWarning(UserWarning):
-    """A checkpoint has been set aside, and its candidate is trained again."""
+    """A checkpoint that cannot be used was renamed; training starts from an earlier checkpoint or the beginning."""
 
 
 def metadata_of(content: bytes) -> dict[str, str]:
-    """Return the metadata in the header of a safetensors file.
+    """Return the metadata in the header of a safetensors file; {} if it has none.
+
+    content: content of the file
 
     Raises:
         ValueError: the header is not JSON.
@@ -44,15 +46,15 @@ def metadata_of(content: bytes) -> dict[str, str]:
 
 
 def owned(owner: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, str]:
-    """Return the metadata of a checkpoint: its owner, `numbers` and a placeholder.
-
-    `sealed` replaces the placeholder by the checksum.
-    """
+    """Return the metadata of a checkpoint: its owner, `numbers`, and a placeholder that `sealed` replaces."""
     return {ENTRY: json.dumps({**numbers, "owner": owner, "sha256": BLANK})}
 
 
 def sealed(content: bytes) -> bytes:
-    """Return a safetensors file with the metadata of `owned`, after inserting the checksum of all its other bytes."""
+    """Return the content of a safetensors file with its checksum in place of the placeholder of `owned`.
+
+    content: content with the placeholder, from which the checksum is computed
+    """
     return _with_checksum(content, BLANK, hashlib.sha256(content).hexdigest())
 
 
@@ -61,7 +63,7 @@ def read_owned(path: Path, owner: Mapping[str, Any]) -> tuple[bytes, dict[str, A
 
     Raises:
         CheckpointError: the file is damaged or unreadable, has no checksum, or belongs to another owner.
-        StrangeFileError: the path is a link, FIFO or directory.
+        StrangeFileError: the path is a link, FIFO or directory, or the file is too large.
     """
     try:
         content = read(path)
@@ -77,7 +79,7 @@ def read_owned(path: Path, owner: Mapping[str, Any]) -> tuple[bytes, dict[str, A
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise CheckpointError("it is damaged, or not a checkpoint") from None
     if checksum == "":
-        raise CheckpointError("it has no checksum, as in former versions")
+        raise CheckpointError("it has no checksum, because an older version wrote it")
     if not isinstance(checksum, str) or re.fullmatch("[0-9a-f]{64}", checksum) is None:
         raise CheckpointError("it is damaged (its checksum has a wrong form)")
     if hashlib.sha256(_with_checksum(content, checksum, BLANK)).hexdigest() != checksum:
@@ -87,7 +89,12 @@ def read_owned(path: Path, owner: Mapping[str, Any]) -> tuple[bytes, dict[str, A
 
 
 def set_aside(path: Path, reason: CheckpointError) -> None:
-    """Rename a checkpoint that cannot be used, and warn of it in one line.
+    """Rename a checkpoint that cannot be used, so that its candidate is trained again.
+
+    reason: error whose message states why the checkpoint cannot be used
+
+    Warns:
+        CheckpointWarning: always; the message is one line with the reason and the new name.
 
     Raises:
         OSError: the file cannot be renamed.

@@ -1,4 +1,4 @@
-"""Normal distribution of a policy's actions. Gradients never move its means further beyond the bounds."""
+"""Normal distribution of a policy's actions. Gradients never move its mean further beyond the bounds of actions."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from torch import Tensor, nn
 
 
 class Within(torch.autograd.Function):
-    """Means of actions. Their gradients never move them further beyond the bounds -1 and 1.
+    """Identity function on the means of actions. Its gradient never moves a mean further beyond the bounds -1 and 1.
 
     Actions beyond the bounds are clipped. If the mean is far outside, all actions are clipped to the same value.
-    Exploration then has no effect, and no gradient would move the mean back (Hausknecht and Stone 2016, section 5.2,
-    "zeroing gradients").
+    Exploration then has no effect, and no gradient would move the mean back. The remedy is "zeroing gradients"
+    (Hausknecht and Stone 2016, section 5.2).
     """
 
     @staticmethod
@@ -30,9 +30,10 @@ class Within(torch.autograd.Function):
 
 
 class Gaussian(DiagGaussianDistribution):
-    """SB3's distribution of actions, which here receives its initial logarithmic spread as a constant.
+    """SB3's normal distribution of actions, whose logarithmic standard deviation is created without arithmetic.
 
-    Arithmetic on the "meta" device of `load_policy` would import torch's compiler, which takes a second.
+    SB3 multiplies a tensor of ones by the initial value. On the "meta" device of `load_policy`, arithmetic would import
+    torch's compiler, which takes a second.
     """
 
     def proba_distribution_net(self, latent_dim: int, log_std_init: float = 0.0) -> tuple[nn.Module, nn.Parameter]:

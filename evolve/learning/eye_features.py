@@ -1,13 +1,13 @@
-"""Encoder of the eyes' signals for actor and critic: a multilayer perceptron per eye over a memory of frames.
+"""Encoder of the eyes' signals for actor and critic: a multilayer perceptron for each eye over a memory of frames.
 
 Each eye has its own weights, unless `wiring.shared_encoder` is set. The same encoder is applied to each frame in
-memory: three layers of width w map the signals of a frame to its code of w numbers. One further layer then maps the
-codes of all frames, `memory` x w numbers, to the w features of the eye. The features of all eyes are joined with the
-other entries of the observation: proprioception and the previous action.
+memory: three layers of width w map the signals of a frame to a code of w numbers. One further layer then maps the codes
+of all frames, `memory` x w numbers, to the w features of the eye. The features of all eyes are joined with the other
+entries of the observation: proprioception and the previous action.
 
 Units are leaky rectifiers. With tanh, the agent needed a third more samples to learn detection, and each unit took ten
-times longer to compute. The receptors adapt: the first layer subtracts the running mean of the signals, and divides by
-their running spread. Mean and spread are measured during learning.
+times as long to compute. Receptors adapt: the first layer subtracts the running mean of the signals, and divides by
+their running standard deviation. Both are measured during learning.
 """
 
 from __future__ import annotations
@@ -36,7 +36,10 @@ UNITS = nn.LeakyReLU  # units of all hidden layers; the gradient of a leaky unit
 
 
 class Felt(nn.Module):
-    """Normalisation of proprioception: each element by its own running mean and spread (Welford 1962)."""
+    """Normalisation of proprioception: each element by its own running mean and standard deviation (Welford 1962).
+
+    Normalised elements are clipped to [-FARTHEST, FARTHEST].
+    """
 
     def __init__(self, size: int) -> None:
         super().__init__()
@@ -49,7 +52,7 @@ class Felt(nn.Module):
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
-        """Update mean and spread with observations (sample, number)."""
+        """Update the running mean and variance with further observations (sample, number)."""
         share = x.shape[0] / (self.seen + x.shape[0])
         deviation = x - self.mean
         step = deviation.mean(dim=0)
@@ -59,18 +62,24 @@ class Felt(nn.Module):
 
 
 class EyeFeatures(BaseFeaturesExtractor):
-    """Features of an observation: `width` numbers for each eye, followed by the observation's other entries.
+    """Module that returns the features of observations: `width` numbers for each eye, then the other entries.
 
     All layers have the same width. An observation may have one of two forms, which give the same features. Environments
     return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each frame once:
     `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number of steps
-    since the first frame of the episode. Samples are then (step, segment) flattened.
+    since the first frame of the episode. The samples are then the pairs (step, segment) in row-major order.
 
     Frames of a compound eye have the axes (ommatidium, channel) instead of (eye, channel, height, width). Two layers of
     `hexagonal_layers` come before the encoder, and all ommatidia of the observation count as one eye.
 
     At the start of an episode, the memory is not yet full. As in sim's environments, the first frame of the episode
     fills the missing places.
+
+    width: number of units in each layer of the encoders, and number of features of an eye
+    wiring: connections between the receptors and the encoders
+
+    Raises:
+        ValueError: `wiring` pools or repeats the signals of a compound eye.
     """
 
     def __init__(self, observation_space: spaces.Dict, width: int, wiring: WiringConfig = DIRECT) -> None:
@@ -111,7 +120,7 @@ class EyeFeatures(BaseFeaturesExtractor):
         return torch.cat([features, *(known[name] for name in self.beside)], dim=1)
 
     def _less_mean(self, observation: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Return the entries that a policy normalises, in normalised form."""
+        """Return the entries that a policy normalises, in normalised form, by name; {} if there are none."""
         if self.felt is None:
             return {}
         joined = self.felt(torch.cat([observation[name] for name in self.normalised], dim=-1))
@@ -127,10 +136,10 @@ class EyeFeatures(BaseFeaturesExtractor):
         return self.grid(frames).reshape(-1, self.n_eyes, self.n_inputs).permute(1, 2, 0)
 
     def adapt(self, frames: Tensor, beside: Mapping[str, Tensor] | None = None) -> None:
-        """Update the running means and spreads with further observations.
+        """Update the running means and variances of the inputs with further observations.
 
-        frames: frames, (..., eye, channel, height, width), for the receptors
-        beside: other entries of the observations by name, (..., number), for their normalisation
+        frames: frames of the eyes, (..., eye, channel, height, width), or (..., ommatidium, channel) of a compound eye
+        beside: other entries of the observations by name, (..., number); None: their normalisation does not change
         """
         if isinstance(self.grid, HexagonalLayers):
             self.grid.adapt(frames)

@@ -19,7 +19,7 @@ __all__ = ["UnfitPolicy", "final_episodes", "require_fit", "require_test_set"]
 
 
 class UnfitPolicy(ValueError):
-    """The policy belongs to an animal with different eyes."""
+    """A policy belongs to an animal whose eyes differ from those of the animal that should use the policy."""
 
 
 def final_episodes(
@@ -27,15 +27,17 @@ def final_episodes(
 ) -> Episodes:
     """Play evaluation episodes in the mode "test". The same arguments give the same episodes.
 
-    A run with `world.layouts = "family"` has a set of layouts for this mode. In other runs, the episodes take place in
-    the worlds of the evaluation, with other starts.
+    A run with `world.layouts = "family"` has a set of layouts for this mode. In other runs with built-in tasks, the
+    episodes take place in the worlds of the evaluation, with other starts.
 
     seed: seed of the episodes
     episodes: number of episodes; None: `evaluation.episodes`
 
     Raises:
-        ConfigError: the user task was not named when the run was opened, or its start fails.
-        TrainingDiverged: the policy's actions are not finite.
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ValueError: `episodes` is below 1, or `seed` is negative.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        TrainingDiverged: the policy's actions, or the returns, are not finite.
         UnfitPolicy: the policy was trained with different eyes.
     """
     count = config.evaluation.episodes if episodes is None else episodes
@@ -49,7 +51,7 @@ def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
     """Check that a policy was trained with the eyes of these worlds.
 
     Raises:
-        UnfitPolicy: it was not.
+        UnfitPolicy: the shape of the eyes' signals differs.
     """
     own, here = (space["eyes"].shape for space in (policy.observation_space, worlds.observation_space))
     if own != here:
@@ -57,10 +59,12 @@ def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
 
 
 def require_test_set(config: RunConfig) -> None:
-    """Check that the mode "test" differs from the evaluation. User tasks pass, because they may define such a mode.
+    """Check that the worlds of the mode "test" differ from those of the evaluation.
+
+    User tasks pass the check, because they may define such a mode.
 
     Raises:
-        ConfigError: the task has no layouts, or the run has fixed ones.
+        ConfigError: the task has no family of layouts, or the layouts of the run are fixed.
     """
     if config.card.has_file or config.world.layouts == FAMILY:
         return

@@ -33,21 +33,29 @@ def evaluate(
 ) -> Evaluation:
     """Train one candidate, write its policy, and measure its fitness.
 
-    On one machine, the same arguments give the same outcome. If learning diverges, a failed Evaluation is returned.
-    Checkpoints that cannot be used are set aside with a CheckpointWarning, and have no effect on the outcome.
+    On one machine, the same arguments give the same outcome, apart from the time. If learning diverges, a failed
+    Evaluation is returned. Checkpoints that cannot be used are renamed, and have no effect on the outcome.
 
     seed: seed of the policy's initial weights, of all worlds and of all random numbers in learning
     policy_path: path of the trained policy (safetensors), which is not written if learning diverged
-    progress: function that is called with (steps trained, steps planned) after every rollout
+    progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
     rung: rung at whose end training stops, with the checkpoints of earlier rungs (`evolve.search.successive_halving`);
         None: train to the end
+
+    Warns:
+        CheckpointWarning: a checkpoint cannot be used.
+
+    Raises:
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        OSError: the policy or a checkpoint cannot be written.
     """
     began, failures = time.perf_counter(), Counter[str]()
     try:
         if rung is None:
-            training, episodes = _live(phenotype, config, seed, failures, progress)
+            training, episodes = _train_and_play(phenotype, config, seed, failures, progress)
         else:
-            training, episodes = _live_until(rung, phenotype, config, seed, failures, progress)
+            training, episodes = _train_to_rung(rung, phenotype, config, seed, failures, progress)
     except TrainingDiverged as error:
         diverged = Evaluation.failed(str(error), time.perf_counter() - began)
         return replace(diverged, episode_failures=most_frequent(failures))
@@ -63,7 +71,7 @@ def evaluate(
     )
 
 
-def _live_until(
+def _train_to_rung(
     rung: TrainingRung,
     phenotype: Phenotype,
     config: RunConfig,
@@ -87,20 +95,20 @@ def _live_until(
             break
     for number in range(first, rung.number + 1):
         learning = replace(config.learning, total_steps=rung.ends[number])
-        # `rungs=1`: the rung must not be divided further, because its parts could be shorter than a rollout.
-        life = replace(config, learning=learning, search=replace(config.search, rungs=1))
+        # With `rungs` unchanged, the check of the settings could refuse a rung as shorter than a rollout.
+        shorter = replace(config, learning=learning, search=replace(config.search, rungs=1))
         entropy = [seed, number] if number else seed  # the first rung starts like an undivided training run
         try:
-            training, episodes = _live(phenotype, life, entropy, failures, progress, begun)
+            training, episodes = _train_and_play(phenotype, shorter, entropy, failures, progress, begun)
         except CheckpointError as error:  # the file is sound, but comes from a version with another network
             set_aside(rung.checkpoints[number - 1], error)
-            return _live_until(rung, phenotype, config, seed, failures, progress)
+            return _train_to_rung(rung, phenotype, config, seed, failures, progress)
         begun = training.end
         save_checkpoint(begun, rung.checkpoints[number], owners[number])
     return training, episodes
 
 
-def _live(
+def _train_and_play(
     phenotype: Phenotype,
     config: RunConfig,
     entropy: int | list[int],
@@ -114,19 +122,19 @@ def _live(
     `failures`, even if learning diverges.
 
     entropy: seed of all random numbers
-    begun: checkpoint from which to continue
+    begun: checkpoint from which to continue; None: train from the start
+
+    Raises:
+        TrainingDiverged: rewards, loss, weights, actions or returns are not finite.
+        CheckpointError: `begun` does not have the tensors of this policy.
     """
     weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
-    places = worlds_of(phenotype, config, *seeds)
-    with (
-        closing(places.training) as lessons,
-        closing(places.selection) as checkpoints,
-        closing(places.fitness) as finals,
-    ):
+    envs = worlds_of(phenotype, config, *seeds)
+    with closing(envs.training), closing(envs.selection), closing(envs.fitness):
         brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder, config.wiring)
         try:
-            training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
-            return training, play(training.policy, finals, seeds[1])
+            training = train(Worlds(envs.training, envs.selection), brain, config.learning, weights, progress, begun)
+            return training, play(training.policy, envs.fitness, seeds[1])
         finally:
-            for worlds in (lessons, checkpoints, finals):
+            for worlds in (envs.training, envs.selection, envs.fitness):
                 failures.update(worlds.failures)

@@ -2,8 +2,8 @@
 
 A unit of the first layer receives the signals of seven ommatidia: a central one and its six neighbours. A unit of the
 second layer receives the outputs of seven units of the first layer in the same way. The centres are chosen so that
-every ommatidium is in at least one neighbourhood, which reduces the number of places to about a quarter in each layer.
-The directions may be any set; on a hexagonal lattice the neighbourhoods are hexagons.
+every ommatidium is in at least one neighbourhood. On a hexagonal lattice, neighbourhoods are hexagons, and each layer
+reduces the number of places to about a quarter. Other sets of directions are also possible.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from sim.eyes.viewing_directions import unit_directions
 __all__ = ["HexagonalLayers", "directions_from_record", "neighbourhoods"]
 
 NEIGHBOURS = 7  # a place and its six neighbours
-WIDTHS = 8, 16  # choice: numbers of units of the two layers at each place
+WIDTHS = 8, 16  # choice: number of units at each place, in the first and the second layer
 
 
 class SharedAdaptation(AdaptedLinear):
-    """AdaptedLinear with the same weights and the same spread at all places, so that noise in the dark stays small."""
+    """AdaptedLinear with the same variance at all places, so that noise at dark places is not amplified."""
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
-        """Update means and spread with further signals, (place, inputs, sample)."""
+        """Update the means and the variance with further signals, (place, inputs, sample)."""
         super().adapt(x)
         self.variance.copy_(self.variance.mean(dim=0, keepdim=True).expand_as(self.variance))
 
@@ -38,10 +38,11 @@ class SharedAdaptation(AdaptedLinear):
 class HexagonalLayers(nn.Module):
     """Map of frames (..., ommatidium, channel) to features (sample, feature).
 
-    directions: viewing directions, (ommatidium, 3)
-    channels: signals of an ommatidium
+    directions: viewing directions, unit vectors (ommatidium, 3)
+    channels: number of signals of an ommatidium
     units: class of the units
-    outputs: number of features
+
+    The attribute `outputs` is the number of features.
     """
 
     def __init__(self, directions: np.ndarray, channels: int, units: type[nn.Module]) -> None:
@@ -61,7 +62,7 @@ class HexagonalLayers(nn.Module):
         return features.flatten(0, 1).T
 
     def adapt(self, frames: Tensor) -> None:
-        """Update the running means and the spread with further frames (..., ommatidium, channel)."""
+        """Update the running means and the variance with further frames (..., ommatidium, channel)."""
         self.convolution.adapt(self._gathered(frames))
 
     def _gathered(self, frames: Tensor) -> Tensor:
@@ -71,10 +72,13 @@ class HexagonalLayers(nn.Module):
 
 
 def neighbourhoods(directions: np.ndarray) -> np.ndarray:
-    """Return indices of neighbouring directions, (place, neighbour), with the central one first.
+    """Return the indices of the directions in each neighbourhood, (place, 7), with the centre first.
 
     The six neighbours are in the order of their azimuths around the centre, from right through up to left. Every
-    direction is in at least one neighbourhood.
+    direction is in at least one neighbourhood. If there are fewer than seven directions, all belong to a single
+    neighbourhood.
+
+    directions: unit vectors, (ommatidium, 3)
     """
     directions = np.asarray(directions, float)
     count = min(NEIGHBOURS, len(directions))
@@ -89,7 +93,7 @@ def neighbourhoods(directions: np.ndarray) -> np.ndarray:
 
 
 def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Return the indices `near`. All but the first are sorted by their azimuth around the first direction."""
+    """Return the indices `near`, all but the first sorted by the azimuth of their directions around the first one."""
     ahead, left, _ = directions[near[0]]
     level = np.hypot(ahead, left)
     rightwards = np.array([left, -ahead, 0]) / level if level > 0 else np.array([0.0, -1.0, 0.0])
@@ -101,10 +105,12 @@ def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
 
 
 def directions_from_record(stored: Mapping[str, Any]) -> tuple[tuple[float, ...], ...]:
-    """Return the directions in the record of a policy; empty for eyes without ommatidia.
+    """Return the directions in the record of a policy; () for eyes without ommatidia.
 
     Raises:
-        ValueError: they do not fit the shape of the eyes, or are not unit vectors.
+        ValueError: the directions do not fit the shape of the eyes, or are not unit vectors.
+        KeyError: the record has no shape of the eyes.
+        TypeError: a value has the wrong type.
     """
     found = tuple(tuple(float(part) for part in way) for way in stored.get("directions", ()))
     if len(stored["eyes"]) != (3 if found else 5) or (found and len(found) != int(stored["eyes"][1])):

@@ -22,7 +22,7 @@ class Entry:
 
     name: key in the observation
     size: number of elements
-    low, high: limits of each element; if both are infinite, a policy normalises the entry
+    low, high: lower and upper limit of the elements; if both are infinite, a policy normalises the entry
     """
 
     name: str
@@ -32,7 +32,7 @@ class Entry:
 
     @property
     def normalised(self) -> bool:
-        """True if a policy normalises the entry by its running mean and spread."""
+        """True if a policy normalises the entry by its running mean and standard deviation."""
         return math.isinf(self.low) and math.isinf(self.high)
 
     @property
@@ -40,7 +40,7 @@ class Entry:
         return spaces.Box(self.low, self.high, (self.size,), np.float32)
 
     def record(self) -> list[Any]:
-        """Return the entry as JSON values; an infinite limit becomes None."""
+        """Return the entry as JSON values [name, size, low, high]; an infinite limit becomes None."""
         limits = (None if math.isinf(limit) else limit for limit in (self.low, self.high))
         return [self.name, self.size, *limits]
 
@@ -78,7 +78,14 @@ def entries_of(space: spaces.Dict) -> tuple[Entry, ...]:
 
 
 def entries_from_record(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
-    """Return the entries in the record of a policy. Former versions stored only the size of the proprioception."""
+    """Return the entries in the record of a policy, other than the eyes' signals and the previous action.
+
+    Older versions stored only the size of the proprioception, or, for built-in tasks, nothing.
+
+    Raises:
+        TypeError: a stored entry is not a list.
+        ValueError: a list does not describe an entry.
+    """
     if "beside" in stored:
         return tuple(Entry.from_record(entry) for entry in stored["beside"])
     if FEELS in stored:

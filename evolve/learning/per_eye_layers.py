@@ -1,7 +1,7 @@
 """Linear layers with separate weights for each eye: a plain layer, one with adaptation, and one over memory.
 
 The last axis of the inputs x contains the samples. A layer W x is then one batched matrix product (GEMM) without a
-copy. With samples on the first axis, the product x Wᵀ took three times longer, both forward and backward, because
+copy. With samples on the first axis, the product x Wᵀ took three times as long, both forward and backward, because
 layers have few outputs.
 """
 
@@ -15,14 +15,14 @@ from torch import Tensor, nn
 
 __all__ = ["CONTRAST", "AdaptedLinear", "MemoryLinear", "PerEyeLinear"]
 
-DARK = 1e-6  # lower limit of the spread of signals, so that weights remain finite if all signals are equal
-CONTRAST = 0.4  # standard deviation of normalised signals, chosen for 675 inputs per unit; 1 was not faster
+DARK = 1e-6  # lower limit of the standard deviation of signals, so that weights stay finite if all signals are equal
+CONTRAST = 0.4  # standard deviation of normalised signals, chosen for 675 inputs per unit; 1 made learning no faster
 
 
 class PerEyeLinear(nn.Module):
     """Linear layer for each eye: (eye, inputs, sample) -> (eye, outputs, sample).
 
-    shared: all eyes have the same weights; otherwise each eye has its own
+    shared: True if all eyes have the same weights; False if each eye has its own
     """
 
     def __init__(self, n_eyes: int, inputs: int, outputs: int, shared: bool = False) -> None:
@@ -36,9 +36,9 @@ class PerEyeLinear(nn.Module):
 
     @property
     def weights(self) -> tuple[Tensor, Tensor]:
-        """Return weights (eye, outputs, inputs) and biases (eye, outputs, 1).
+        """Weights (eye, outputs, inputs) and biases (eye, outputs, 1).
 
-        If eyes share them, both are views of the same numbers.
+        If eyes share them, the entries of all eyes are views of the same numbers.
         """
         return self.weight.expand(self.n_eyes, -1, -1), self.bias.expand(self.n_eyes, -1, -1)
 
@@ -48,12 +48,12 @@ class PerEyeLinear(nn.Module):
 
 
 class AdaptedLinear(PerEyeLinear):
-    """Linear layer on signals from which a running mean is subtracted, and which are divided by a running spread.
+    """Linear layer on signals that are normalised by their running mean and standard deviation.
 
-    Each receptor has its own mean, and each eye its own spread, even if the eyes share their weights. Within a scene,
-    signals vary little around their means, and behind a small pupil all signals are small. Without normalisation, the
-    means would saturate the units, and variations around them would have almost no effect. The normalisation is
-    applied to weight and bias, so that it takes almost no time.
+    Each receptor has its own mean, and each eye its own standard deviation, even if the eyes share their weights.
+    Within a scene, signals vary little around their means, and behind a small pupil all signals are small. Without
+    normalisation, the units would respond almost only to the means, and hardly to the variations around them. Weight
+    and bias are rescaled instead of the signals, so that normalisation takes almost no time.
     """
 
     def __init__(self, n_eyes: int, inputs: int, outputs: int, shared: bool = False) -> None:
@@ -69,7 +69,7 @@ class AdaptedLinear(PerEyeLinear):
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
-        """Update means and spreads with further signals, (eye, inputs, sample).
+        """Update the running means and variances with further signals, (eye, inputs, sample).
 
         The update follows Chan, Golub and LeVeque (1983), eq. 2.1.
         """
@@ -83,7 +83,11 @@ class AdaptedLinear(PerEyeLinear):
 
 
 class MemoryLinear(PerEyeLinear):
-    """Linear layer on the codes of `memory` frames: (eye, code, memory, sample) -> (eye, outputs, sample)."""
+    """Linear layer on the codes of `memory` frames: (eye, code, memory, sample) -> (eye, outputs, sample).
+
+    memory: number of frames
+    code: number of elements of a frame's code
+    """
 
     def __init__(self, n_eyes: int, memory: int, code: int, outputs: int, shared: bool = False) -> None:
         super().__init__(n_eyes, code * memory, outputs, shared)
@@ -93,11 +97,11 @@ class MemoryLinear(PerEyeLinear):
         return super().forward(codes.flatten(1, 2))
 
     def slide(self, codes: Tensor) -> Tensor:
-        """Apply the layer at each step to the codes of the last `memory` frames.
+        """Return the outputs at each step, which depend on the codes of the last `memory` frames.
 
-        codes: (eye, code, memory - 1 + step, segment)
+        The outputs are (eye, outputs, sample), with samples (step, segment) flattened.
 
-        The result is (eye, outputs, sample), with samples (step, segment) flattened.
+        codes: codes of the frames, (eye, code, memory - 1 + step, segment)
         """
         weight, bias = self.weights
         return _Slide.apply(codes, weight.unflatten(2, (-1, self.memory)), bias)
@@ -106,17 +110,17 @@ class MemoryLinear(PerEyeLinear):
 class _Slide(torch.autograd.Function):
     """Sum of the terms W[lag] codes[lag : lag + steps] over all lags, with its gradient.
 
-    Each term is a matrix product (GEMM) on the stored codes. A version that copied the window of frames of each step
-    took four times longer, both forward and backward.
+    Each term is a matrix product (GEMM) on the stored codes. A version that copied the last frames for each step took
+    four times as long, both forward and backward.
     """
 
     @staticmethod
     def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-        """Return the sum of the weighted codes plus `bias`.
+        """Return the sum of the weighted codes plus `bias`, (eye, output, sample).
 
-        codes: shape (eye, code, frame, segment)
-        weight: shape (eye, output, code, lag)
-        bias: shape (eye, output, 1)
+        codes: codes of the frames, (eye, code, frame, segment)
+        weight: weights, (eye, output, code, lag)
+        bias: biases, (eye, output, 1)
         """
         weights = weight.permute(3, 0, 1, 2).contiguous()
         total, *pieces = _slices(codes, len(weights))

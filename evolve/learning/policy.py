@@ -1,6 +1,6 @@
 """Policy of an animal: an actor and a critic, whose inputs are the features of its eyes.
 
-A policy is stored in a safetensors file, with its shape in the metadata. The file contains no code.
+A policy is stored in a safetensors file, with its `PolicyConfig` in the metadata. The file contains no code.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 
 
 
 class TrainingDiverged(FloatingPointError):
-    """Learning produced numbers that are not finite; the message states which."""
+    """Learning or playing produced numbers that are not finite; the message states which."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Brain:
 
 @dataclass(frozen=True)
 class PolicyConfig:
-    """Shape of a policy, from which it can be built again.
+    """Shape of a policy, from which an untrained policy can be built.
 
     eyes: shape of the observation's `eyes` (memory, eye, channel, height, width), or (memory, ommatidium, channel)
     neurons, layers, encoder, wiring: see `Brain`
@@ -80,7 +80,7 @@ class PolicyConfig:
 
     @classmethod
     def from_space(cls, space: spaces.Dict, brain: Brain) -> PolicyConfig:
-        """Return the shape of a policy for these observations."""
+        """Return the shape of a policy for an observation space of sim's environments."""
         actions = known_beside_eyes(space)["previous_action"]
         sizes = (brain.neurons, brain.layers, brain.encoder)
         eyes = space["eyes"]
@@ -91,7 +91,7 @@ class PolicyConfig:
 
     @property
     def brain(self) -> Brain:
-        """Size of the policy's brain."""
+        """Size and wiring of the policy's brain."""
         return Brain(self.neurons, self.layers, self.encoder, self.wiring)
 
     def observation_space(self) -> spaces.Dict:
@@ -108,9 +108,9 @@ class PolicyConfig:
     def record(self) -> dict[str, Any]:
         """Return the shape as JSON values.
 
-        The record of a run contains a hash of each policy file. A policy must therefore be written with the same bytes
-        by all versions. Former versions had neither a list of other entries nor a choice of wiring, so their form is
-        used for shapes that they could describe.
+        The record of a run contains a hash of each policy file. All versions must therefore write a policy as the same
+        bytes. Older versions had neither a list of other entries nor a choice of wiring, so shapes that those versions
+        could describe are still written in their form.
         """
         left_out = {"beside"} | ({"wiring"} if self.wiring == DIRECT else set())
         left_out |= set() if self.directions else {"directions"}
@@ -153,9 +153,8 @@ def _wiring(stored: Mapping[str, Any]) -> WiringConfig:
 class EyePolicy(MultiInputActorCriticPolicy):
     """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
 
-    brain: size of the brain
-    first_actions: mean and standard deviation of each element of the untrained policy's actions; None: 0 and
-        FIRST_SPREAD
+    brain: size and wiring of the brain
+    first_actions: mean and standard deviation of each element of untrained actions; None: 0 and FIRST_SPREAD
     """
 
     def __init__(
@@ -206,9 +205,10 @@ def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy
 
 
 def save_policy(policy: EyePolicy, path: Path | str) -> None:
-    """Write the policy's tensors as a safetensors file, with the policy's configuration in the metadata.
+    """Write a policy as a safetensors file, completely or not at all.
 
-    The file is written completely or not at all.
+    Raises:
+        OSError: the file cannot be written.
     """
     tensors = {name: tensor.detach().clone() for name, tensor in learnt(policy).items()}
     # One entry only: safetensors writes several entries in random order, but equal policies must give equal bytes.
@@ -217,13 +217,13 @@ def save_policy(policy: EyePolicy, path: Path | str) -> None:
 
 
 def load_policy(path: Path | str) -> EyePolicy:
-    """Build the policy in a file; nothing in the file is executed.
+    """Return the policy that a file contains; nothing in the file is executed.
 
     Torch is set to one thread, as in learning: several threads would vary the order of sums, and thereby episodes.
 
     Raises:
-        ValueError: the file was not written by `save_policy`; for example, it is a pickle, or truncated.
-        StrangeFileError: the path is a link, FIFO or directory.
+        ValueError: the file does not exist, or is not a policy; for example, it is a pickle or truncated.
+        OSError: the file cannot be read, is too large, or is a link, FIFO or directory (StrangeFileError).
     """
     try:
         metadata, tensors = read_tensors(Path(path))
@@ -232,7 +232,7 @@ def load_policy(path: Path | str) -> EyePolicy:
             raise ValueError(f"its units are not {UNITS.__name__}, which this version uses")
         config = PolicyConfig.from_record(stored)
         if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
-            raise ValueError("it holds numbers that are not finite")
+            raise ValueError("it contains numbers that are not finite")
         _require_shape(config, tensors)
         policy = build_policy(config)
         set_learnt(policy, tensors)
@@ -247,7 +247,7 @@ def load_policy(path: Path | str) -> EyePolicy:
 
 
 def learnt(policy: EyePolicy) -> dict[str, Tensor]:
-    """Return all tensors that learning changes, by name: weights, and running means and spreads of inputs.
+    """Return all tensors that learning changes, by name: weights, and running means and variances of inputs.
 
     Tables that follow from the policy's shape, such as the neighbours of ommatidia, are not among them.
     """

@@ -50,7 +50,7 @@ class Training:
 
     policy: policy at the best evaluation
     steps: number of agent steps, in whole rollouts
-    curve: (steps, mean return of the evaluation episodes), every `eval_interval` steps
+    curve: (steps, mean return) of each evaluation during training
     end: state at the end of training, from which it can continue
     """
 
@@ -73,12 +73,12 @@ class Episodes:
 
     @property
     def successes(self) -> np.ndarray:
-        """Return whether each world's episode was solved, (world,) bool."""
+        """True for each world whose episode was solved, (world,)."""
         return self.verdicts > 0
 
 
 class AdaptingPPO(PPO):
-    """PPO with normalised signals and rewards. It stops if numbers of a rollout or an update are not finite.
+    """PPO with normalised signals and rewards. It fails if the numbers of a rollout or an update are not finite.
 
     Rewards are divided by their unit, which follows the spread of the discounted returns. At the start of training,
     agents often touch walls, and the costs of contact are about a hundred times larger than all later rewards. Without
@@ -137,8 +137,7 @@ class AdaptingPPO(PPO):
         _require_finite("loss", np.asarray(self.logger.name_to_value["train/value_loss"]), self.num_timesteps)
         for name, parameter in self.policy.named_parameters():
             _require_finite(f"policy's {name}", parameter.detach().numpy(), self.num_timesteps)
-        # The normalisation must not change before the update, which compares the policy with the policy of the rollout.
-        # Every eighth frame is enough, because successive frames are similar.
+        # The update above needed the normalisation of the rollout. Successive frames are similar: an eighth is enough.
         self._adapt(self.rollout_buffer.new_frames[:, ::8], self.rollout_buffer.beside)
         self._adapt_unit()
 
@@ -232,12 +231,12 @@ def train(
 
     After every `eval_interval` steps, the policy plays one episode in each of the evaluation worlds. Training ends
     after `patience` evaluations without a better mean return, or after `total_steps`. The result is the policy at the
-    evaluation with the highest mean return (the earliest of equals).
+    evaluation with the highest mean return, or at the earliest of several.
 
     begun: checkpoint from which to continue; its steps count towards `total_steps`
 
     Raises:
-        TrainingDiverged: rewards, loss, weights or actions are not finite.
+        TrainingDiverged: rewards, loss, weights, actions or returns are not finite.
         CheckpointError: `begun` does not have the tensors of this learner.
     """
     model = AdaptingPPO(worlds.training, brain, config, seed)
@@ -260,13 +259,17 @@ def train(
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
-    """Return whether none of the last `patience` evaluations exceeded the best earlier evaluation."""
+    """Return whether none of the last `patience` evaluations of a learning curve exceeded the best earlier one."""
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 
 
 def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
-    """Reset all worlds with this seed, and play one episode in each; the policy acts without exploration."""
+    """Reset all worlds with this seed, and play one episode in each; the policy acts without exploration.
+
+    Raises:
+        TrainingDiverged: actions or returns are not finite.
+    """
     worlds.seed(seed)
     observation = worlds.reset()
     returns = np.zeros(worlds.num_envs)
@@ -292,9 +295,6 @@ def batch_task_of(worlds: VecEnv) -> BatchTask:
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
-    """Return the mean and standard deviation of each element of the untrained policy's actions.
-
-    For the command SPEED, both follow from the setting `learning.first_speed`.
-    """
+    """Return mean and standard deviation of each command before training; `learning.first_speed` sets the speed's."""
     speed = (2 * config.first_speed - 1, config.first_speed)
     return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

@@ -1,7 +1,7 @@
-"""Averaging of an eye's signals to a coarser grid, and repetition on a finer one, before they reach the encoder.
+"""Averaging of an eye's signals on a coarser grid, and repetition on a finer one, before they reach the encoder.
 
-Both are controls in experiments on resolution. An eye of 15 x 15 receptors whose signals are averaged to 4 x 4 and
-repeated on 15 x 15 has the acuity of 4 x 4 receptors, but still 15 x 15 inputs.
+Both are controls in experiments on resolution. An eye of 15 x 15 receptors whose signals are averaged on 4 x 4 cells
+and repeated on 15 x 15 has the acuity of 4 x 4 receptors, but still 15 x 15 inputs.
 """
 
 from __future__ import annotations
@@ -18,9 +18,11 @@ __all__ = ["Regridding"]
 class Regridding:
     """Linear map from the signals of a retina to the inputs of an encoder, the same for all eyes and channels.
 
-    shape: rows and columns of the inputs
+    retina: rows and columns of the receptors
+    wiring: settings, of which `pool_side` and `repeat_side` are used
 
-    It is not a PyTorch module, because it has no parameters and no state.
+    The attribute `shape` contains the rows and columns of the inputs. The map is not a PyTorch module, because it has
+    no parameters and no state.
     """
 
     def __init__(self, retina: tuple[int, int], wiring: WiringConfig) -> None:
@@ -38,7 +40,7 @@ class Regridding:
 
 
 def _axis(n: int, pool_side: int, repeat_side: int) -> np.ndarray:
-    """Return the matrix (input, n) from the signals of `n` receptors along an axis to the inputs along it."""
+    """Return the matrix (input, n) that maps the signals of `n` receptors to the inputs, both along one axis."""
     pooled = _averages(n, min(pool_side or n, n))
     return _repeats(len(pooled), max(repeat_side, len(pooled))) @ pooled
 
@@ -48,10 +50,10 @@ def _averages(n: int, side: int) -> np.ndarray:
 
     The weight of a receptor is the fraction of the interval that it covers.
     """
-    receptor, interval = (
+    receptor, interval = (  # beginnings of receptors and intervals, on an axis of the length n * side
         side * np.arange(n),
         n * np.arange(side)[:, None],
-    )  # where they begin; the axis is n * side long
+    )
     overlap = np.minimum(receptor + side, interval + n) - np.maximum(receptor, interval)
     return np.clip(overlap, 0, None) / n
 

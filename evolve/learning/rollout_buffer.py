@@ -46,7 +46,7 @@ class FrameRolloutBuffer(RolloutBuffer):
         self.beside = {name: np.zeros((worlds, steps, size), np.float32) for name, size in sizes.items()}
 
     def compute_returns_and_advantage(self, last_values: Tensor, dones: np.ndarray) -> None:
-        """Compute returns and advantages without NumPy's warnings of overflow; the learner checks the loss."""
+        """Compute returns and advantages without NumPy's warnings of overflow, because the learner checks the loss."""
         with np.errstate(over="ignore", invalid="ignore"):
             super().compute_returns_and_advantage(last_values, dones)
 
@@ -88,11 +88,17 @@ class FrameRolloutBuffer(RolloutBuffer):
 
     @property
     def new_frames(self) -> np.ndarray:
-        """New frame of each step of this rollout, (world, step, eye, channel, height, width)."""
+        """New frame of each step of this rollout, (world, step, eye, channel, height, width).
+
+        For compound eyes, it is (world, step, ommatidium, channel).
+        """
         return self.frames[:, self.memory - 1 :]
 
     def get(self, batch_size: int | None = None) -> Iterator[DictRolloutBufferSamples]:
-        """Yield mini-batches of whole segments with about `batch_size` samples each; every sample occurs once."""
+        """Yield mini-batches of whole segments in random order; every sample of the rollout occurs once.
+
+        batch_size: approximate number of samples in a mini-batch; None: all
+        """
         assert self.full
         starts = np.arange(0, self.buffer_size, self.segment_steps)
         worlds, starts = (a.ravel() for a in np.meshgrid(np.arange(self.n_envs), starts, indexing="ij"))

@@ -23,9 +23,9 @@ __all__ = ["executed_task"]
 
 @lru_cache(maxsize=4)
 def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | BatchTask:
-    """Execute the code and return the task; later changes of the file have no effect.
+    """Execute the code of a user task, and return the task. Later changes of the file have no effect.
 
-    encoded_textures: see `WorldConfig`
+    encoded_textures: see `WorldConfig.encoded_textures`
 
     Raises:
         ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
@@ -50,7 +50,11 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
 
 
 def _resolve_textures(task: Task | BatchTask) -> None:
-    """Request linear light for the textures that MuJoCo's compiler resolves to it."""
+    """Request linear light for the textures for which MuJoCo's compiler chooses it.
+
+    Raises:
+        ValueError: the model cannot be compiled with this request.
+    """
     try:
         task.model = with_compiled_color_spaces(task.model)
     except ValueError as error:
@@ -58,7 +62,11 @@ def _resolve_textures(task: Task | BatchTask) -> None:
 
 
 def _executed(code: TaskCode) -> ModuleType:
-    """Execute the code as a module with a unique name in `sys.modules`, where pickle and dataclasses look it up."""
+    """Execute the code as a module with a unique name in `sys.modules`, where pickle and dataclasses look it up.
+
+    Raises:
+        ConfigError: the code raises an error.
+    """
     name = f"{MODULE}{code.sha256[:16]}"
     module = ModuleType(name)
     module.__file__ = str(code.file)

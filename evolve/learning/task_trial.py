@@ -1,6 +1,6 @@
 """Checks before a run starts: random layouts, settings of a user task that would have no effect, and a short trial.
 
-A failure would affect every animal of the run.
+A fault that these checks find would affect every animal of the run.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["UnusedSettingWarning", "check_layouts", "check_settings", "try_task"]
 
-WORLDS, ACTIONS = 2, 4
+WORLDS, ACTIONS = 2, 4  # numbers of worlds and of actions in a trial
 
 
 class UnusedSettingWarning(UserWarning):
@@ -35,16 +35,17 @@ class UnusedSettingWarning(UserWarning):
 
 
 def check_settings(config: RunConfig) -> None:
-    """Refuse a user task with mounts that no animal would use, and warn about each other setting without effect.
+    """Refuse a user task with mounts that no animal would use, and warn about other settings without effect.
 
-    The default `place` spreads an animal's eyes around a single mount. Recorded runs are not checked, so they can
-    always be continued and replayed with their eyes.
+    The default method `place` of a task spreads an animal's eyes around a single mount. Runs on record are not checked,
+    so they can always be continued and replayed with their eyes.
 
     Warns:
-        UnusedSettingWarning: the genome or the run determines a value that the task also defines.
+        UnusedSettingWarning: the genome or the settings of the run determine a value that the task also defines.
 
     Raises:
-        ConfigError: the task has several mounts and does not define `place`, or its module cannot be executed.
+        ConfigError: the task has several mounts and does not define `place`, the user has not named its code, or its
+            module cannot be executed.
     """
     if (code := config.choice.named_code) is None:
         return
@@ -82,7 +83,7 @@ def _unused(task: TaskSettings, config: RunConfig) -> Iterator[str]:
 
 
 def check_layouts(config: RunConfig) -> None:
-    """Draw the random layouts of all sets, if the run has a family of them.
+    """Check a run's random layouts by drawing all of them. Runs with fixed layouts pass.
 
     Raises:
         ConfigError: two layouts have the same walls, or no navigation course of the configured size can be drawn.
@@ -100,7 +101,8 @@ def try_task(config: RunConfig) -> None:
     """Build the user task with the run's first animal, and take a few random actions; skip built-in tasks.
 
     Raises:
-        ConfigError: the task's module, model, eyes or methods fail; the message is one line.
+        ConfigError: the user has not named the task's code, or the task's module, model, eyes or methods fail; the
+            message is one line.
     """
     if config.choice.named_code is None:
         return

@@ -20,7 +20,7 @@ def read_tensors(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
     """Return the metadata and the tensors of a file, each by name.
 
     Raises:
-        StrangeFileError: the path is not a regular file.
+        StrangeFileError: the path is not a regular file, or the file is too large.
         OSError: the file cannot be read.
         SafetensorError: the file is not a safetensors file.
         ValueError: the header is not JSON.

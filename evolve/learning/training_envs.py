@@ -19,9 +19,9 @@ class TrainingEnvs:
 
     training: environments in which the policy is trained
     selection: environments of the evaluations during training, which select the best policy
-    fitness: environments of the evaluation after training, which gives the fitness, in the layouts of `selection`
+    fitness: environments of the evaluation after training, which measures the fitness, in the layouts of `selection`
 
-    Reflections of light are computed in the same way in all three. The first two are rendered with at most
+    All three compute reflections of light in the same way. Training and selection use at most
     `learning.rays_per_receptor` rays for each receptor, because the noise of rendering averages out in learning.
     """
 
@@ -37,17 +37,18 @@ def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation
     evaluation: seed of the environments for selection and fitness
 
     Raises:
-        ConfigError: the user task was not named when the run was opened, or its start fails.
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ValueError: the eyes that the task places differ from the animal's.
     """
-    memory, wanted, episodes = phenotype.memory_frames, config.learning, config.evaluation.episodes
+    memory, settings, episodes = phenotype.memory_frames, config.learning, config.evaluation.episodes
     fine = PreparedTask(animal_task(phenotype, config))
-    coarse = fine.at_most(wanted.rays_per_receptor)
+    coarse = fine.at_most(settings.rays_per_receptor)
     if config.world.training == config.world.evaluation:
-        school = coarse.in_mode("training")
+        training = coarse.in_mode("training")
     else:
-        school = coarse.elsewhere(animal_task(phenotype, config, "training"))
+        training = coarse.elsewhere(animal_task(phenotype, config, "training"))
     return TrainingEnvs(
-        training=school.vec_env(wanted.n_envs, learning, memory, least_return=wanted.least_return or None),
+        training=training.vec_env(settings.n_envs, learning, memory, least_return=settings.least_return or None),
         selection=coarse.vec_env(episodes, evaluation, memory),
         fitness=fine.vec_env(episodes, evaluation, memory),
     )

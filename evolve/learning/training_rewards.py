@@ -14,7 +14,7 @@ FIRST_SHARE = 0.1  # initial fraction of the cost of contact; with a third, agen
 
 
 class RewardsInUnits(VecEnvWrapper):
-    """Worlds whose rewards are divided by a unit, and in which some terms of the reward have reduced weights.
+    """Environments in which rewards are divided by a unit, and some terms of the reward have reduced weights.
 
     The learner sets `unit` and `shares`.
 
@@ -46,11 +46,11 @@ class RewardsInUnits(VecEnvWrapper):
 def ramped_share(steps: int, ramp: int) -> float:
     """Return the weight of a reward term after `steps`, as a fraction of its final weight.
 
-    It is FIRST_SHARE for the first third of the ramp, and then rises exponentially to 1. If contact has its full cost
-    from the start, agents learn to stand still before they can steer, because standing still costs nothing. They then
-    never learn to steer.
+    It is FIRST_SHARE for the first third of the ramp, and then rises exponentially to 1. The ramp is meant for the cost
+    of contact. If contact has its full cost from the start, agents learn to stand still before they can steer, because
+    standing still costs nothing. They then never learn to steer.
 
-    ramp: number of steps after which the fraction is 1
+    ramp: number of steps after which the fraction is 1; 0: it is always 1
     """
     if steps >= ramp:
         return 1.0

@@ -22,9 +22,9 @@ class TrainingRung:
     """A training run from its start to the end of one of its rungs (the parts into which it is divided).
 
     ends: number of training steps at the end of each rung up to this rung, in ascending order
-    checkpoints: path of the checkpoint at the end of each of these rungs; training continues from the latest checkpoint
-        that exists
-    candidate: id of the candidate; None outside a run
+    checkpoints: path of the checkpoint at the end of each of these rungs; training continues from the latest usable
+        checkpoint of an earlier rung
+    candidate: id of the candidate; None if the training does not belong to a run
     """
 
     ends: tuple[int, ...]
@@ -37,9 +37,12 @@ class TrainingRung:
         return len(self.ends) - 1
 
     def owners(self, phenotype: Phenotype, config: RunConfig, seed: int) -> tuple[dict[str, Any], ...]:
-        """Return the owner of each checkpoint, as JSON values: all inputs on which the state of training depends.
+        """Return the owner of each checkpoint: all inputs on which the state of training depends, as JSON values.
 
-        The numbers of workers and of generations are left out, because they have no effect on this state.
+        The numbers of workers and of generations are left out, because they have no effect on this state. A checkpoint
+        with another owner must not be used.
+
+        seed: seed of the training run
         """
         common = {
             "candidate": self.candidate,
@@ -51,7 +54,7 @@ class TrainingRung:
         return tuple({**common, "rung": number, "ends": list(self.ends[: number + 1])} for number in numbers)
 
     def set_aside_unusable(self, phenotype: Phenotype, config: RunConfig, seed: int) -> None:
-        """Set aside unusable checkpoints of earlier rungs, from the latest back to the first usable one.
+        """Rename unusable checkpoints of earlier rungs, from the latest back to the first usable one; see `set_aside`.
 
         Raises:
             OSError: a checkpoint is not a regular file, or cannot be renamed.

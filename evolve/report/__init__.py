@@ -23,8 +23,8 @@ gene_drift       comparison of runs with the null model of their search
 moving_picture   episode as a GIF or video
 replay           replay of an episode
 exr_export       radiance and signals of an agent, as EXR files
-rerun_recording  recording of an episode for rerun
-rerun_bodies     bodies of a task's model and the eyes, for rerun
-rerun_layout     layout in which rerun opens a recording
-rerun_stream     writer of recordings for rerun
+rerun_recording  recording of an episode for Rerun
+rerun_bodies     bodies of a task's model, and the eyes, for Rerun
+rerun_layout     layout in which Rerun opens a recording
+rerun_stream     writer of recordings for Rerun
 """

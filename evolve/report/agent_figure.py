@@ -22,8 +22,9 @@ LARGEST_EYE = math.radians(24)  # maximum half angle of an eye's disk on the hea
 def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | np.ndarray) -> Html:
     """Return a drawing of the head, seen from the front and above; eyes are disks that do not overlap.
 
+    eyes: design of the eyes
     name: prefix of the ids in the drawing, unique on the page
-    placed: azimuths of the eyes [rad]
+    placed: azimuths of the eyes [rad], (eye,)
     """
     azimuths = [float(azimuth) for azimuth in placed]
     between = _closest(azimuths)
@@ -50,9 +51,9 @@ def _closest(azimuths: Sequence[float]) -> float:
 
 
 def _projected(points: np.ndarray) -> np.ndarray:
-    """Project points to the drawing.
+    """Return the positions of points in the drawing, in its units, (n, 2).
 
-    points: (n, 3), x ahead, y to the left and z up, in radii of the head; the result is (n, 2), in units of the drawing
+    points: (x ahead, y to the left, z up) in radii of the head, (n, 3)
     """
     x, y, z = points.T
     turned = AHEAD - math.pi
@@ -68,7 +69,10 @@ def _faces(azimuth: float) -> bool:
 
 
 def _field(azimuth: float, fov: float) -> Html:
-    """Return the horizontal field of view of an eye as a sector in the plane of the eyes."""
+    """Return the horizontal field of view of an eye as a sector in the plane of the eyes.
+
+    azimuth, fov: direction of the eye and width of the field [rad]
+    """
     angles = azimuth + np.linspace(-fov / 2, fov / 2, 1 + max(2, int(math.degrees(fov) / 5)))
     near = np.array([[math.cos(azimuth), math.sin(azimuth), 0.0]])
     far = REACH * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
@@ -76,7 +80,10 @@ def _field(azimuth: float, fov: float) -> Html:
 
 
 def _eye(azimuth: float, half: float) -> Html:
-    """Return an eye as a disk on the head's equator, with a highlight."""
+    """Return an eye as a disk on the head's equator, with a highlight.
+
+    azimuth, half: direction of the eye, and half the angle that the disk covers on the head [rad]
+    """
     around = np.linspace(0, 2 * math.pi, 33)[:-1]
     normal = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     left, up = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0]), np.array([0.0, 0.0, 1.0])

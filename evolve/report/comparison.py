@@ -26,8 +26,8 @@ OF_THE_BEST = ("best candidate", "fitness", *PARTS, "95 % interval", "success ra
 def run_summary(run: Run) -> dict[str, Any]:
     """Return the summary of one run as JSON values.
 
-    Before a candidate has succeeded, values that describe the best candidate are None. The interval of its fitness is
-    also None if it has played a single episode.
+    Before a candidate has succeeded, values that describe the best candidate are None. The interval of the fitness is
+    also None if the best candidate has played a single evaluation episode.
     """
     best = run.best
     interval = None if best is None else fitness_interval(best)
@@ -55,9 +55,9 @@ def run_summary(run: Run) -> dict[str, Any]:
 
 
 def differing_settings(runs: Sequence[Run]) -> dict[str, list[Any]]:
-    """Return the settings in which the runs differ, by dotted name, with the value of each run.
+    """Return the settings in which the runs differ, by dotted name, with the value in each run.
 
-    If a run lacks a setting, the value is None.
+    If a run lacks a setting, its value is None.
     """
     flat = [dict(_flat(asdict(run.config))) for run in runs]
     names = list(dict.fromkeys(name for settings in flat for name in settings))
@@ -78,6 +78,9 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
     """Write an HTML page with the comparison: a figure of the best fitness over the generations, and a table.
 
     The file is written completely or not at all.
+
+    Raises:
+        OSError: the file cannot be written.
     """
     columns = _rows(runs)
     names = columns.pop("run")
@@ -95,7 +98,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
 
 
 def _rows(runs: Sequence[Run]) -> dict[str, list[str]]:
-    """Return the values of the runs' summaries as text, by name of the table's row.
+    """Return the rows of the table by name: for each quantity, its value in each run as text.
 
     Rows that would repeat a simpler row in all runs are omitted: the parts of fitness if no run has costs, and the
     vertical acuity if it equals the horizontal one.
@@ -110,7 +113,7 @@ def _rows(runs: Sequence[Run]) -> dict[str, list[str]]:
 
 
 def _column(one: Mapping[str, Any]) -> dict[str, str]:
-    """Return the values of a summary as text, by name of the table's row."""
+    """Return the column of a run in the table: the values of its summary as text, by name of the row."""
     column = {
         "run": one["run"],
         "task": one["task"],

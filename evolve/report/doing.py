@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 __all__ = ["Doing", "in_silence"]
 
-Doing = Callable[[str, float], None]  # called with the current step and the completed fraction of the work, in [0, 1]
+Doing = Callable[[str, float], None]  # (current step, completed fraction of the work in [0, 1])
 
 
 def in_silence(what: str, share: float) -> None:

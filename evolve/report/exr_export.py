@@ -33,12 +33,15 @@ def export_run(
     candidate_id: id of the candidate that plays; None: the best candidate
     seed: seed of the episode
     every: number of actions from one file to the next
-    out: folder of the files; None for `exr/` in the run directory
+    out: folder of the files; None: `exr/` in the run directory
     doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
 
     Raises:
-        RunError: the candidate does not exist, or it has no policy.
+        RunError: the candidate does not exist, or its policy is missing or damaged.
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
         ValueError: `every` is not a whole number from 1 to 1,000,000.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        OSError: a file cannot be read or written.
     """
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -52,8 +55,12 @@ def export_episode(run: Run, episode: Episode, directory: Path, doing: Doing = i
     A file has two parts for each eye: the spectral radiance in front of the eye (`left.spectral`) and the signals of
     its receptors (`left.receptors`). Attributes identify the run (`evolve.store.versions.provenance`), the candidate
     and the time, and state the pose of the eye. File names contain the candidate, the seed of the episode and the time,
-    so that exports of different episodes do not overwrite each other. The folder also contains a list of their
-    checksums.
+    so that exports of different episodes do not overwrite each other. A list of the files' checksums is also written.
+
+    directory: folder of the files, which is created if it is missing; its parent must exist
+
+    Raises:
+        OSError: a file cannot be read or written.
     """
     folder(directory)
     source = provenance(run.path)
@@ -70,7 +77,11 @@ def export_episode(run: Run, episode: Episode, directory: Path, doing: Doing = i
 
 
 def _views(episode: Episode, frame: int, source: Mapping[str, Any]) -> list[sim.View]:
-    """Return the views of all eyes at one recorded time. `source` identifies the run."""
+    """Return the views of all eyes at one recorded time.
+
+    frame: index of the time in `Episode.radiance_frames`
+    source: attributes that identify the run
+    """
     t, lens = int(episode.radiance_frames[frame]), episode.eyes.eye()
     peaks = None if lens.mosaic is not None else [kind.peak_nm for kind in lens.receptors.types]
     return [

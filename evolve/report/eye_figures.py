@@ -31,11 +31,12 @@ SHOWN_POWER = 0.98  # fraction of the PSF's light that lies within the image
 
 
 def eye_figures(phenotype: Phenotype, config: EyeConfig, medium: str = "air") -> Html:
-    """Return the figures with their captions. For a perfect lens, return a sentence instead.
+    """Return the figures of an animal's eye with their captions. For a perfect lens, return a sentence instead.
 
-    For compound eyes, see `facet_figures`.
+    For compound eyes, see `facet_figures`. If the PSF cannot be computed accurately enough, a line of text with the
+    reason replaces a figure.
 
-    medium: medium of the run's worlds
+    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
     """
     eye = phenotype.eye(config, medium)
     if not isinstance(eye, optics.Eye):
@@ -102,7 +103,7 @@ def _is_round(pupil: optics.Pupil | None) -> bool:
 def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
     """Return the heights of the relief [m] and the mask of the aperture, both (y, x).
 
-    They cover the square around the pupil, and row 0 is at the lowest y.
+    They cover the square around the pupil; row 0 is at the lowest y. Without a relief, all heights are 0.
     """
     types = precision("float64")
     centres = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
@@ -147,9 +148,10 @@ def _psf(light: WhiteLight) -> Html:
 
 
 def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
-    """Return the central part of the PSF, with most of its light (SHOWN_POWER), and the half width of this part [m].
+    """Return the central part of the PSF in white daylight [1/m²], (y, x), and half the width of this part [m].
 
-    The PSF is averaged to at most PIXELS along a side.
+    It contains most of the light (SHOWN_POWER). The PSF is averaged over blocks, so that the part has at most PIXELS
+    along a side.
     """
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
@@ -227,8 +229,11 @@ def _mtf(light: WhiteLight) -> Html:
 def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
     """Return the MTF in white daylight of a circular aperture of the same width without aberrations, (frequency,).
 
-    In each band, the MTF is (2/π)(arccos s - s √(1 - s²)), where s is the frequency divided by the cutoff frequency
-    (Goodman, §6.3.3). The bands are weighted by their light.
+    In each band, the MTF is (2/π)(arccos s - s √(1 - s²)) for s < 1, else 0, where s is the frequency divided by the
+    cutoff frequency (Goodman, Fourier Optics, §6.3.3). The bands are weighted by daylight and by the mean sensitivity
+    of the eye's channels.
+
+    frequency: spatial frequencies on the retina [1/m]
     """
     weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)
     s = np.clip(frequency / light.psf.cutoff[:, None], 0, 1)
@@ -245,7 +250,7 @@ def _bar(axes: Axes, picture: Any, label: str) -> None:
 
 
 def _degrees(axes: Axes, eye: optics.Eye, edge: float) -> None:
-    """Add an axis at the top with the visual angle of positions on the retina [µm]."""
+    """Add an axis at the top, which shows the visual angle [°] of positions on the retina [µm]."""
     distance = 1e6 * eye.sensor_distance
     top = axes.secondary_xaxis(
         "top",

@@ -1,4 +1,7 @@
-"""Figures of a whole run: fitness, costs, success and genes over the generations, descent, and learning curves."""
+"""Figures of a whole run: fitness, costs, success and genes over the generations, descent, and learning curves.
+
+Each public function draws one figure, and returns it as an SVG element.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,10 @@ Generations = Sequence[int] | NDArray[np.int64]
 
 
 def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Candidate]) -> Html:
-    """Draw the fitness of each candidate, the spread and median of each population, and the best so far."""
+    """Draw the fitness of each candidate, quantiles and median of each population, and the best fitness so far.
+
+    rows: statistics of each generation, at least one
+    """
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         _candidates(axes, candidates, [c.fitness for c in candidates])
@@ -134,7 +140,11 @@ def _links(axes: Axes, candidates: Sequence[Candidate], place: Callable[[Candida
 
 
 def vision_figure(name: str, label: str, generations: Sequence[int], values: Sequence[float]) -> Html:
-    """Draw one measure of the best eye so far over the generations."""
+    """Draw one measure of the best eye so far over the generations.
+
+    name: name of the measure, for ids and for screen readers
+    label: label of the vertical axis
+    """
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()
         axes.plot(generations, values, color=ACCENT, lw=1.8, marker="o", ms=3)
@@ -186,8 +196,9 @@ def gene_figure(
 ) -> Html:
     """Draw the values of one gene over the generations.
 
+    label: label of the vertical axis
     limits: range of the vertical axis; None: the range of the values
-    whole: True if its ticks are integers
+    whole: True if the ticks of this axis are integers
     """
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()

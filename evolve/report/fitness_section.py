@@ -18,7 +18,7 @@ POPULATION = html(
 
 
 def fitness_section(run: Run) -> Html:
-    """Return the section with fitness and success over the generations, and the learning curves."""
+    """Return the section with fitness, its parts and success over the generations, learning curves, and descent."""
     if not run.candidates:
         return section("fitness", "Fitness", html("<p>No candidate has been evaluated yet.</p>\n"))
     rows, best = generation_statistics(run.candidates), run.best

@@ -37,6 +37,7 @@ class QuantityDrift:
 
     The value of a run or a search is a mean over its candidates.
 
+    quantity: name of the quantity
     runs: value of each run
     low, median, high: quantiles of the values of the searches; 95 % of the values lie between low and high
     p: two-sided p-value of the mean of the runs, see `evolve.search.null_model.p_value`
@@ -59,10 +60,10 @@ class Drift:
     """Comparison of runs with searches with random fitness.
 
     of: number of runs
-    searches: number of searches
-    costs: True if the searches subtract costs
     generations: generations over which means are computed, counted from 0
+    searches: number of searches
     moved: quantities, with their values
+    costs: True if the searches subtract costs
     """
 
     of: int
@@ -103,9 +104,9 @@ class Drift:
 def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
     """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
 
-    The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical one unless
-    receptors are square, and the number of positions of receptors. Means are over the last generations that all runs
-    have completed.
+    The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical acuity
+    unless receptors are square, and the number of positions of receptors. Quantities that do not vary between the
+    searches, or that a run lacks, are omitted. Means are over the last generations that all runs have completed.
 
     searches: number of searches
     done: function that is called with the completed fraction of the searches
@@ -132,6 +133,11 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
 
 
 def _require_alike(runs: Sequence[Run]) -> None:
+    """Check that runs differ in their seeds, and in no other setting but the number of workers.
+
+    Raises:
+        RunError: the runs differ in other settings, or two of them have the same seed.
+    """
     differing = set(differing_settings(runs)) - set(ALLOWED_TO_DIFFER)
     if differing:
         raise RunError(
@@ -144,7 +150,11 @@ def _require_alike(runs: Sequence[Run]) -> None:
 
 
 def _complete(run: Run) -> int:
-    """Return the number of generations that are complete, counted from the start of the run."""
+    """Return the number of generations that are complete, counted from the start of the run.
+
+    Raises:
+        RunError: no generation is complete.
+    """
     known = (successive_halving.complete(run, generation) for generation in range(run.config.search.generations))
     done = sum(takewhile(bool, known))
     if not done:
@@ -166,7 +176,7 @@ def _open(name: str, config: RunConfig) -> bool:
 def _ends(run: Run, generations: range) -> dict[str, float]:
     """Return the mean of each quantity over the successful candidates of these generations.
 
-    It is NaN for a quantity that none of them has.
+    The mean is NaN for a quantity that no candidate has.
     """
     values: dict[str, list[float]] = defaultdict(list)
     for candidate in run.candidates:

@@ -26,5 +26,9 @@ MEANINGS = {
 
 
 def hint(term: str, shown: str | None = None) -> Html:
-    """Return a term with its explanation, displayed as `shown` if given."""
+    """Return a term with its explanation.
+
+    term: a key of MEANINGS
+    shown: text in place of the term; None: the term itself
+    """
     return html('<dfn tabindex="0" aria-label="{}: {}">{}</dfn>', term, MEANINGS[term], shown or term)

@@ -19,7 +19,10 @@ MOST = 60  # maximum number of animals on a page; if there are more, evenly spac
 def lineup(run: Run) -> Html:
     """Return two cards side by side: on the left the first animal, on the right the one that the slider selects.
 
-    The script lineup.js shows the card of the selected generation.
+    The script lineup.js shows the card of the selected generation. If no candidate has succeeded, the result is empty.
+
+    Raises:
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
     """
     best = _thinned(champions(run.candidates))
     if not best:
@@ -33,14 +36,14 @@ def lineup(run: Run) -> Html:
     )
     return html(
         '<div class="lineup"><div class="first"><h4>{}</h4>{}</div><div><h4>{}</h4>{}</div></div>\n',
-        *(_whose(first[0]), _card(run, *first, "line-first"), slider if last else html("The best of all"), cards),
+        *(_heading(first[0]), _card(run, *first, "line-first"), slider if last else html("The best of all"), cards),
     )
 
 
-def _whose(generation: int) -> str:
+def _heading(generation: int) -> str:
     """Return the heading of the first animal.
 
-    Its generation is not 0 if all candidates of the earlier generations have failed.
+    generation: generation of the animal; it is not 0 if all candidates of the earlier generations have failed
     """
     return f"Generation {generation}’s best{', the first to succeed' if generation else ''}"
 

@@ -42,7 +42,7 @@ _SLOT = "{}"
 
 @dataclass(frozen=True)
 class Html:
-    """A piece of a page. Modules other than this one and `svg` must not create it directly, but with `html`.
+    """A piece of a page. Modules other than this one and `svg` must create pieces only with the function `html`.
 
     markup: the HTML text
     rules: CSS declarations for elements of this piece, by the value of the elements' attribute `data-look`
@@ -59,7 +59,9 @@ class Html:
 
 
 def html(template: str, *pieces: object) -> Html:
-    """Fill the placeholders "{}" of a template in order: with Html objects unchanged, with others as escaped text.
+    """Return a template with its placeholders "{}" replaced by the pieces, in order.
+
+    Html objects are inserted unchanged, and all other pieces as escaped text.
 
     Raises:
         ValueError: the number of pieces differs from the number of placeholders.
@@ -73,16 +75,16 @@ def html(template: str, *pieces: object) -> Html:
 
 
 def joined(pieces: Iterable[Html]) -> Html:
-    """Return all pieces in sequence."""
+    """Return one piece that contains all pieces in sequence."""
     listed = list(pieces)
     return html(_SLOT * len(listed), *listed)
 
 
 def style(declarations: str) -> Html:
-    """Return an attribute that gives an element some CSS declarations, such as "width:5px".
+    """Return an attribute that applies CSS declarations, such as "width:5px", to its element.
 
-    The page's policy does not allow the attribute `style`. The attribute `data-look` refers to a rule in the page's
-    style sheet instead.
+    The page's content security policy does not allow the attribute `style`. The attribute `data-look` refers to a rule
+    in the page's style sheet instead.
 
     Raises:
         ValueError: the text contains more than declarations.
@@ -124,7 +126,7 @@ def duration(seconds: float) -> str:
 
 
 def exact(value: float) -> str:
-    """Return a setting or an integer as text, without rounding to a few digits."""
+    """Return a setting or an integer as text, with at most six significant digits."""
     return f"{value:g}".replace("-", "−")
 
 
@@ -137,6 +139,7 @@ def table(
 ) -> Html:
     """Return a table that can be scrolled sideways.
 
+    header, rows: cells of the first row, and of the other rows; texts are escaped
     name: id of the table
     highlight: number of the row that is emphasised; None: no row
     ids: id of each row
@@ -159,7 +162,10 @@ def table(
 
 
 def figure(content: Html, caption: Html, kind: str = "") -> Html:
-    """Return a figure with its caption."""
+    """Return a figure with its caption.
+
+    kind: CSS class of the figure
+    """
     return html('<figure class="{}">{}<figcaption>{}</figcaption></figure>\n', kind, content, caption)
 
 
@@ -189,11 +195,11 @@ def asset(name: str) -> str:
 
 
 def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
-    """Return a complete, self-contained page.
+    """Return a complete, self-contained page, encoded as UTF-8.
 
     The content security policy of the page forbids all other files, styles and scripts.
 
-    scripts: names of the files with scripts
+    scripts: names of the files with scripts, in this module's folder
     """
     from evolve.report.theme import CSS
 

@@ -21,9 +21,9 @@ from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["require_ffmpeg", "write_gif", "write_mp4"]
 
-HEIGHT, ASIDE, GAP = 320, 320, 10  # height, maximum width of the part with the eyes, and gaps around eyes [pixels]
+HEIGHT, ASIDE, GAP = 320, 320, 10  # [pixels] height of a frame, maximum width of all eyes, and gaps around eyes
 INSET = 0.36  # height of the plan within a rendered image, relative to that of the image
-SMOOTH = 2  # factor by which the drawing is larger before it is reduced, so that edges are smooth
+SMOOTH = 2  # factor by which the plan is drawn larger before it is reduced, so that edges are smooth
 SPEED = 2.0  # speed relative to real time
 LONGEST = 150  # maximum number of frames in a GIF, which limits its size, because noise hardly compresses
 FIELD = "#c9e0ef"  # colour of fields of view
@@ -33,7 +33,11 @@ SAMPLES = 8  # frames from which the palette's colours are chosen
 
 
 def write_gif(episode: Episode, path: Path) -> Path:
-    """Write an episode as a GIF that repeats, completely or not at all, and return its path."""
+    """Write an episode as a GIF that repeats, completely or not at all, and return its path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
     stride = max(1, -(-len(episode) // LONGEST))
     frames = list(_frames(episode, stride))
     palette = _palette(frames[:: -(-len(frames) // SAMPLES)])
@@ -65,6 +69,7 @@ def write_mp4(episode: Episode, path: Path) -> Path:
 
     Raises:
         ConfigError: ffmpeg is not installed.
+        OSError: the file cannot be written.
     """
     frames = _frames(episode, stride=1)
     first = next(frames)
@@ -133,6 +138,8 @@ def _from_above(episode: Episode, plan: GroundPlan, time: int) -> Image.Image:
 def _frame(world: Image.Image, seen: np.ndarray, aspect: float) -> Image.Image:
     """Return one frame, with the world on the left, and the signals of all eyes on the right, row by row.
 
+    world: image of the world
+    seen: signals of the eyes as pixels, (eye, y, x, 3)
     aspect: width of a field of view divided by its height
     """
     columns = max(range(1, len(seen) + 1), key=lambda number: _eye_height(len(seen), number, aspect))
@@ -148,7 +155,10 @@ def _frame(world: Image.Image, seen: np.ndarray, aspect: float) -> Image.Image:
 
 
 def _eye_height(eyes: int, columns: int, aspect: float) -> float:
-    """Return the largest height of eyes in a number of columns [pixels]."""
+    """Return the largest height of an eye's image [pixels] if all images are arranged in a number of columns.
+
+    aspect: width of an image divided by its height
+    """
     rows = -(-eyes // columns)
     return min((HEIGHT - GAP * (rows - 1)) / rows, (ASIDE - GAP * (columns - 1)) / columns / aspect)
 

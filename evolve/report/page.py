@@ -78,7 +78,12 @@ def animals_section(run: Run) -> Html:
 
 
 def numbers_section(run: Run) -> Html:
-    """Return the section with the main results; if there is a test set of layouts, the best candidate plays in it."""
+    """Return the section with the main results. If there is a test set of layouts, the best candidate plays in it.
+
+    Raises:
+        RunError: the policy of the best candidate is missing or damaged.
+        OSError: the policy's file cannot be read.
+    """
     has_test_set = run.config.world.layouts == FAMILY and run.best is not None
     held_out = held_out_episodes(run).returns.tolist() if has_test_set else ()
     return section("numbers", "The run in numbers", tables.headline(run, held_out))
@@ -126,13 +131,13 @@ def _acuity(run: Run) -> Html:
     path, upwards = (trajectory(run.candidates, acuity) for acuity in (acuity_cpd, acuity_vertical_cpd))
     caption = html(
         "<b>{}</b>: finest grating that the spacing of receptors can resolve, 1 / (2 min(placement range / (eyes − 1), "
-        "fov / width))",
+        "fov / columns))",
         hint("acuity"),
     )
     drawn = figure(gene_figure("acuity", "cycles / degree", path, None), caption)
     if all(acuity_cpd(c.phenotype) == acuity_vertical_cpd(c.phenotype) for c in run.candidates):
         return drawn
-    caption = html("<b>vertical acuity</b>: the same for gratings with horizontal bars, 1 / (2 vertical fov / height)")
+    caption = html("<b>vertical acuity</b>: the same for gratings with horizontal bars, 1 / (2 vertical fov / rows)")
     return drawn + figure(gene_figure("vertical-acuity", "cycles / degree", upwards, None), caption)
 
 
@@ -176,12 +181,12 @@ def candidates_section(run: Run) -> Html:
     """Return the section with the tables of all candidates and of failures."""
     what = "Task fitness" if any_costs(run.candidates) else "Fitness"
     intro = html(
-        "<p>{} is the mean return of the evaluation episodes. The lowest and the highest returns are of single "
+        "<p>{} is the mean return of the evaluation episodes. The lowest and the highest returns are those of single "
         "episodes.</p>\n",
         what,
     )
-    everybody = tables.all_candidates(run) + tables.failures(run)
-    return section("candidates", "Candidates", intro + everybody + tables.episode_failures(run))
+    found = tables.all_candidates(run) + tables.failures(run) + tables.episode_failures(run)
+    return section("candidates", "Candidates", intro + found)
 
 
 def facts_section(run: Run) -> Html:
@@ -189,7 +194,7 @@ def facts_section(run: Run) -> Html:
 
 
 def best_section(run: Run, best: Candidate, episode: Episode) -> Html:
-    """Return the section on the best candidate: its eye, its views, and its genes."""
+    """Return the section on the best candidate: its eye, its views in the episode, and its genes."""
     content = html(
         "<p>{} {} of {} {}, {} {}.</p>\n{}<h3>Views</h3>\n{}<h3>Genes</h3>\n{}",
         *(hint("candidate", "Candidate"), best.id, hint("generation"), best.generation),
@@ -215,8 +220,8 @@ def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[
         yield "the first animal and the best", lambda doing: animals_section(run)
         yield "the best eye", lambda doing: best_section(run, best, episode)
     else:
-        nobody = html("<p>No candidate has been evaluated successfully.</p>\n")
-        yield "the best eye", lambda doing: section("best", "The best eye", nobody)
+        none = html("<p>No candidate has been evaluated successfully.</p>\n")
+        yield "the best eye", lambda doing: section("best", "The best eye", none)
     yield "the run in numbers", lambda doing: numbers_section(run)
     yield "fitness over the generations", lambda doing: fitness_section(run)
     yield "genes over the generations", lambda doing: genes_section(run)
@@ -230,16 +235,23 @@ def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
 
     done: number of completed sections
     of: number of all sections
+    what: current step
     share: completed fraction of the current section
     """
     doing(what, (done + share) / of)
 
 
 def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> bytes:
-    """Return the whole page.
+    """Return the whole page, encoded as UTF-8.
 
     episode: an episode of the best candidate; None if no candidate has succeeded
     doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
+
+    Raises:
+        RunError: the run has a test set of layouts, and the policy of the best candidate is missing or damaged.
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        OSError: a file of the run cannot be read.
     """
     makers = list(_makers(run, episode))
     parts = []

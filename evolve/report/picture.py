@@ -18,9 +18,10 @@ def display(signals: NDArray[np.floating], gain: float = 1.0) -> NDArray[np.uint
     """Return signals (..., channel, y, x) as sRGB pixels (..., y, x, 3).
 
     The first three channels are used as linear red, green and blue. If there are fewer, their mean is shown as grey.
-    The encoding follows IEC 61966-2-1:1999.
+    After multiplication by `gain`, the signal 1 is white, and values outside [0, 1] are clipped. The encoding follows
+    IEC 61966-2-1:1999.
 
-    gain: factor by which signals are multiplied; 1 is then white
+    gain: factor by which signals are multiplied
     """
     linear = np.moveaxis(np.asarray(signals, dtype=np.float64), -3, -1)
     linear = linear[..., :3] if linear.shape[-1] >= 3 else linear.mean(axis=-1, keepdims=True).repeat(3, axis=-1)

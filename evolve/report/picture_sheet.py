@@ -15,7 +15,7 @@ from evolve.report.picture import SHEET_WIDTH
 
 __all__ = ["figure_of_pictures", "film_of_pictures"]
 
-WIDTH = 320  # width of an image on a page, in pixels
+WIDTH = 320  # [pixels] width of an image on a page
 QUALITY = 80  # quality of JPEG; artefacts are invisible at this size of the images
 
 
@@ -37,7 +37,7 @@ def figure_of_pictures(pictures: Pictures) -> Html:
 def film_of_pictures(pictures: Pictures, kept: np.ndarray) -> dict[str, Any]:
     """Return the part of the data for player.js that contains the images.
 
-    kept: time steps that the player shows
+    kept: time steps that the player shows, in ascending order
     """
     size = _size(pictures)
     columns = max(1, min(len(pictures.pixels), SHEET_WIDTH // size[1]))

@@ -16,15 +16,19 @@ from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["episode_sentence", "player", "write_player"]
 
-# Maximum size of the pixels on a sheet [bytes]. It limits the size of the page, because noise hardly compresses.
+# [bytes] Maximum size of the pixels on a sheet. It limits the size of the page, because noise hardly compresses.
 LARGEST_FILM = 1_500_000
-ROOM = 200  # length of the longer side of an eye's image, half of it with more than six eyes [CSS pixels]
+ROOM = 200  # [CSS pixels] length of the longer side of an eye's image; half of it if there are more than six eyes
 EVENTS = ("goal", "adversary")  # reward terms that player.js marks when they differ from 0
 TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # player.js uses the same colours
 
 
 def write_player(episode: Episode, path: Path) -> Path:
-    """Write a page that plays the episode, and return its path."""
+    """Write a page that plays the episode, completely or not at all, and return its path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
     name = f"{episode.title}: candidate {episode.candidate_id} plays"
     body = html(
         '<header><p class="kicker">rhabdom · replay</p>\n<h1>{}</h1>\n<p>{}</p></header>\n{}',
@@ -44,7 +48,7 @@ def episode_sentence(episode: Episode) -> str:
 
 
 def player(episode: Episode) -> Html:
-    """Return the player as an element; its page must include the script player.js."""
+    """Return the player as an element. Its page must include the script player.js."""
     film = json_script(_film(episode), "film")
     left, right = _controls(episode) + _world(episode) + _score(episode), _sights(episode)
     return html(
@@ -83,7 +87,10 @@ def _from_above(plan: GroundPlan) -> Html:
 
 
 def _sights(episode: Episode) -> Html:
-    """Return a pair of canvases for each eye, which show its signals and the signals behind a perfect lens."""
+    """Return a pair of canvases for each eye, which show its signals with noise and the signals without noise.
+
+    The signals without noise are those behind a perfect lens, except for compound eyes.
+    """
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
     room = ROOM if eyes.n_eyes <= 6 else ROOM // 2
@@ -163,9 +170,9 @@ def _film(episode: Episode) -> dict[str, Any]:
 
 
 def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
-    """Return the part of the data that describes the world: commands, and rendered images if there are any.
+    """Return the part of the data for player.js that describes the world: commands, and images if there are any.
 
-    With a ground plan, it also contains positions [m] and angles [rad].
+    If the task has a ground plan, it also contains positions [m] and angles [rad].
     """
     plan = episode.plan
     part = _commands(episode, kept) | ({} if episode.pictures is None else film_of_pictures(episode.pictures, kept))
@@ -214,7 +221,10 @@ def _kept(episode: Episode) -> np.ndarray:
 
 
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
-    """Return (frame, "goal" or "adversary") for each object that was reached; the frame is the first one afterwards."""
+    """Return (frame, "goal" or "adversary") for each time at which an object was reached, in order of the frames.
+
+    frame: index in `kept` of the first time step from then on
+    """
     found = [
         (int(np.searchsorted(kept, time)), name)
         for name in EVENTS
@@ -224,5 +234,5 @@ def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
 
 
 def _rounded(values: np.ndarray, decimals: int = 3) -> Any:
-    """Return nested lists of rounded numbers. In the drawing, a millimetre is invisible."""
+    """Return nested lists of rounded numbers. Three decimals suffice for positions [m], since 1 mm is invisible."""
     return np.round(np.asarray(values, dtype=np.float64), decimals).tolist()

@@ -35,16 +35,19 @@ def write_replay(
     candidate_id: id of the candidate that plays; None: the best candidate
     seed: seed of the episode
     every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8
-    also: formats of additional files next to the page: "rrd" (a recording for rerun), "gif" and "mp4"
+    also: formats of additional files next to the page: "rrd" (a recording for Rerun), "gif" and "mp4"
     out: path of the page; None: a name in the run directory
     mode: "evaluation", or "test" for the layouts of the test set
 
     Raises:
-        RunError: the candidate does not exist, or it has no policy.
-        ConfigError: rerun or ffmpeg is needed but not installed, `out` has the ending of an additional file, a format
-            is unknown, `every` is given without "rrd", or the run has no test set.
+        RunError: the candidate does not exist, or its policy is missing or damaged.
+        ConfigError: the package `rerun` or ffmpeg is needed but not installed, `out` has the ending of an additional
+            file, a format or the mode is unknown, `every` is given without "rrd", the run has no test set, or the user
+            task was not named when the run was opened, or fails.
         StrangeFileError: `out` is not a regular file, for example a directory.
         ValueError: `every` is not a whole number from 1 to 1,000,000.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        OSError: a file cannot be read or written.
     """
     if isinstance(also, str) or not set(also) <= set(BESIDE):
         raise ConfigError(f"also = {quoted(also)}: must be a list of {', '.join(BESIDE)}")
@@ -62,7 +65,12 @@ def write_replay(
 
 
 def _require_page(out: Path) -> None:
-    """Check the path of the page. The check comes first, because playing an episode takes time."""
+    """Check the path of the page. The check precedes the episode, because playing takes time.
+
+    Raises:
+        ConfigError: the path has the ending of an additional file.
+        StrangeFileError: the path is not a regular file.
+    """
     require_file_name(out)
     if (form := out.suffix.lower().removeprefix(".")) in BESIDE:
         page = out.with_suffix(".html")
@@ -70,7 +78,11 @@ def _require_page(out: Path) -> None:
 
 
 def write_page(run: Run, episode: Episode, out: Path | None = None) -> Path:
-    """Write the page that plays an episode of a run, to `out` or into the run directory, and return its path."""
+    """Write the page that plays an episode of a run, to `out` or into the run directory, and return its path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
     test = "_test" if episode.mode == "test" else ""
     path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}{test}.html"
     if out is not None:  # a run directory that was deleted meanwhile must not reappear

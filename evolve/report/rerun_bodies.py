@@ -1,4 +1,4 @@
-"""Bodies of a task's model, with their visible geoms, and the animal's eyes, for rerun."""
+"""Bodies of a task's model, with their visible geoms, and the animal's eyes, for Rerun."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GOAL, GOAL_HEIGHT = (0, 158, 115), 0.01  # colour (green) and half height [m] of
 
 
 def draw_bodies(to: RerunStream, scene: EpisodeScene, eyes: sim.Eyes) -> None:
-    """Log all bodies and eyes, with their poses before each action."""
+    """Log all bodies and eyes with their poses before each action, and the animal's path."""
     for body in sorted({solid.body for solid in scene.solids}):
         _place(to, (*BODIES, scene.bodies[body]), scene.positions[:, body], scene.rotations[:, body])
     for solid in scene.solids:
@@ -64,6 +64,6 @@ def _shape(rr: Any, solid: Solid) -> Any:
         return rr.Boxes3D(half_sizes=[[x, y, z]], **look)
     if solid.kind == "ellipsoid":
         return rr.Ellipsoids3D(half_sizes=[[x, y, z]], **look)
-    if solid.kind == "capsule":  # in rerun, the origin of a capsule is the centre of one end
+    if solid.kind == "capsule":  # in Rerun, the origin of a capsule is the centre of one end
         return rr.Capsules3D(lengths=[2 * z], radii=[x], translations=[[0, 0, -z]], **look)
     return rr.Cylinders3D(lengths=[2 * z], radii=[x], **look)

@@ -1,4 +1,4 @@
-"""Layout in which rerun shows a recording: the world, numbers over time, and the images of each eye."""
+"""Layout in which the viewer Rerun shows a recording: the world, numbers over time, and the images of each eye."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ ACROSS = 4  # maximum number of eyes side by side
 
 
 def layout(rr: Any, episode: Episode) -> Any:
-    """Return a blueprint (rerun's description of a layout) for the entities that `rerun_recording` logs.
+    """Return a blueprint (Rerun's description of a layout) for the entities that `rerun_recording` logs.
 
     Without a blueprint, the viewer would superimpose the images of all eyes.
 
-    rr: the package rerun
+    rr: the package `rerun`
     """
     import rerun.blueprint as views
 

@@ -1,7 +1,7 @@
-"""Recording of an episode for the viewer rerun, which opens it with `rerun FILE.rrd`. It needs the extra `rerun`.
+"""Recording of an episode for the viewer Rerun, which opens it with `rerun FILE.rrd`. It needs the extra `rerun`.
 
-A recording has two timelines: `action` is the number of the action, `time` is the time in the world [s]. It has the
-following entities.
+A recording has two timelines: `action` is the number of the action, and `time` is the time in the world [s]. The
+recording has the following entities.
 
 `world` contains `bodies`, the animal's `path` and its `eyes`. Each eye is a camera with an image of its signals.
 
@@ -33,21 +33,22 @@ COLORS = ((235, 235, 235), (230, 159, 0), (86, 180, 233), (213, 94, 0), (0, 158,
 
 
 def write_recording(episode: Episode, path: Path) -> Path:
-    """Write an episode, completely or not at all, and return the path.
+    """Write an episode as a recording, completely or not at all, and return the path.
 
     Raises:
-        ConfigError: rerun is not installed.
+        ConfigError: the package `rerun` is not installed.
+        OSError: the file cannot be written.
     """
     rr = require_rerun()
     name = f"{episode.task}, candidate {episode.candidate_id}, seed {episode.seed}"
     stream = rr.RecordingStream("rhabdom", recording_id=name, send_properties=False)
     opens_with = layout(rr, episode)
     strict = rr.strict_mode()
-    rr.set_strict_mode(True)  # otherwise, rerun omits invalid arguments with only a warning
+    rr.set_strict_mode(True)  # otherwise, Rerun omits invalid arguments with only a warning
     try:
         with unfinished(path) as neighbour:
             stream.save(neighbour, default_blueprint=opens_with)
-            stream.set_log_time_enabled(False)  # rerun would add timelines for the time of writing
+            stream.set_log_time_enabled(False)  # Rerun would add timelines for the time of writing
             stream.set_log_tick_enabled(False)
             _write(RerunStream(rr, stream, episode.seconds), episode)
             stream.flush()
@@ -68,7 +69,10 @@ def _write(to: RerunStream, episode: Episode) -> None:
 
 
 def _log_images(to: RerunStream, episode: Episode) -> None:
-    """Log, before each action, the signals of each eye, those behind a perfect lens, and the scene if recorded."""
+    """Log, for the time before each action, the signals of each eye, and those behind a perfect lens.
+
+    At times at which radiance was recorded, also log the scene in front of each eye.
+    """
     rr, weights = to.rr, episode.eyes.eye().spectral_bands.weights
     gain = episode.gain
     scenes = {int(t): frame for frame, t in enumerate(episode.radiance_frames)}
@@ -98,7 +102,7 @@ def _log_numbers(to: RerunStream, episode: Episode) -> None:
 
 def _end(to: RerunStream, episode: Episode) -> None:
     """Log the outcome at the last action."""
-    told, level = ("solved" if episode.solved else "not solved"), "INFO"
+    outcome, level = ("solved" if episode.solved else "not solved"), "INFO"
     if episode.failure is not None:
-        told, level = f"failed: {episode.failure}", "ERROR"
-    to.log(len(episode) - 1, ("outcome",), to.rr.TextLog(told, level=level))
+        outcome, level = f"failed: {episode.failure}", "ERROR"
+    to.log(len(episode) - 1, ("outcome",), to.rr.TextLog(outcome, level=level))

@@ -1,4 +1,4 @@
-"""RerunStream: writer of a recording for rerun."""
+"""RerunStream: writer of a recording for Rerun."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from evolve.config.run_config import ConfigError
 
 __all__ = ["RerunStream", "require_rerun"]
 
-PATH = (230, 180, 60)
+PATH = (230, 180, 60)  # colour of the animal's path
 
 
 def require_rerun() -> Any:
-    """Return the package rerun.
+    """Return the package `rerun`.
 
     Raises:
-        ConfigError: rerun is not installed.
+        ConfigError: the package `rerun` is not installed.
     """
     try:
         import rerun
@@ -33,7 +33,7 @@ def require_rerun() -> Any:
 class RerunStream:
     """Writer of a recording.
 
-    rr: the package rerun
+    rr: the package `rerun`
     stream: an rr.RecordingStream
     seconds: duration of one action [s]
 
@@ -58,14 +58,17 @@ class RerunStream:
     def columns(self, entity: tuple[str, ...], n: int, columns: Any) -> None:
         """Log the states of an entity before each of n actions.
 
-        columns: one state for each action, as rerun's columns
+        columns: one state for each action, as columns of the package `rerun`
         """
         actions, rr = np.arange(n), self.rr
         times = [rr.TimeColumn("action", sequence=actions), rr.TimeColumn("time", duration=actions * self.seconds)]
         rr.send_columns(rr.new_entity_path(list(entity)), times, columns, recording=self.stream)
 
     def camera(self, entity: tuple[str, ...], eyes: sim.Eyes) -> None:
-        """Log an entity as a camera with the field of view of these eyes. It looks along z, with x right and y down."""
+        """Log an entity as a camera with the field of view of these eyes.
+
+        In its own frame, the camera looks along z, with x to the right and y down.
+        """
         height, width = eyes.resolution
         # In receptor widths and heights.
         focal_length = [
@@ -84,5 +87,7 @@ def camera_frames(rotations: np.ndarray) -> np.ndarray:
     """Return the frames of eyes as right-handed frames of cameras, (..., 3, 3).
 
     The columns of an eye's frame are (right, up, ahead). A camera's frame has the columns (right, down, ahead).
+
+    rotations: frames of the eyes, (..., 3, 3)
     """
     return rotations * np.array([1, -1, 1])

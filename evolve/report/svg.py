@@ -68,7 +68,8 @@ def label(name: str) -> str:
 def inline(figure: Figure, name: str, alt: str) -> Html:
     """Return a figure as an <svg> element.
 
-    The page's policy does not allow styles in elements, so these are moved to the page's style sheet.
+    The page's content security policy does not allow styles in elements. The styles of the figure are therefore moved
+    to the page's style sheet.
 
     name: prefix of the ids in the element, unique on the page
     alt: description of the figure for screen readers
@@ -90,7 +91,7 @@ def inline(figure: Figure, name: str, alt: str) -> Html:
 
 
 def _without_inline_styles(text: str) -> Html:
-    """Replace the attributes `style` by `data-look`. The figure's text cannot match, because its quotes are escaped."""
+    """Replace the attributes `style` by `data-look`. The figure's text cannot match, as its quotes are escaped."""
     pieces = re.split(r' style="([^"]*)"', text)
     return joined(html(" {}", style(unescape(piece))) if at % 2 else Html(piece) for at, piece in enumerate(pieces))
 

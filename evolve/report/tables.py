@@ -73,7 +73,7 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
 
 
 def _best_spread(best: Candidate) -> str:
-    """Return the parts of the fitness if there are costs, and the interval of the fitness, in words."""
+    """Return the interval of the fitness in words, after the parts of the fitness if there are costs."""
     spread = _spread(best.returns, best.costs)
     if not best.costs:
         return spread
@@ -111,7 +111,7 @@ def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str 
 
 
 def all_candidates(run: Run) -> Html:
-    """Return a table with a row for each candidate, sorted by id; the row of the best candidate is emphasised."""
+    """Return a table with a row for each candidate, in the order of ids. The best candidate's row is emphasised."""
     costs, acuity = any_costs(run.candidates), f"acuity{_directions(run.candidates)} [cpd]"
     header = [
         *("no.", "gener\u00adation", "fitness", *(("task fitness", "costs") if costs else ())),
@@ -136,19 +136,19 @@ def _candidate_row(candidate: Candidate, costs: bool) -> list[str]:
 
 
 def field_of_view(animal: Phenotype) -> str:
-    """Return the fields of view of an animal's eyes, with the vertical one unless receptors are square."""
+    """Return the fields of view of an animal's eyes as text; only the horizontal one if receptors are square."""
     high = "" if animal.vertical_fov_deg is None else f", {rounded(animal.vertical_fov_deg)}° high"
     return f"{rounded(animal.fov_deg)}° wide{high}"
 
 
 def _fields(phenotype: Phenotype) -> str:
-    """Return the fields of view (width × height); only the width if receptors are square."""
+    """Return the fields of view as text (width × height), or only the width if receptors are square."""
     fields = (phenotype.fov_deg, *(() if phenotype.vertical_fov_deg is None else (phenotype.vertical_fov_deg,)))
     return " × ".join(map(rounded, fields))
 
 
 def acuity_text(animal: Phenotype, unit: str) -> str:
-    """Return the acuity of an animal with its unit, for each direction if the two differ."""
+    """Return the acuity of an animal as text with its unit, for each direction if the two acuities differ."""
     across, up = _both_acuities(animal)
     return f"{across} {unit}" if across == up else f"{across} {unit} horizontally, {up} vertically"
 
@@ -158,7 +158,7 @@ def _both_acuities(animal: Phenotype) -> tuple[str, str]:
 
 
 def _acuities(animal: Phenotype) -> str:
-    """Return the acuity (horizontal × vertical); a single number if they are equal."""
+    """Return the acuities as text (horizontal × vertical), or a single number if the two are equal."""
     return " × ".join(dict.fromkeys(_both_acuities(animal)))
 
 

@@ -1,8 +1,9 @@
 """Colours of the report, after the palette of Okabe and Ito, which colour-blind readers can distinguish.
 
-Every colour has a value for light pages and a value for dark pages. All are suitable for text on paper: their contrast
-is at least 4.5 (WCAG 2.2, 1.4.3). Figures are drawn with the light values. The module `svg` replaces these by CSS
-variables, so that figures follow the page's theme.
+Every colour has a value for light pages and a value for dark pages. The colours of text and curves (INK, MUTED, ACCENT,
+VERMILLION, GREEN and PURPLE) are legible on PAPER and PANEL: their contrast is at least 4.5 (WCAG 2.2, 1.4.3). Figures
+are drawn with the light values. The module `svg` replaces these by CSS variables, so that figures follow the page's
+theme.
 """
 
 from __future__ import annotations

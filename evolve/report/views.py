@@ -19,7 +19,7 @@ MOST_EYES = 6  # maximum number of eyes that are shown
 
 
 def what_it_sees(episode: Episode) -> Html:
-    """Return the images of each eye with their caption."""
+    """Return the images of each eye at the time with most detail, with their caption."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])
     lens, names, gain = episode.eyes.eye(), episode.eyes.names(), episode.gain
@@ -52,10 +52,10 @@ def _figure(rows: Html, caption: Html) -> Html:
 
 
 def _busiest(episode: Episode) -> int:
-    """Return the frame with recorded radiance in which the eyes see most detail.
+    """Return the index of the recorded radiance with most detail.
 
     Detail is measured as the variance of radiance in the horizontal direction. Variance in the vertical direction is
-    ignored, because every frame shows the sky above the floor.
+    ignored, because every image shows the sky above the floor.
     """
     return int(np.argmax(episode.radiance.mean(axis=2).var(axis=-1).mean(axis=(1, 2))))
 
@@ -82,10 +82,12 @@ def _row(episode: Episode, eye: int, name: str, frame: int, lens: WorldEye) -> H
 
 
 def through_optics(eye: optics.Eye, radiance: np.ndarray) -> np.ndarray:
-    """Return the noise-free signals (channel, h, w) of an eye in front of a scene with the radiance (band, y, x).
+    """Return the noise-free signals of an eye in front of a scene, (channel, height, width).
 
-    Beyond the edges of the image, the values at the edges are used, as far as the kernel of the eye extends, but at
-    most over the width of the image.
+    The image of the scene is padded with the values at its edges, by the reach of the eye's kernel, but at most by the
+    width of the image.
+
+    radiance: radiance of the scene, (band, y, x), with a whole number of pixels for each receptor
     """
     samples = radiance.shape[-1] // eye.resolution[1]
     reach = min(max(eye.kernel(samples).shape[1:]) // 2, radiance.shape[-1])

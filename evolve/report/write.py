@@ -26,8 +26,11 @@ def write(run: Run, episode: Episode | None = None, out: Path | None = None, doi
     doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
 
     Raises:
-        ValueError: the best candidate's policy is missing or damaged.
+        RunError: the best candidate's policy is missing or damaged.
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         StrangeFileError: `out` is not a regular file, for example a directory.
+        OSError: a file cannot be read or written.
     """
     from evolve.analysis.recorder import record
     from evolve.report.page import render

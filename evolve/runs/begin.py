@@ -29,11 +29,11 @@ class RunRequest:
 
     task: name of a built-in task, or "FILE.py:CLASS" for a user task; None if the preset or the TOML file names the
         task
-    preset: name of the preset from which the settings start
-    config: TOML file, whose settings override the preset
-    assignments: single settings, "KEY=VALUE", which override the file
-    scale: size of a preset that comes in several sizes, see `assemble`
-    start_from: "RUN:ID", an animal of another run, whose genes become the start values
+    preset: name of the preset
+    config: TOML file, whose settings override the preset; None: no file
+    assignments: single settings, "KEY=VALUE", which override all others
+    scale: scale of a preset that has several, see `assemble`; None: "laptop"
+    start_from: "RUN:ID", an animal of another run, whose genes become the start values; None: no animal
     """
 
     task: str | None = None
@@ -49,7 +49,7 @@ class PreparedRun:
     """Checked settings of a run, which is ready to start. Nothing has been written yet.
 
     config: settings of the run
-    preset: name of the preset, which becomes part of the name of the run directory
+    preset: name for the run directory: that of the preset, without the name of the task at its end
     origin: "RUN:ID", the animal whose genes are the start values; None without such an animal
     """
 
@@ -58,12 +58,15 @@ class PreparedRun:
     origin: str | None
 
     def directory(self, out: Path | str | None = None) -> Path:
-        """Return the run directory that `create` would use if it were called now."""
+        """Return the run directory that `create` would use if it were called now.
+
+        out: run directory; None: runs/TASK-PRESET-N, with the first free number N
+        """
         return next_directory(self.config.task_name, self.preset) if out is None else Path(out)
 
     @contextmanager
     def create(self, kind: type[RunT], out: Path | str | None = None) -> Iterator[RunT]:
-        """Create the run and hold its lock within the context.
+        """Create the run, yield it, and hold its lock within the context.
 
         kind: class of the returned object, `Run` or a subclass
         out: run directory; None: runs/TASK-PRESET-N, with the first free number N
@@ -87,10 +90,10 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
         processes then try the task and measure its pace
 
     Raises:
-        ConfigError: a setting is invalid, the optimizer is unknown, two random layouts are equal, or the user task
-            fails or has several mounts that no animal would use; the message is one line.
-        RunError: the animal to start from does not exist.
-        BackendError: Dr.Jit cannot find a usable LLVM library.
+        ConfigError: a setting is invalid, the optimizer is unknown, random layouts cannot be drawn or two of them are
+            equal, or the user task fails or has several mounts that no animal would use; the message is one line.
+        RunError: the run or the animal of `start_from` does not exist, or its record is damaged.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     starts = starts_from(request.start_from) if request.start_from else None
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)
@@ -106,7 +109,9 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
 
 
 def check_task(config: RunConfig) -> list[Warning | str]:
-    """Check the settings of the user task, try it, and return each warning once; for use in a worker process.
+    """Check the layouts and the user task of a run, try the task, and return the warnings of rhabdom, each once.
+
+    A worker process calls this function while a run is planned; see `evolve.cli.pace`.
 
     Raises:
         ConfigError: see `check_settings`, `check_layouts` and `try_task`.

@@ -1,7 +1,4 @@
-"""Evaluation of all candidates that are missing in a run.
-
-An executor evaluates them, and watchers show the progress.
-"""
+"""Evaluation of the candidates that are missing in a run. An executor evaluates them; watchers show the progress."""
 
 from __future__ import annotations
 
@@ -28,7 +25,10 @@ class Workers(Executor, Protocol):
 
 
 def local_workers(config: RunConfig) -> LocalExecutor:
-    """Return an executor with processes on this machine; the setting `workers` is the number of processes."""
+    """Return an executor with processes on this machine.
+
+    The setting `workers` is the number of processes; for 0, there is one for each core.
+    """
     return LocalExecutor(evaluate_candidate, config.workers, prepare_device)
 
 
@@ -46,8 +46,10 @@ def carry_on(
     workers: function of the run's settings that returns the executor
 
     Raises:
-        RunError: the record cannot be written, or this search proposes other candidates than those on record.
-        ExecutorError: no candidate can be evaluated.
+        RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
+        ExecutorError: no worker can evaluate candidates.
+        ConfigError: the optimizer is unknown, or cannot be used here.
+        OSError: a file of the run cannot be read or written.
     """
     with workers(run.config) as executor, watched(run, executor.count) as watcher:
         evolve(run, executor, watcher)

@@ -4,7 +4,8 @@ Messages, settings and names of directories may come from an untrusted source. E
 visible text, so that they have no effect on the terminal. Characters that the terminal's encoding lacks are spelt out
 ("sigma"), or printed as numbers. If a reader such as `head` closes the pipe, or the disk is full, a run continues.
 
-stdout contains only what `say` prints. Within a command, `print` writes to stderr, as do the users' tasks.
+stdout contains only the text that `say` prints. Within a command, `print` writes to stderr; so do `print` calls in the
+code of users' tasks.
 """
 
 from __future__ import annotations
@@ -27,7 +28,10 @@ _SPELLINGS = {"σ": "sigma", "λ": "lambda", "±": "+-", "×": "x", "°": " deg"
 
 
 def printable(text: str) -> str:
-    """Return the text with control characters escaped as in Python, for example "\\x1b[31m"."""
+    """Return the text with control characters escaped as in Python, for example "\\x1b[31m".
+
+    Invisible characters, such as marks of writing direction, are also escaped. Line feeds and tabs are kept.
+    """
     if text.isascii() and text.replace("\n", "").isprintable():
         return text
     return "".join(
@@ -62,11 +66,14 @@ class Voice(OwnedStream):
     """A text stream that writes to another stream, with control characters escaped.
 
     stream: the stream that receives the text
-    patient: True to continue without output after a fault. False: if the reader has closed the pipe, a BrokenPipeError
-        ends the command, and other faults raise an OSError
+    patient: True to continue without output after a fault
     obeyed: True to write control characters unchanged, which a progress bar needs
-    name: name of the stream in the error, and in the note of a patient stream; None: faults other than a closed pipe
-        are not reported
+    name: name of the stream in the error of an impatient stream, and in the note that a patient stream prints on
+        stderr; None: faults other than a closed pipe are ignored
+
+    Raises:
+        BrokenPipeError: on writing, the reader has closed the pipe, and `patient` is False.
+        OSError: on writing, another fault has occurred, `patient` is False, and the stream has a name.
     """
 
     def __init__(self, stream: TextIO, patient: bool, obeyed: bool = False, name: str | None = None) -> None:
@@ -78,7 +85,12 @@ class Voice(OwnedStream):
         return len(text)
 
     def _judge(self, fault: OSError | ValueError) -> None:
-        """Report a fault, or raise it if the stream is not patient."""
+        """Report a fault, or raise it if the stream is not patient.
+
+        Raises:
+            BrokenPipeError: the reader has closed the pipe, and the stream is not patient.
+            OSError: another fault has occurred, the stream is not patient, and it has a name.
+        """
         number = fault.errno if isinstance(fault, OSError) else errno.EBADF
         if number in (errno.EPIPE, errno.EIO):  # a closed pipe or terminal
             if not self.patient:
@@ -93,12 +105,12 @@ _results: TextIO | None = None
 
 
 def results() -> TextIO:
-    """Return the stream for the results of a command: stdout."""
+    """Return the stream for the results of a command: stdout, unless `silenced` discards them."""
     return sys.stdout if _results is None else _results
 
 
 def say(text: str, end: str = "\n", flush: bool = False) -> None:
-    """Print a part of a command's result on stdout."""
+    """Print a part of a command's result on stdout, with the arguments `end` and `flush` of `print`."""
     print(text, end=end, file=results(), flush=flush)
 
 
@@ -141,7 +153,7 @@ def _results_on(stream: TextIO) -> Iterator[None]:
 
 
 def as_it_is(stream: TextIO) -> TextIO:
-    """Return a stream that writes to the same destination, but does not escape control characters."""
+    """Return a stream with the same destination that does not escape control characters; see `Voice.obeyed`."""
     if not isinstance(stream, Voice):
         return stream
     return cast(TextIO, Voice(stream.stream, stream.patient, obeyed=True, name=stream.name))

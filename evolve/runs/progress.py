@@ -19,11 +19,16 @@ from evolve.store.directory import Run
 
 __all__ = ["Bar", "Events", "Lines", "Silent", "Tally", "Watchers", "clock", "watcher"]
 
-EVENT_S = 1.0  # minimum time between two events of one candidate's training [s]
+EVENT_S = 1.0  # [s] minimum time between two events of one candidate's training
 
 
 class Tally:
-    """Counts of evaluations and training steps, from which pace and remaining time are computed."""
+    """Counts of evaluations and training steps, from which the pace and the remaining time are computed.
+
+    The pace refers to the time since this process started or resumed the run.
+
+    workers: number of workers
+    """
 
     def __init__(self, run: Run, workers: int = 1) -> None:
         self._run, self._workers = run, workers
@@ -45,13 +50,13 @@ class Tally:
 
     @property
     def done(self) -> float:
-        """Number of evaluations so far, including fractions for candidates that are being trained."""
+        """Number of evaluations on record, plus the completed fractions of those that are in progress."""
         parts = (min(steps / planned, 1.0) for steps, planned in self._in_training.values() if planned)
         return len(self._run.in_order_of_finish) + sum(parts)
 
     @property
     def planned(self) -> int:
-        """Total number of evaluations in the run; a candidate is evaluated after every rung that it reaches."""
+        """Total number of evaluations in the whole run; a candidate is evaluated after every rung that it reaches."""
         return evaluations(self._run.config.search)
 
     @property
@@ -86,7 +91,7 @@ class Tally:
         return statistics.median(fitness) if fitness else None
 
     def summary(self) -> str:
-        """Return the generation, counted from 0, best and median fitness, pace and remaining time as text."""
+        """Return the generation (counted from 0), best and median fitness, pace and remaining time as text."""
         run = self._run
         search = run.config.search
         last = search.generations - 1
@@ -110,7 +115,7 @@ class Tally:
 
 
 class _Watcher:
-    """Base class of watchers, which follow a run and show its progress; a context manager."""
+    """Base class of watchers, which are context managers that follow a run and show its progress."""
 
     def __init__(self, run: Run, out: TextIO, workers: int) -> None:
         self.run, self.out, self.tally = run, out, Tally(run, workers)
@@ -236,7 +241,11 @@ class Watchers:
 
 
 def watcher(run: Run, out: TextIO = sys.stderr, workers: int = 1, as_json: bool = False) -> Bar | Events | Lines:
-    """Return the watcher for an output: Events if `as_json` is true, else Bar on a terminal, and Lines elsewhere."""
+    """Return the watcher for an output: Events if `as_json` is True, else Bar on a terminal, and Lines elsewhere.
+
+    out: stream for the output
+    workers: number of workers, for the utilisation
+    """
     if as_json:
         return Events(run, out, workers)
     return Bar(run, out, workers) if out.isatty() else Lines(run, out, workers)

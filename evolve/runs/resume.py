@@ -23,18 +23,19 @@ def _ignore(note: str) -> None:
 def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
     """Repair a run, hold its lock within the context, and yield whether candidates remain to be evaluated.
 
-    If candidates remain, the run has also been checked, and this start has been recorded in versions.json. Otherwise,
-    obsolete checkpoints have been removed.
+    If candidates remain, the run is also checked, and this start is recorded in versions.json. Otherwise, obsolete
+    checkpoints are removed.
 
-    note: function that is called with each remark for the user: on damaged files, on settings that have changed, and
+    note: function that is called with each message for the user: on damaged files, on settings that have changed, and
         on software that has changed
 
     Raises:
         LockedError: another process is working on the run.
-        RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or the
-            run has a former format.
-        ConfigError: the user task was not named when the run was opened, or the task fails.
-        BackendError: Dr.Jit cannot find a usable LLVM library.
+        RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or its
+            format is too old for the run to be continued.
+        ConfigError: config.toml is invalid, or the user task was not named when the run was opened or fails.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        OSError: a file of the run cannot be read or written.
     """
     device.make_ready()
     with run.lock():
@@ -54,7 +55,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
 
 def _changes(run: Run) -> Iterator[str]:
-    """Yield a note on changed software, which may change the numbers of the run."""
+    """Yield a note if the software has changed since the first start of the run, which may change its numbers."""
     then, now = recorded(run.path), present()
     changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
     if changed:

@@ -24,10 +24,12 @@ def starts_from(text: str) -> Source:
     Some genes are relative to settings: a relief's heights are fractions of `eye.relief_height`, for example. With
     other settings, the same genes would describe another lens. These settings are therefore returned as well.
 
-    text: "RUN:ID", a run directory and a candidate; "RUN" stands for the best candidate of the run
+    text: "RUN:ID", a run directory and the id of a candidate; "RUN" stands for the best candidate of the run
 
     Raises:
-        RunError: the run or the candidate does not exist, or no candidate has succeeded.
+        RunError: the run or the candidate does not exist, no candidate has succeeded, or the record is damaged.
+        ConfigError: the config of the run is invalid.
+        OSError: config.toml cannot be read, or a file of the run is a link or FIFO.
     """
     path, candidate_id = _parsed(text)
     run = Run.open(path)
@@ -59,7 +61,10 @@ def starts_from(text: str) -> Source:
 
 
 def _parsed(text: str) -> tuple[Path, int | None]:
-    """Return the run directory and the candidate of "RUN:ID" or "RUN", where RUN may contain colons, too."""
+    """Return the run directory and the id of the candidate in "RUN:ID"; the id is None for "RUN".
+
+    RUN may also contain colons.
+    """
     head, colon, tail = text.rpartition(":")
     if colon and tail.isdecimal():
         return Path(head), int(tail)

@@ -2,7 +2,7 @@
 
 ask_tell            minimal example of a search, as an introduction
 loop                main loop of a run, from proposals to recorded candidates
-search              Search: proposals of candidates in several phases, and seeds of their training
+search              Search: proposals of candidates, also if genes open in later generations, and training seeds
 optimizers          CMA-ES and other optimizers
 null_model          searches with random fitness, for comparison with runs
 same_search         check that a rebuilt search proposes the candidates on record
@@ -12,7 +12,7 @@ local_executor      executor with processes on this machine
 worker              worker process of the local executor
 dask_executor       executor on a Dask cluster
 dask_connection     connection to a Dask scheduler, with a limited waiting time
-signs_of_life       time without signs of life of a Dask scheduler and its workers
+signs_of_life       time since the last signs of life of a Dask scheduler and its workers
 scheduler           address and certificates of a Dask scheduler
 dask_worker         evaluation of a candidate in a Dask worker
 """

@@ -29,6 +29,13 @@ def ask_tell(
     """Yield the genomes of each generation, and their fitness, which the search maximises.
 
     Each genome is (dimension,), with coordinates in [0, 1].
+
+    fitness: function that returns the finite fitness of a genome
+    start: genome from which the search starts, (dimension,)
+    search: settings; the optimizer "mutation" is not supported, because it needs genes
+
+    Raises:
+        ConfigError: the optimizer is unknown, or cannot be used here.
     """
     optimizer = build_optimizer(Space(genes=(), start=start, seed=(seed,)), search)
     for generation in range(search.generations):
@@ -41,7 +48,7 @@ def ask_tell(
 
 
 def main() -> None:
-    """Find the maximum of a paraboloid at (0.7, 0.7, 0.7)."""
+    """Search for the maximum of a paraboloid, which is at (0.7, 0.7, 0.7), and print the progress."""
     search = SearchConfig(population=8, generations=20)
     generations = ask_tell(lambda genome: -float(np.sum((genome - 0.7) ** 2)), np.full(3, 0.5), search, seed=0)
     for number, (genomes, values) in enumerate(generations):

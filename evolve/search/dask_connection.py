@@ -18,28 +18,30 @@ from evolve.search.signs_of_life import SCHEDULER, SignsOfLife
 
 __all__ = ["LISTEN_S", "Connection", "ConnectionLost"]
 
-CONNECT_S = 8.0
-LISTEN_S = 0.5  # interval between checks [s]
-QUESTION_S = 5.0  # maximum interval between requests to the scheduler for a list of all workers [s]
-NOTICE_S = 10.0  # time without a sign of life after which a note is printed [s]
+CONNECT_S = 8.0  # [s] time limit for an attempt to connect
+LISTEN_S = 0.5  # [s] interval between checks
+QUESTION_S = 5.0  # [s] maximum interval between requests to the scheduler for a list of all workers
+NOTICE_S = 10.0  # [s] time without a sign of life after which the user is notified
 Events = Callable[[Any], Any]
 
 
 class ConnectionLost(Exception):
-    """The scheduler has not answered a call, because the connection was lost."""
+    """The connection to the scheduler was lost during a call."""
 
 
 @dataclass
 class Connection:
-    """Connection to a scheduler, which regularly requests a list of the living workers.
+    """Connection to a scheduler, from which a list of the living workers is requested regularly.
 
+    scheduler: the scheduler
     patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]
     note: function that is called with one line if the run waits for a sign of life
     topic, events: Dask topic to subscribe to, and the function that receives its events
 
     Raises:
-        ExecutorError: the scheduler does not answer, or Dask is not installed. All methods raise it if the patience is
-            exhausted.
+        ExecutorError: the scheduler does not answer, or Dask is not installed. All methods except `close` raise it
+            after `patience_s` without a sign of life.
+        ConfigError: the address of the scheduler requires certificates, but there are none.
     """
 
     scheduler: Scheduler
@@ -61,10 +63,11 @@ class Connection:
 
     @property
     def lost(self) -> bool:
+        """True if Dask's client is not connected to the scheduler."""
         return bool(self.client.status != "running")
 
     def restore(self) -> None:
-        """Connect again, with repeated attempts until the patience is exhausted.
+        """Connect again, with repeated attempts for at most `patience_s`.
 
         Dask's client also reconnects, but gives up after seconds, so a new client replaces it.
         """
@@ -96,13 +99,13 @@ class Connection:
         self._pass_time(2 * LISTEN_S)
 
     def ask(self, call: Callable[[], Awaitable[Any]], timeout: float = math.inf) -> Any:
-        """Return the result of a call of Dask.
+        """Return the result of a call of Dask. Exceptions of the call are passed on.
 
-        By default, its duration is unlimited while the connection shows signs of life.
+        timeout: maximum duration of the call [s]; by default, it is unlimited while there are signs of life
 
         Raises:
             ConnectionLost: the connection was lost during the call.
-            TimeoutError: the call has taken longer than `timeout` seconds.
+            TimeoutError: the call has taken longer than `timeout`.
         """
         from distributed.client import ClosedClientError
 
@@ -124,7 +127,11 @@ class Connection:
             answer.cancel()
 
     def remove_lost_workers(self) -> None:
-        """Remove workers that have been silent for too long from the scheduler, which reassigns their candidates."""
+        """Remove workers that have been silent for `patience_s` from the scheduler, which reassigns their candidates.
+
+        Raises:
+            ConnectionLost: the connection was lost.
+        """
         for address in self.signs.lost_workers:
             silence = f"worker {address} has given no sign of life for {self.patience_s:g} s"
             self.note(f"{self.scheduler.address}: {silence}; its candidates are evaluated by other workers")
@@ -132,6 +139,7 @@ class Connection:
             self.signs.forget(address)
 
     def close(self) -> None:
+        """Close the connection. Errors are ignored."""
         if self._question is not None:
             self._question.cancel()
             self._question = None
@@ -147,7 +155,7 @@ class Connection:
         self._asked = -math.inf
 
     def _start(self, call: Callable[[], Awaitable[Any]]) -> concurrent.futures.Future[Any]:
-        """Start a call in the thread of Dask's client."""
+        """Start a call in the thread of Dask's client, and return its future."""
 
         async def awaited() -> Any:
             return await call()
@@ -155,9 +163,12 @@ class Connection:
         return asyncio.run_coroutine_threadsafe(awaited(), self.client.loop.asyncio_loop)
 
     def _pass_time(self, longest: float) -> None:
-        """Add the time since the last check, note a long silence, and raise an error at the end of the patience.
+        """Count the time since the last check as silence, and notify the user of a long silence.
 
-        longest: limit of the added time [s]; this process may have been suspended since the last check
+        longest: maximum time that is counted [s], because this process may have been suspended since the last check
+
+        Raises:
+            ExecutorError: the silence has lasted for `patience_s`.
         """
         before, self._checked = self._checked, time.monotonic()
         self.signs.wait(min(self._checked - before, longest))

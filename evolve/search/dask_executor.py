@@ -21,7 +21,7 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["DaskExecutor"]
 
-REPLY_S = 10.0  # time limit for a worker to send its result
+REPLY_S = 10.0  # [s] time limit for a worker to send its result
 
 
 def _ignore(note: str) -> None:
@@ -32,7 +32,8 @@ def _ignore(note: str) -> None:
 class _Trial:
     """A submitted job.
 
-    counter: the scheduler's variable that counts the attempts
+    counter: variable of the scheduler that counts the attempts
+    order: the job as text
     """
 
     job: Job
@@ -42,21 +43,22 @@ class _Trial:
 
 @dataclass
 class DaskExecutor:
-    """Workers of a Dask scheduler. Each worker evaluates one candidate at a time.
+    """Executor with the workers of a Dask scheduler. Each worker evaluates one candidate at a time.
 
     The executor is a context manager. A candidate whose worker dies is evaluated again, up to `ATTEMPTS` times in
-    total. If the connection to the scheduler was lost, all unfinished jobs are submitted again after reconnecting.
+    total. If the connection to the scheduler is lost, all unfinished jobs are submitted again after reconnecting.
 
     scheduler: the scheduler, or its address
     function: "module:name" of the function that evaluates a candidate; it takes the arguments of
         `evolve.learning.fitness.evaluate`
-    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]. Heartbeats are signs of
-        life, so an evaluation may take longer
-    note: function that is called with one line if the run waits for a sign of life, or gives up a worker
-    count: number of workers at the start
+    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]; an evaluation may take
+        longer, because workers also send heartbeats meanwhile
+    note: function that is called with one line if the run waits for a sign of life, or removes a silent worker
+    count: number of workers when the context was entered
 
     Raises:
-        ExecutorError: Dask is not installed, the scheduler does not answer, or no worker can evaluate candidates.
+        ConfigError: the address of the scheduler is malformed; on entry, it requires certificates, but there are none.
+        ExecutorError: on entry, Dask is not installed, the scheduler does not answer, or no worker is connected.
     """
 
     scheduler: Scheduler | str
@@ -93,9 +95,13 @@ class DaskExecutor:
 
         If `jobs` is a deque, the caller may append further jobs between results.
 
+        progress: function that is called with (candidate id, steps trained, steps planned); None: no function
+
         Raises:
-            ExecutorError: no worker can evaluate candidates, a worker's machine lacks resources such as disk space, the
-                run's settings cannot be used there, or the scheduler remains unreachable.
+            ExecutorError: a worker cannot evaluate candidates or has other software, its machine lacks resources such
+                as disk space, the run's settings cannot be used there, or the scheduler or all workers are silent for
+                `patience_s`.
+            OSError: a policy or a checkpoint cannot be read or written here.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         under_way: dict[Any, _Trial] = {}
@@ -121,7 +127,7 @@ class DaskExecutor:
             trial = under_way[future]
             if future.status in ("cancelled", "lost"):
                 waiting.append(under_way.pop(future).job)
-            elif self._died_too_few_times(trial, future):
+            elif self._may_be_repeated(trial, future):
                 under_way[self._submit(trial)] = trial
                 del under_way[future]
             elif (outcome := self._outcome(trial, future)) is not None:
@@ -131,9 +137,9 @@ class DaskExecutor:
         self._connection.remove_lost_workers()
 
     def _trial(self, job: Job) -> _Trial:
-        """Return a job with a new counter of its attempts.
+        """Return a job with a new counter of its attempts, which is 0.
 
-        The scheduler stores the counter, because a worker that is killed cannot report the attempt.
+        The scheduler stores the counter, because a worker that is killed cannot report its attempt.
         """
         from distributed import Variable
 
@@ -151,7 +157,7 @@ class DaskExecutor:
                 raise ConnectionLost from None
             raise
 
-    def _died_too_few_times(self, trial: _Trial, future: Any) -> bool:
+    def _may_be_repeated(self, trial: _Trial, future: Any) -> bool:
         """Return whether the scheduler gave up a job because its workers died, although attempts remain."""
         from distributed import KilledWorker
 
@@ -164,7 +170,7 @@ class DaskExecutor:
             return True
 
     def _done(self, under_way: dict[Any, _Trial]) -> list[Any]:
-        """Wait up to LISTEN_S for a first result, and return all futures that are no longer pending."""
+        """Wait up to LISTEN_S for a result, and return all futures that are no longer pending."""
         from distributed import wait
 
         with contextlib.suppress(Exception):  # no result within LISTEN_S, or a lost connection, which `run` handles
@@ -174,7 +180,12 @@ class DaskExecutor:
     def _outcome(self, trial: _Trial, future: Any) -> Evaluation | None:
         """Return the evaluation of a candidate, and write its policy and checkpoint.
 
-        The result is None if the worker that stores it does not send it in time, for example because it has died.
+        If the worker that stores the result does not send it in time, for example because it has died, return None.
+
+        Raises:
+            ExecutorError: the worker cannot evaluate candidates.
+            ConnectionLost: the connection was lost before the worker sent the result.
+            OSError: the policy or the checkpoint cannot be written.
         """
         from distributed import KilledWorker
 
@@ -191,7 +202,7 @@ class DaskExecutor:
             return None
         outcome, policy, checkpoint = dask_worker.decode(reply)
         # If the worker that stores a result dies, Dask repeats the evaluation, unless the result has been released.
-        with contextlib.suppress(Exception):  # a lost connection releases both
+        with contextlib.suppress(Exception):  # if the connection is lost, the scheduler releases both
             future.release()
             trial.counter.delete()
         if policy:
@@ -201,6 +212,7 @@ class DaskExecutor:
         return outcome
 
     def _report(self, progress: Progress | None) -> None:
+        """Pass the progress reports that workers have sent to `progress`."""
         with contextlib.suppress(Empty):
             while True:
                 report = self._reports.get_nowait()

@@ -2,7 +2,7 @@
 
 A worker and the sender of its jobs share no files and no state; they only connect to the same scheduler. A worker
 process evaluates one candidate at a time, even if Dask gives it several threads. Sums are therefore computed in the
-same order as in a local worker.
+same order as in a worker of the local executor.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from evolve.store.versions import present
 
 __all__ = ["Order", "UnfitWorker", "decode", "encode", "evaluate"]
 
-COUNTER_S = 20.0  # time limit for the scheduler's answer [s]
-Reply = tuple[str, bytes, bytes]
+COUNTER_S = 20.0  # [s] time limit for the scheduler to send a counter of attempts
+Reply = tuple[str, bytes, bytes]  # Evaluation as JSON, content of the policy and of the checkpoint
 _one_at_a_time = threading.Lock()
 _prepared = False
 
@@ -49,12 +49,15 @@ class Order:
     """A job as text.
 
     function: "module:name" of the function that evaluates the candidate
+    id, seed: see `Job`
+    phenotype: the phenotype as JSON
+    config: the settings of the run as TOML
     counter: name of the scheduler's variable that counts the attempts
     topic: Dask topic on which the worker reports its progress
     ends: number of training steps at the end of each rung, up to the last rung of this job; () without rungs
     begun: (rung, checkpoint) from which training continues; None: training starts from the beginning
     software: versions of the sender's software
-    code: file and text of a user task; None for a built-in task
+    code: path and text of a user task's file; None for a built-in task
     """
 
     function: str
@@ -73,8 +76,12 @@ class Order:
 def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Order:
     """Return a job as text.
 
-    toml: config of the run
+    toml: settings of the run
     function, counter, topic: see `Order`
+
+    Raises:
+        OSError: a checkpoint cannot be read.
+        ConfigError: the run has a user task that the user has not named.
     """
     phenotype = json.dumps(job.phenotype.to_json())
     task = job.config.choice.named_code
@@ -87,9 +94,13 @@ def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Orde
 
 
 def evaluate(order: Order) -> Reply:
-    """Evaluate a candidate, and return its Evaluation as JSON, its policy, and its checkpoint.
+    """Evaluate a candidate in a Dask worker. Return its Evaluation as JSON, and the bytes of its policy and checkpoint.
 
-    The bytes of the policy or the checkpoint are empty if the candidate has none.
+    The bytes are empty if the candidate has no policy or checkpoint.
+
+    Raises:
+        UnfitWorker: the worker cannot evaluate candidates, or has other software than the sender.
+        TimeoutError: the scheduler does not send the counter of attempts in time.
     """
     from distributed import Variable, get_worker
 
@@ -119,7 +130,7 @@ def evaluate(order: Order) -> Reply:
 
 
 def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
-    """Return the Evaluation, policy and checkpoint in a reply of `evaluate`."""
+    """Return the Evaluation, and the bytes of the policy and of the checkpoint, in a reply of `evaluate`."""
     text, policy, checkpoint = reply
     record = json.loads(text)
     record["returns"] = tuple(record["returns"])
@@ -151,7 +162,11 @@ def _content(path: Path) -> bytes:
 
 
 def _prepare(order: Order) -> None:
-    """Check that the software has the sender's versions, and prepare Dr.Jit at the first call in this process."""
+    """Check that the software has the sender's versions, and prepare Dr.Jit at the first call in this process.
+
+    Raises:
+        UnfitWorker: a version differs, or Dr.Jit cannot be prepared.
+    """
     global _prepared
     here = _software()
     differing = [name for name, there in order.software.items() if there and here[name] and here[name] != there]
@@ -168,7 +183,7 @@ def _prepare(order: Order) -> None:
 
 @lru_cache
 def _software() -> Mapping[str, str]:
-    """Return the versions of the software. They are cached, because reading the commit from git takes milliseconds."""
+    """Return the versions of the software; see `present`. They are cached, because git takes milliseconds."""
     return present()
 
 

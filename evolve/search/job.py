@@ -13,18 +13,20 @@ from evolve.learning.training_rung import TrainingRung
 
 __all__ = ["ATTEMPTS", "ExecutorError", "Job", "Progress"]
 
-ATTEMPTS = 3  # maximum number of attempts to evaluate a candidate whose worker dies
+ATTEMPTS = 3  # maximum number of attempts to evaluate a candidate, if its worker dies in each
 Progress = Callable[[int, int, int], None]  # (candidate id, steps trained, steps planned)
 
 
 class ExecutorError(RuntimeError):
-    """No worker can evaluate candidates; the message states the reason in one line."""
+    """Candidates cannot be evaluated by the workers of an executor; the message states the reason in one line."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """One candidate to evaluate: its id, and the arguments of `evolve.learning.fitness.evaluate`.
+    """One candidate to evaluate.
 
+    id: id of the candidate
+    phenotype, config, seed, policy_path: see `evolve.learning.fitness.evaluate`
     rung: rung at whose end training stops; None: training is not divided into rungs
     """
 
@@ -37,5 +39,6 @@ class Job:
 
     @property
     def arguments(self) -> tuple[Any, ...]:
+        """Positional arguments of the function that evaluates the candidate."""
         rung = () if self.rung is None else (self.rung,)
         return self.phenotype, self.config, self.seed, self.policy_path, *rung

@@ -21,11 +21,11 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores", "interrupts_held"]
 
-# Several processes share the cores, so each process uses one thread. Numerical libraries read these variables when they
-# are imported.
+# Several processes share the cores, so each process uses one thread. Numerical libraries read these environment
+# variables when they are imported.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-STOPPING_S = 5.0  # time after which a process that does not end is killed [s]
-KILLED = "by SIGKILL"
+STOPPING_S = 5.0  # [s] time after which a process that does not end is killed
+KILLED = "by SIGKILL"  # how a killed process ended, as in `_remove`
 OUT_OF_MEMORY = (
     f"the worker of candidate {{}} was killed {ATTEMPTS} times (SIGKILL), probably because memory ran out; use fewer "
     "workers (workers in config.toml), or free some memory, then use evolve resume"
@@ -34,7 +34,7 @@ OUT_OF_MEMORY = (
 
 @dataclass
 class _Worker:
-    """A worker process, the executor's end of its pipe, and the current job (None if the worker is idle)."""
+    """A worker process, the executor's end of the pipe to it, and its current job, which is None for an idle worker."""
 
     process: Any
     connection: Connection
@@ -43,18 +43,21 @@ class _Worker:
 
 @dataclass
 class LocalExecutor:
-    """Worker processes on this machine. Each process evaluates one candidate at a time.
+    """Executor with worker processes on this machine. Each process evaluates one candidate at a time.
 
     The executor is a context manager, which ends its processes on exit. If `evaluate` raises an exception, the
     candidate counts as failed; the exceptions OSError, MemoryError and ConfigError end the run instead. A worker that
     dies is replaced, and its candidate is evaluated again, up to `ATTEMPTS` times in total. After the last attempt, the
-    candidate counts as failed. If every attempt was ended by SIGKILL, however, the run ends, because operating systems
-    kill processes in this way when memory runs out.
+    candidate counts as failed. If SIGKILL ended every attempt, however, the run ends, because operating systems kill
+    processes in this way when memory runs out.
 
     evaluate: function that is called as `evaluate(*job.arguments, progress=...)`
     count: number of workers; 0: one for each core that this process may use
     prepare: function that is called once in each new worker; an exception in it ends the run, because no worker could
         evaluate candidates
+
+    Raises:
+        ValueError: `count` is negative.
     """
 
     evaluate: Callable[..., Evaluation]
@@ -84,6 +87,8 @@ class LocalExecutor:
 
         If `jobs` is a deque, the caller may append further jobs between results.
 
+        progress: function that is called with (candidate id, steps trained, steps planned); None: no function
+
         Raises:
             ExecutorError: a worker cannot be prepared, the machine lacks resources such as disk space or memory, or the
                 run's settings cannot be used.
@@ -91,7 +96,7 @@ class LocalExecutor:
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         deaths: dict[int, list[str]] = {}
         while waiting or any(worker.job for worker in self._workers):
-            self._hand_out(waiting)
+            self._assign(waiting)
             for worker, message in self._messages():
                 job = worker.job
                 if message.kind == "progress" and job and progress:
@@ -102,7 +107,7 @@ class LocalExecutor:
                     worker.job = None
                     yield job, message.content
                 elif message.kind == "died":
-                    how = self._bury(worker)
+                    how = self._remove(worker)
                     if job is None:
                         continue
                     deaths.setdefault(job.id, []).append(how)
@@ -113,8 +118,8 @@ class LocalExecutor:
                         raise ExecutorError(OUT_OF_MEMORY.format(job.id))
                     yield job, Evaluation.failed(f"its worker process died {ATTEMPTS} times, at last {how}")
 
-    def _hand_out(self, waiting: deque[Job]) -> None:
-        """Give jobs to idle workers, and start further workers up to `count` if needed."""
+    def _assign(self, waiting: deque[Job]) -> None:
+        """Send waiting jobs to idle workers, and start further workers if needed, up to `count` workers."""
         idle = [worker for worker in self._workers if worker.job is None]
         while waiting and (idle or len(self._workers) < self.count):
             worker = idle.pop() if idle else self._hire()
@@ -135,7 +140,7 @@ class LocalExecutor:
         return self._workers[-1]
 
     def _messages(self) -> Iterator[tuple[_Worker, Message]]:
-        """Yield the messages of workers; wait until one sends a message or dies."""
+        """Wait until a worker sends a message or dies, and yield the messages that have arrived."""
         by_connection = {worker.connection: worker for worker in self._workers}
         for ready in wait(list(by_connection)):
             worker = by_connection[ready]  # type: ignore[index]
@@ -144,8 +149,8 @@ class LocalExecutor:
             except (EOFError, OSError):  # the pipe was closed, possibly within a message
                 yield worker, Message("died")
 
-    def _bury(self, worker: _Worker) -> str:
-        """Remove a worker whose pipe is closed, and return how its process ended."""
+    def _remove(self, worker: _Worker) -> str:
+        """Remove a worker whose pipe is closed, and return how its process ended, such as "with exit code 1"."""
         self._workers.remove(worker)
         _end(worker)
         code = worker.process.exitcode

@@ -1,11 +1,11 @@
 """Main loop of a run: propose candidates, evaluate and record them, and report their fitness to the optimizer.
 
-A continued run executes the same loop from its start. Candidates that are already on record are not evaluated again,
+A resumed run executes the same loop from its start. Candidates that are already on record are not evaluated again,
 but their fitness is reported to the optimizer, which restores the state of the search.
 
-The loop has two modes. Generation by generation, the optimizer receives the fitness of a whole generation at once, so
-all candidates follow from the seed alone. In the steady state (`search.steady_state`), fitness is reported in the order
-in which candidates finish. The candidates then also depend on this order, which the record stores.
+The loop has two modes. By default, the optimizer receives the fitness of a whole generation at once, so all candidates
+follow from the settings and the seed. With `search.steady_state`, fitness is reported in the order in which candidates
+finish. The candidates then also depend on this order, which the record stores.
 """
 
 from __future__ import annotations
@@ -36,6 +36,11 @@ class Executor(Protocol):
         """Start the jobs in order, and yield each job with its outcome once, as soon as it is complete.
 
         The caller may append to `jobs` between results.
+
+        progress: function that is called with (candidate id, steps trained, steps planned); None: no function
+
+        Raises:
+            ExecutorError: candidates cannot be evaluated.
         """
 
 
@@ -43,19 +48,23 @@ class Watcher(Protocol):
     """Protocol of objects that follow a run."""
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        """Receive the progress of a candidate: `steps` of `planned` steps."""
+        """Receive the progress of a candidate's training: `steps` of `planned` steps."""
 
     def evaluated(self, candidate: Candidate) -> None:
-        """Receive a candidate that has been evaluated and recorded."""
+        """Receive a candidate after it has been evaluated and recorded."""
 
 
 def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
     """Evaluate all candidates that a locked run still lacks.
 
+    executor: evaluates the candidates
+    watcher: receives the progress of training and each evaluated candidate
+
     Raises:
-        RunError: the record cannot be written, or this search proposes other candidates than those on record.
+        RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
         ConfigError: the optimizer is unknown, or cannot be used here.
-        ExecutorError: no candidate can be evaluated.
+        ExecutorError: candidates cannot be evaluated.
+        OSError: a policy or a checkpoint cannot be read, or a checkpoint cannot be renamed or removed.
     """
     search = Search(run.config)
     if run.config.search.steady_state:
@@ -65,7 +74,7 @@ def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
 
 
 def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Evaluate one generation after the other, and report the fitness of each after all its rungs are complete."""
+    """Evaluate one generation after the other, and report a generation's fitness when all its rungs are complete."""
     same = SameSearch(run)
     for generation in range(run.config.search.generations):
         proposals = {proposal.id: proposal for proposal in search.propose_generation()}
@@ -76,18 +85,18 @@ def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watch
             same.require_complete(generation, missing)
             jobs = deque(_job(run, proposals[candidate_id], rung) for candidate_id in missing)
             for job, outcome in executor.run(jobs, watcher.training):
-                _write_down(run, proposals[job.id], job, outcome, watcher)
+                _record(run, proposals[job.id], job, outcome, watcher)
         run.forget_trainings(proposals)
         search.tell([(candidate.id, candidate.fitness) for candidate in run.generation(generation)])
 
 
 def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Keep one population of candidates in evaluation, and replace each finished candidate by a new proposal."""
+    """Evaluate one population of candidates at a time, and replace each finished candidate by a new proposal."""
     under_way: dict[int, Proposal] = {}
 
     def refill() -> list[Proposal]:
-        room = min(run.config.search.population - len(under_way), run.config.candidates - search.proposed)
-        proposals = [search.propose() for _ in range(room)]
+        missing = min(run.config.search.population - len(under_way), run.config.candidates - search.proposed)
+        proposals = [search.propose() for _ in range(missing)]
         under_way.update((proposal.id, proposal) for proposal in proposals)
         return proposals
 
@@ -99,7 +108,7 @@ def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) ->
         refill()
     jobs = deque(_job(run, proposal) for proposal in under_way.values())
     for job, outcome in executor.run(jobs, watcher.training):
-        candidate = _write_down(run, under_way.pop(job.id), job, outcome, watcher)
+        candidate = _record(run, under_way.pop(job.id), job, outcome, watcher)
         search.tell([(candidate.id, candidate.fitness)])
         jobs.extend(_job(run, proposal) for proposal in refill())
 
@@ -116,7 +125,8 @@ def _job(run: Run, proposal: Proposal, rung: int = 0) -> Job:
     return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id), training)
 
 
-def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher: Watcher) -> Candidate:
+def _record(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher: Watcher) -> Candidate:
+    """Append an evaluated candidate to the record, inform the watcher, and return the candidate."""
     genome, parents = proposal.genome, proposal.parents
     candidate = Candidate.from_evaluation(proposal.place, genome, job.phenotype, job.seed, outcome, parents)
     if job.rung is not None:
@@ -132,9 +142,11 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
 
 
 def _after(before: Candidate, candidate: Candidate) -> Candidate:
-    """Return a candidate after a later rung, with seconds and episode failures summed over all its rungs.
+    """Return a candidate after a rung, with seconds and episode failures summed over this and all earlier rungs.
 
-    If training failed in the later rung, steps and learning curve come from the rung before.
+    If training failed in this rung, steps and learning curve are those of the rung before.
+
+    before: the candidate as recorded after the rung before
     """
     if candidate.failure is not None:
         candidate = replace(candidate, steps=before.steps, curve=before.curve)

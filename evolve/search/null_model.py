@@ -28,19 +28,19 @@ __all__ = ["FIRST_SEED", "LAST", "SEVERAL", "NullModel", "fitness_spread", "last
 
 Floats = NDArray[np.float64]
 Measure: TypeAlias = "Callable[[Phenotype], Mapping[str, float]]"
-LAST = 3  # number of last generations over which the final value of a quantity is averaged
+LAST = 3  # number of generations at the end over which the final value of a quantity is averaged
 FIRST_SEED = 10_000  # seed of the first search; larger than the usual seeds of runs
 SEVERAL = 20_000  # number of random groups of searches with which the mean of several runs is compared
-# Relative difference up to which two means count as equal. They differ by the order of sums and by rounded records.
+# Relative difference up to which two means count as equal. Equal means may differ by the order of sums and by rounding.
 TIE = 1e-5
 
 
 @dataclass(frozen=True)
 class NullModel:
-    """Results of searches with random fitness.
+    """Results of searches with random fitness, by name of the quantity.
 
-    means: mean of each quantity over the candidates of a generation that have this quantity, (search, generation); NaN
-        if no candidate has it
+    means: mean of a quantity over the candidates of a generation that have it, (search, generation); NaN if no
+        candidate has it
     counts: number of candidates that have the quantity, (search, generation)
     """
 
@@ -69,16 +69,18 @@ def null_model(
 ) -> NullModel:
     """Run searches with these settings, but with random task fitness and other seeds.
 
+    config: settings of the run; its seed is not used
+    measure: function that returns quantities of an untrained animal by name. It returns the same names for all animals,
+        with NaN for quantities that an animal lacks.
     generations: number of generations of each search
-    searches: number of searches
-    measure: function that returns quantities of an untrained animal. It returns the same names for all animals, with
-        NaN for quantities that an animal lacks.
+    searches: number of searches, at least 1
     done: function that is called with the completed fraction of the searches
     spread: standard deviation of task fitness in each generation, from `fitness_spread`. It is needed only if there
         are costs, because optimizers use only the order of fitness values.
 
     Raises:
         ValueError: there are costs, and `spread` has fewer values than generations.
+        ConfigError: the optimizer is unknown, or cannot be used here.
     """
     if not config.costs.free and len(spread) < generations:
         raise ValueError(f"spread has {len(spread)} values: must be {generations}, one for each generation")
@@ -94,7 +96,10 @@ def null_model(
 def fitness_spread(runs: Sequence[Run], generations: int) -> list[float]:
     """Return the standard deviation of task fitness within each generation, pooled over the runs.
 
-    A generation in which no run has two successful candidates has the pooled value of all generations.
+    For a generation in which no run has two successful candidates, the value is pooled over all generations. If there
+    is no such generation, all values are 0.
+
+    generations: number of generations, counted from the first
     """
     squares, free = np.zeros(generations), np.zeros(generations)
     for run in runs:
@@ -112,7 +117,10 @@ def fitness_spread(runs: Sequence[Run], generations: int) -> list[float]:
 def _search(
     config: RunConfig, measure: Measure, generations: int, spread: Sequence[float]
 ) -> dict[str, tuple[list[float], list[int]]]:
-    """Return, for each quantity, its mean in each generation and the number of candidates that have it."""
+    """Return, for each quantity, its mean in each generation, and the number of candidates that have it.
+
+    The mean is NaN if no candidate has the quantity.
+    """
     found: dict[str, tuple[list[float], list[int]]] = {}
     for proposals in _proposals(config, generations, spread):
         measured = [measure(develop(proposal.vector, config)) for proposal in proposals]
@@ -127,7 +135,7 @@ def _search(
 def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> Iterator[list[Proposal]]:
     """Yield the proposals of one generation after the other, and report a random fitness for each proposal.
 
-    In the steady state, a fitness is reported before each new proposal, as in a run.
+    With `search.steady_state`, a fitness is reported before each new proposal, as in a run.
     """
     search, chance = Search(config), np.random.default_rng(config.seed)
 
@@ -160,6 +168,8 @@ def last_generations(config: RunConfig, generations: int) -> list[range]:
     """Return the last LAST generations of each phase, or all generations of a shorter phase.
 
     A phase consists of the generations between two changes of the set of genes that vary.
+
+    generations: number of generations of the search
     """
     starts = sorted({use.opens_at for use in config.genome.values() if use.open and use.opens_at < generations})
     ends = [*starts[1:], generations]
@@ -171,13 +181,13 @@ def p_value(values: Sequence[float], ends: Floats) -> float:
 
     The value of a single run counts as an additional sample of the null model (Davison and Hinkley 1997, §4.2).
     Therefore, p is at least 2 / (searches + 1). For several runs, their mean is compared with the means of random
-    groups of searches; the number of searches in a group equals the number of runs. The lower limit of p is the same.
+    groups of searches. The number of searches in a group is the number of runs. The lower limit of p is the same.
 
     values: final value of a quantity in each run
-    ends: final values of the quantity in the searches, from `NullModel.ends`
+    ends: final values of the quantity in the searches, from `NullModel.ends`, (search,)
     """
-    asked = float(np.mean(values))
+    mean = float(np.mean(values))
     several = np.random.default_rng(0).choice(ends, (SEVERAL, len(values))).mean(axis=1)
-    drawn, near = ends if len(values) == 1 else several, TIE * abs(asked)
-    share = min((drawn <= asked + near).sum(), (drawn >= asked - near).sum()) / drawn.size
-    return min(1.0, 2 * (float(share) * ends.size + 1) / (ends.size + 1))
+    drawn, near = ends if len(values) == 1 else several, TIE * abs(mean)
+    tail = min((drawn <= mean + near).sum(), (drawn >= mean - near).sum()) / drawn.size
+    return min(1.0, 2 * (float(tail) * ends.size + 1) / (ends.size + 1))

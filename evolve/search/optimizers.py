@@ -1,7 +1,7 @@
 """Optimizers, which propose genomes one by one and accept their fitness in any order.
 
-The state of an optimizer follows from its seed and from the sequence of its proposals and of the fitness values that it
-has received. A run can therefore be continued by repeating this sequence, and no state needs to be stored. Only this
+The state of an optimizer follows from its seed, and from the sequence of its proposals and of the fitness values that
+it has received. A run can therefore be continued by repeating this sequence, and no state needs to be stored. Only this
 module imports nevergrad.
 """
 
@@ -29,11 +29,11 @@ OWN = ("CMA", "mutation")  # names of optimizers that are defined here
 
 @dataclass(frozen=True)
 class Space:
-    """Search space, in which each coordinate is in [0, 1].
+    """Search space, in which each coordinate is in [0, 1], with the start and the seed of the search.
 
-    genes: the genes that vary, each with its settings
+    genes: the genes that vary, each with its use in the run; only the optimizer "mutation" needs them
     start: genome from which the search starts, (dimension,)
-    seed: seed of random numbers
+    seed: seed of random numbers, as integers for NumPy's `SeedSequence`
     """
 
     genes: Sequence[tuple[Gene, GeneConfig]]
@@ -45,10 +45,10 @@ class Optimizer(Protocol):
     """Protocol of optimizers, which propose genomes and maximise fitness."""
 
     def ask(self, candidate_id: int) -> tuple[Floats, tuple[int, ...]]:
-        """Return a genome for the candidate with this id, and the ids of its parents."""
+        """Return a genome (dimension,) for the candidate with this id, and the ids of its parents."""
 
     def tell(self, candidate_id: int, fitness: float) -> None:
-        """Receive the fitness of a proposed candidate, which must be finite."""
+        """Receive the fitness of a proposed candidate. The fitness must be finite."""
 
 
 def build_optimizer(space: Space, search: SearchConfig) -> Optimizer:
@@ -99,7 +99,13 @@ class Mutation:
 
 
 class Named:
-    """Any optimizer of nevergrad. The setting `search.sigma` is its step size, if it has one."""
+    """Any optimizer of nevergrad, by its name in nevergrad's registry.
+
+    The setting `search.sigma` is the standard deviation of nevergrad's mutations, which many optimizers use.
+
+    Raises:
+        ConfigError: the name is unknown, or the optimizer cannot be used here.
+    """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
         self._dimension = space.start.size
@@ -144,8 +150,8 @@ class Named:
 class CMA(Named):
     """CMA-ES (Hansen and Ostermeier 2001), implemented by pycma, which is called through nevergrad.
 
-    The initial step size is `search.sigma`. CMA-ES samples candidates around the mean of the better half of the last
-    population with known fitness. This better half is recorded as the parents of each candidate.
+    The initial step size is `search.sigma`. CMA-ES samples candidates around a weighted mean of the better half of the
+    last population with known fitness. The members of this better half are recorded as the parents of each candidate.
 
     nevergrad has an option for noisy functions, but its CMA-ES uses this option only to recommend a single best genome.
     The option is not set, because the best candidate is taken from the record.
@@ -162,8 +168,8 @@ class CMA(Named):
 
         def scaled(scale: float) -> Any:
             # `CMA_active` gives negative weights to the worse half. Samples are reflected at the bounds. Near a bound,
-            # negative weights therefore shrink the covariance in the direction across the bound to zero. The remaining
-            # steps then count as very long, so that the step size grows without limit.
+            # negative weights therefore shrink the covariance in the direction across the bound to zero. Steps in this
+            # direction then count as very long, so that the step size grows without limit.
             configured = ParametrizedCMA(scale=scale, popsize=search.population, inopts={"CMA_active": search.active})
             return configured(_array(space, 1.0), num_workers=search.population)
 
@@ -182,7 +188,10 @@ class CMA(Named):
 
 
 def _array(space: Space, sigma: float) -> Any:
-    """Return nevergrad's description of the search space: an array of coordinates in [0, 1]."""
+    """Return nevergrad's description of the search space: an array of coordinates in [0, 1].
+
+    sigma: standard deviation of nevergrad's mutations
+    """
     from nevergrad import p
 
     # CMA-ES needs at least two dimensions to adapt a covariance. With one dimension, nevergrad would require an

@@ -30,8 +30,9 @@ LIBRARIES = ("nevergrad", "cma", "numpy")
 class SameSearch:
     """Comparison of a search's proposals with a run's record.
 
-    The first generation follows from the settings alone, so it may differ only by rounding. Later generations have the
-    wider tolerance, but only if the versions of the optimizer's libraries are the same as at the start of the run.
+    The first generation follows from the settings alone, so its tolerance is ROUNDING. Later generations have the wider
+    tolerance TAKEN_FOR_ANOTHERS, but only if the optimizer's libraries have the same versions as at the start of the
+    run. With other versions, the tolerance of all generations is ROUNDING.
     """
 
     def __init__(self, run: Run) -> None:
@@ -39,10 +40,12 @@ class SameSearch:
         self._same_libraries = all(self._then.get(name) == self._now[name] for name in LIBRARIES)
 
     def require(self, proposal: Proposal | None, candidate: Candidate) -> None:
-        """Check that a proposal equals the candidate on record.
+        """Check that a proposal agrees with the candidate on record.
+
+        proposal: proposal of the search; None if it proposes no candidate with this id
 
         Raises:
-            RunError: the search proposes a different candidate.
+            RunError: the search proposes a different candidate, or none.
         """
         allowed = TAKEN_FOR_ANOTHERS if self._same_libraries and candidate.generation > 0 else ROUNDING
         if proposal is not None and np.abs(proposal.vector - candidate.vector).max() <= allowed:

@@ -21,20 +21,20 @@ from evolve.search.job import ExecutorError
 __all__ = ["Scheduler", "close"]
 
 ADDRESS = re.compile(r"(?:(?P<protocol>tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^\s:/\[\]]+):(?P<port>\d{1,5})")
-ANSWER_S = 5.0  # time limit for an answer [s], enough for a scheduler that is just starting
-RETRY_S = 0.25  # interval between attempts to connect [s]
-CLOSE_S = 2.0  # time limit for closing a connection [s], which a silent scheduler does not confirm
+ANSWER_S = 5.0  # [s] time limit for an answer, enough for a scheduler that is just starting
+RETRY_S = 0.25  # [s] interval between attempts to connect
+CLOSE_S = 2.0  # [s] time limit for closing a connection, which a silent scheduler does not confirm
 
 
 @dataclass(frozen=True)
 class Scheduler:
     """A Dask scheduler: its address, and the certificates for encrypted connections to it.
 
-    address: "tls://host:8786", or "tcp://host:8786" in a trusted network
+    address: "tls://host:8786", or "tcp://host:8786" or "host:8786" in a trusted network
     ca_file: certificates of the authorities that signed the certificates of scheduler and workers
     certificate, key: certificate and private key of this process
 
-    The last three are PEM files. Without them, Dask's own settings (distributed.comm.tls) apply.
+    The last three are paths of PEM files. If they are None, Dask's own settings (distributed.comm.tls) apply.
 
     Raises:
         ConfigError: the address is malformed, certificates are missing or invalid, or certificates are given for an
@@ -60,10 +60,15 @@ class Scheduler:
 
     @property
     def encrypted(self) -> bool:
+        """True if connections to this address are encrypted."""
         return self.address.startswith("tls://")
 
     def _require_certificates(self) -> None:
-        """Check the certificates here, because Dask would report errors in them only later, in long messages."""
+        """Check the certificates in advance, because Dask would report errors in them only later, in long messages.
+
+        Raises:
+            ConfigError: a file is missing or invalid.
+        """
         for file in (self.ca_file, self.certificate, self.key):
             if not Path(str(file)).is_file():
                 raise ConfigError(f"{file}: no such file: must be a PEM file")
@@ -82,7 +87,7 @@ class Scheduler:
 
         Raises:
             ConfigError: the address requires certificates, but there are none.
-            ExecutorError: the scheduler does not answer within seconds, or Dask is not installed.
+            ExecutorError: the scheduler does not answer within ANSWER_S, or Dask is not installed.
         """
         self.security()
         found = ADDRESS.fullmatch(self.address)
@@ -107,8 +112,8 @@ class Scheduler:
         timeout: maximum time for the connection [s]
 
         Raises:
-            ConfigError: see `security`
-            ExecutorError: the scheduler does not answer, or Dask is not installed.
+            ConfigError: the address requires certificates, but there are none.
+            ExecutorError: the scheduler does not answer in time, or Dask is not installed.
         """
         security = self.security()
         from distributed import Client
@@ -149,7 +154,7 @@ class Scheduler:
         """Return Dask's `Security` with the certificates of this object; None if Dask's own settings apply.
 
         Raises:
-            ConfigError: the address requires certificates, and there are none.
+            ConfigError: the address requires certificates, but there are none.
             ExecutorError: Dask is not installed.
         """
         try:
@@ -175,7 +180,7 @@ def close(client: Any) -> None:
 
 
 def _silence_dask() -> None:
-    """Suppress log messages of Dask in this process. They have tracebacks, and rhabdom reports lost connections."""
+    """Suppress log messages of Dask in this process. They have tracebacks; rhabdom itself reports lost connections."""
     for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
         if name.split(".")[0] in ("distributed", "tornado", "asyncio"):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)

@@ -1,8 +1,8 @@
 """The search, which proposes candidates and receives their fitness.
 
-A gene may begin to vary only in a later generation (its setting `opens_at`). The generations between two such changes
-are a phase. The state of the search follows from the seed and from the fitness values received so far. A run is
-continued by repeating all proposals and reporting all recorded fitness values again; no state is stored.
+A gene may begin to vary only in a later generation (its setting `opens_at`). A phase consists of the generations
+between two such changes. The state of the search follows from the settings, the seed and the fitness values received so
+far. A run is continued by repeating all proposals and reporting all recorded fitness values again; no state is stored.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Proposal:
     """A proposed genome.
 
     place: place of the candidate in the search
-    genome: (dimension,) in [0, 1]
-    parents: ids of its parents. At the start of a later phase, the new optimizer has no parents yet; the parent is then
-        the candidate from which the phase started.
+    genome: coordinates of the open genes in [0, 1]
+    parents: ids of the candidates from which the optimizer derived the genome. A new optimizer at the start of a later
+        phase has no parents yet; the parent is then the candidate from which the phase started.
     """
 
     place: Place
@@ -45,18 +45,19 @@ class Proposal:
 
     @property
     def vector(self) -> NDArray[np.float64]:
+        """The genome as an array, (gene,)."""
         return np.array(self.genome)
 
 
 class Search:
     """Search that proposes one candidate after the other.
 
-    In each generation in which further genes begin to vary, a new optimizer starts from the best genome so far. It
-    varies all genes that may vary from then on. Each optimizer receives the fitness of the candidates that it has
-    proposed.
+    In each generation in which further genes begin to vary, a new optimizer starts from the best genome so far. This
+    optimizer varies these genes and those that varied before. Each optimizer receives the fitness of the candidates
+    that it has proposed.
 
     Raises:
-        ConfigError: the optimizer is unknown.
+        ConfigError: the optimizer is unknown, or cannot be used here.
     """
 
     def __init__(self, config: RunConfig) -> None:
@@ -134,5 +135,8 @@ class Search:
 
 
 def training_seed(run_seed: int, candidate_id: int) -> int:
-    """Return the seed of a candidate's training and evaluation, which differs between candidates."""
+    """Return the seed of a candidate's training and evaluation, which differs between candidates.
+
+    run_seed: the setting `seed` of the run
+    """
     return int(np.random.SeedSequence([run_seed, candidate_id]).generate_state(1)[0])

@@ -16,12 +16,12 @@ SHOWN = 3  # number of workers that a message names
 class SignsOfLife:
     """Time without signs of life of a scheduler and its workers.
 
-    An answer is a sign of life of the scheduler, and a heartbeat is one of a worker. Heartbeats continue during a
-    training, so a training may take longer than the patience.
+    An answer is a sign of life of the scheduler, and a heartbeat is a sign of life of a worker. Workers also send
+    heartbeats while they train, so training may take longer than `patience_s`.
 
     patience_s: maximum time without a sign of life [s]
-    regular_s: maximum time between two answers of a scheduler that is alive [s]; if it was silent for longer, the
-        excess does not count as silence of the workers
+    regular_s: maximum time between two answers of a scheduler that is alive [s]; if the scheduler was silent for
+        longer, the excess does not count as silence of the workers
     """
 
     patience_s: float
@@ -53,7 +53,7 @@ class SignsOfLife:
         self._workers_s = 0.0 if alive else self._workers_s + passed
 
     def forget(self, address: str) -> None:
-        """Forget a worker that has been removed; the next answer may still contain it."""
+        """Forget a worker that was removed. If the next answer still contains this worker, it counts as new."""
         self._silent_s.pop(address, None)
         self._last_seen.pop(address, None)
 
@@ -64,23 +64,27 @@ class SignsOfLife:
 
     @property
     def silence_s(self) -> float:
-        """Time [s] since the last sign of life of the scheduler, or of any worker, whichever is longer ago."""
+        """Time [s] since the last answer of the scheduler, or since the last heartbeat of any worker if this is longer.
+
+        Heartbeats of paused workers do not count.
+        """
         return max(self._scheduler_s, self._workers_s)
 
     @property
     def exhausted(self) -> bool:
+        """True if the silence has lasted for `patience_s`."""
         return self.silence_s >= self.patience_s
 
     @property
     def lost_workers(self) -> tuple[str, ...]:
-        """Addresses of workers that have been silent for longer than the patience, while others are alive."""
+        """Addresses of workers that have been silent for at least `patience_s`; () if all workers are silent."""
         if self._workers_s >= self.patience_s:
             return ()
         return tuple(address for address, silence in self._silent_s.items() if silence >= self.patience_s)
 
     @property
     def missing(self) -> str:
-        """Missing sign of life, as text."""
+        """Description of the sign of life that has been missing for the longest time, for messages."""
         if self._scheduler_s >= self._workers_s:
             return SCHEDULER
         if not self._silent_s:

@@ -33,12 +33,12 @@ __all__ = [
 
 
 def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
-    """Return the total training steps of a candidate at the end of each rung, (rung,)."""
+    """Return the total number of training steps of a candidate at the end of each rung, (rung,)."""
     return tuple(math.ceil(learning.total_steps * search.promoted**after) for after in range(search.rungs - 1, -1, -1))
 
 
 def sizes(search: SearchConfig) -> tuple[int, ...]:
-    """Return the number of candidates of a generation in each rung, (rung,), if no candidate fails."""
+    """Return the number of candidates of a generation that are trained in each rung, (rung,), if no candidate fails."""
     return tuple(max(1, math.ceil(search.population * search.promoted**rung)) for rung in range(search.rungs))
 
 
@@ -52,10 +52,10 @@ def steps(config: RunConfig) -> int:
 
 
 def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
-    """Return the total steps at which training from `begin` to `end` stops, as training consists of whole rollouts.
+    """Return the number of steps after which training from `begin` to `end` steps stops.
 
-    A rollout has n_envs x n_steps steps. The steps between two evaluations (`eval_interval`) are rounded up to whole
-    rollouts.
+    It is at least `end`, because training consists of whole rollouts of n_envs x n_steps steps. The steps between two
+    evaluations (`eval_interval`) are rounded up to whole rollouts.
     """
     rollout, trained = learning.n_envs * learning.n_steps, begin
     while trained < end:
@@ -64,19 +64,24 @@ def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
 
 
 def evaluations(search: SearchConfig) -> int:
-    """Return the number of evaluations in the whole run; a candidate is evaluated after every rung that it reaches."""
+    """Return the number of evaluations in the whole run, if no candidate fails.
+
+    A candidate is evaluated after every rung that it reaches.
+    """
     return search.generations * sum(sizes(search))
 
 
 def promoted(search: SearchConfig, rung: int, fitness: Sequence[tuple[int, float]]) -> set[int]:
-    """Return the ids that continue after a rung, given (id, fitness) of all candidates that reached it.
+    """Return the ids of the candidates that continue after a rung; none after the last rung.
 
-    The fittest candidates continue; of candidates with equal fitness, the lower id has priority. Failed candidates
-    (-inf) never continue.
+    The fittest candidates continue; of candidates with equal fitness, the one with the lower id has priority. Failed
+    candidates (-inf) never continue.
+
+    fitness: (id, fitness) of all candidates that reached the rung
     """
     if rung + 1 >= search.rungs:
         return set()
-    able = sorted((told for told in fitness if math.isfinite(told[1])), key=lambda told: (-told[1], told[0]))
+    able = sorted((pair for pair in fitness if math.isfinite(pair[1])), key=lambda pair: (-pair[1], pair[0]))
     return {candidate_id for candidate_id, _ in able[: sizes(search)[rung + 1]]}
 
 
@@ -87,8 +92,8 @@ def reaching(run: Run, generation: int, rung: int) -> set[int]:
     """
     ids = set(generation_ids(generation, run.config.search.population))
     for earlier in range(rung):
-        told = [run.on_record(candidate_id, earlier) for candidate_id in ids]
-        known = [(candidate.id, candidate.fitness) for candidate in told if candidate is not None]
+        lines = [run.on_record(candidate_id, earlier) for candidate_id in ids]
+        known = [(candidate.id, candidate.fitness) for candidate in lines if candidate is not None]
         if len(known) < len(ids):
             return set()
         ids = promoted(run.config.search, earlier, known)

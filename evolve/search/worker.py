@@ -26,9 +26,9 @@ from rhabdom.streams import send_all_to_stderr
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "refusal", "work"]
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # numbers of two settings, from glibc's malloc.h
-LARGEST_THRESHOLD = 2**25  # size from which arrays get new pages [bytes]; the maximum that glibc accepts
-KEPT = 2**30  # freed memory that glibc keeps [bytes]; more than a training run's arrays need at the same time
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # numbers of two settings of `mallopt`, from glibc's malloc.h
+LARGEST_THRESHOLD = 2**25  # [bytes] size from which arrays get new pages; the maximum that glibc accepts
+KEPT = 2**30  # [bytes] freed memory that glibc keeps; more than a training run's arrays need at the same time
 NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation")  # in messages of PyTorch and Dr.Jit
 
 
@@ -36,9 +36,8 @@ NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation") 
 class Message:
     """Message from a worker to its executor.
 
-    kind: one of four kinds. "progress": the content is (steps trained, steps planned). "done": it is the Evaluation.
-        "unfit": it is the reason why the worker cannot evaluate candidates. "died": the pipe is closed, and there is no
-        content
+    kind, content: "progress" with (steps trained, steps planned); "done" with the Evaluation; "unfit" with the reason
+        why the worker cannot evaluate candidates; or "died" with None, if the pipe is closed
     """
 
     kind: Literal["progress", "done", "unfit", "died"]
@@ -86,7 +85,7 @@ def prepare_device() -> None:
     Also configure glibc so that freed memory is kept for later arrays.
 
     Raises:
-        BackendError: Dr.Jit cannot work here.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     from optics.numerics import device
     from sim.envs.threads import set_threads
@@ -118,24 +117,26 @@ def evaluate_candidate(
     *,
     progress: Callable[[int, int], None],
 ) -> Evaluation:
-    """Call `evolve.learning.fitness.evaluate`. It is imported here, so that only workers load its libraries."""
+    """Call `evolve.learning.fitness.evaluate`, which is imported here, so that only workers load its libraries."""
     from evolve.learning.fitness import evaluate
     from sim.scene.mirror import MirrorWarning
 
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", MirrorWarning
-        )  # the warning is the same for all candidates, and was shown at the start of the run
+        # The warning is the same for all candidates, and was shown at the start of the run.
+        warnings.simplefilter("ignore", MirrorWarning)
         return evaluate(phenotype, config, seed, policy_path, progress, rung)
 
 
 def evaluated(
     evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
 ) -> Evaluation:
-    """Return the candidate's evaluation. After most kinds of exception in it, the candidate counts as failed.
+    """Call `evaluate`, and return the candidate's evaluation.
 
-    Errors that do not depend on the animal are passed on to the caller: a full disk, insufficient memory, and invalid
-    settings.
+    If `evaluate` raises an exception, the candidate counts as failed. Only errors that do not depend on the animal are
+    passed on to the caller: a full disk, insufficient memory, and invalid settings.
+
+    arguments: positional arguments of `evaluate`
+    progress: function that is called with (steps trained, steps planned)
 
     Raises:
         OSError: a file cannot be written, for example the policy.
@@ -159,7 +160,7 @@ def evaluated(
 
 
 def refusal(error: OSError | MemoryError) -> str:
-    """Return a message that states which resource is missing, and the remedy."""
+    """Return the end of a message: the resource that is missing, and the remedy."""
     if isinstance(error, OSError):
         return f"{error}; correct this"
     reason = " ".join(str(error).split())[:200]
@@ -169,9 +170,9 @@ def refusal(error: OSError | MemoryError) -> str:
 def _give_back_memory() -> None:
     """Return freed memory to the system after a candidate.
 
-    Without this, memory would grow with every candidate. glibc keeps about 10 MB per candidate, in gaps that are too
-    small for the next arrays. Dr.Jit keeps the kernels of every shape of eye in memory; after they have been freed, it
-    reloads them from disk if they are needed again.
+    Otherwise, the memory of a worker would grow with every candidate. glibc keeps about 10 MB per candidate, in gaps
+    that are too small for the next arrays. Dr.Jit keeps the kernels of every shape of eye in memory. If a kernel is
+    needed again after its memory has been freed, Dr.Jit reloads it from disk.
     """
     gc.collect()  # this must precede the next call, because it frees frozen functions, which refer to kernels
     if (drjit := sys.modules.get("drjit")) is not None and multiprocessing.parent_process() is not None:

@@ -16,14 +16,20 @@ POLICIES, TRAININGS = "policies", "trainings"  # folders of a run
 
 
 def sweep(folder: Path) -> None:
-    """Remove unfinished files of killed processes. Files of running processes, such as a replay, are not touched."""
+    """Remove the unfinished files that killed processes left in a folder.
+
+    Files that another running process is writing, such as a replay, are kept.
+
+    Raises:
+        OSError: a file cannot be removed.
+    """
     for path in folder.glob(f".*{UNFINISHED}"):
         if not _lives(path.name.removesuffix(UNFINISHED).rpartition(".")[2]):
             path.unlink(missing_ok=True)
 
 
 def _lives(process: str) -> bool:
-    """Return whether another process with this id is running."""
+    """Return whether a text is the id of a process that is running, and that is not this process."""
     if not process.isdecimal() or int(process) == os.getpid():
         return False
     try:
@@ -50,7 +56,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def require_file_name(path: Path) -> None:
-    """Check that a file can be written at a path: it must have a file name, and be a regular file if it exists.
+    """Check that a path has a file name, and that it is a regular file or does not exist.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.
@@ -60,10 +66,10 @@ def require_file_name(path: Path) -> None:
 
 @contextmanager
 def unfinished(path: Path) -> Iterator[Path]:
-    """Create an empty file next to `path` for writing.
+    """Create an empty file next to `path`, and yield the path of the new file; the caller writes the content.
 
-    At the end of the context, the file is synchronised with the disk and renamed to `path`. After an exception, it is
-    removed.
+    At the end of the context, the new file is synchronised with the disk and renamed to `path`. If an exception leaves
+    the context, the new file is removed.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.

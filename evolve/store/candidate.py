@@ -25,15 +25,17 @@ __all__ = ["Candidate"]
 class Candidate:
     """A genome, its phenotype, and the outcome of training and evaluation.
 
-    `Evaluation` describes the fields that both classes have.
+    `Evaluation` describes the fields that are not listed here.
 
     id, generation, index: see `Place`
-    fitness: task fitness minus costs, which the search maximises; -inf if the candidate failed
-    costs: costs of eyes and brain (`evolve.config.costs`); 0 for a failed candidate
+    genome: coordinates of the open genes in [0, 1], see `Genotype`
+    phenotype: eyes and brain of the animal
     seed: seed of training and evaluation
+    fitness: task fitness minus costs, which the search maximises; -inf if the candidate failed
     parents: ids of the candidates from which the search derived the genome; () if there are none
     rung: rung after which the candidate was evaluated, counted from 0; steps and seconds include all earlier rungs
-    policy: SHA-256 of the file of the trained policy; None if there is no policy, and in records of former versions
+    policy: SHA-256 of the trained policy's file; None if there is no policy, or if an older version wrote the record
+    costs: costs of eyes and brain (`evolve.config.costs`); 0 for a failed candidate
     """
 
     id: int
@@ -69,12 +71,12 @@ class Candidate:
 
     @property
     def task_fitness(self) -> float:
-        """Mean of `returns`, which contains no costs."""
+        """Mean of `returns`, from which no costs are subtracted; -inf if the candidate failed."""
         return self.fitness + self.costs
 
     @property
     def vector(self) -> NDArray[np.float64]:
-        """The genome as an array."""
+        """The genome as an array, (gene,)."""
         return np.array(self.genome)
 
     @classmethod
@@ -89,7 +91,10 @@ class Candidate:
     ) -> Candidate:
         """Return the candidate at `place` with its outcome, as a record can store it (see `recordable`).
 
-        If its fitness is not finite, it counts as failed. Its costs are 0; `charged` subtracts them.
+        A candidate whose fitness is not finite counts as failed. No costs are subtracted yet; see `charged`.
+
+        Raises:
+            ValueError: the place, genome, phenotype, seed or parents cannot be recorded.
         """
         if outcome.failure is None and not math.isfinite(outcome.fitness):
             outcome = Evaluation.failed(f"fitness is {outcome.fitness}", outcome.seconds)
@@ -99,15 +104,14 @@ class Candidate:
 
     def charged(self, costs: float) -> Candidate:
         """Return the candidate after subtracting costs from its fitness. A failed candidate is unchanged."""
-        if self.failure is not None or not costs:
-            return self
-        return replace(self, fitness=self.fitness - costs, costs=self.costs + costs)
+        free = self.failure is not None or not costs
+        return self if free else replace(self, fitness=self.fitness - costs, costs=self.costs + costs)
 
     def recordable(self) -> Candidate:
         """Return the candidate as a record restores it: text is escaped, and infinity in a list becomes NaN.
 
-        If a value of the outcome has the wrong type or is outside the range of a record, the candidate counts as
-        failed. If it has failed already, such values are dropped.
+        If a value of the outcome has the wrong type or is outside the range that a record allows, the candidate counts
+        as failed. If the candidate has failed already, such values are dropped.
 
         Raises:
             ValueError: another value, such as the genome or the seed, cannot be recorded.
@@ -126,7 +130,11 @@ class Candidate:
         return replace(self, **{**vars(Evaluation.failed(failure)), **kept}, policy=None, costs=0.0)
 
     def _restored(self) -> Candidate:
-        """Return the candidate after writing and reading, or raise a ValueError that states the reason."""
+        """Return the candidate after writing its line and reading this line back.
+
+        Raises:
+            ValueError: a value cannot be written or read back; the message states the reason.
+        """
         try:
             candidate = Candidate.from_line(self.to_line())
         except TypeError as error:
@@ -137,8 +145,12 @@ class Candidate:
     def to_line(self) -> str:
         """Return the candidate as a line of JSON.
 
-        Numbers can be restored bit for bit. NaN and infinity become null, and text that is not valid is escaped. If
-        there are costs, the line contains them and the task fitness; otherwise, it has the keys of former versions.
+        Finite numbers can be restored bit for bit. NaN and infinity become null, and lone surrogates in text are
+        escaped. If there are costs, the line contains them and the task fitness; otherwise, it has the same keys as
+        lines of older versions.
+
+        Raises:
+            TypeError: a value has a type that JSON lacks.
         """
         record = {KEYS.get(name, name): value for name, value in vars(self).items()}
         record["phenotype"] = self.phenotype.to_json()
@@ -164,7 +176,7 @@ class Candidate:
         names = [KEYS.get(f.name, f.name) for f in fields(cls)]
         task_fitness = record.pop("task_fitness", None) if isinstance(record, dict) else None
         if not isinstance(record, dict) or sorted(record) != sorted(names):
-            raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
+            raise ValueError(f"wrong fields: must be exactly {', '.join(names)}")
         try:
             candidate = cls(
                 **{name: whole_number(record[name], name, 0, most) for name, most in _COUNTS.items()},
@@ -194,7 +206,11 @@ class Candidate:
         return candidate
 
     def _require_success(self) -> None:
-        """Check that the candidate has a fitness and returns, unless it has failed. Failed candidates have no costs."""
+        """Check that a successful candidate has a fitness and returns, and that a failed one has no costs.
+
+        Raises:
+            ValueError: the candidate does not meet these conditions.
+        """
         if self.failure is not None:
             if self.costs:
                 raise ValueError("costs: must be 0 or absent if the candidate failed")
@@ -251,8 +267,11 @@ def _episode_failure(entry: Any) -> tuple[str, int]:
 def _text(value: Any, name: str) -> str | None:
     """Return a text or None after a check.
 
-    Failure messages may contain names of files, and thus bytes that are not valid text. These are escaped. Records of
-    former versions may contain messages of any length. These are shortened.
+    A failure message may contain a file name with bytes that are not valid text; they are escaped. Records of older
+    versions may contain messages of any length; long messages are shortened.
+
+    Raises:
+        ValueError: the value is neither text nor None.
     """
     if value is not None and not isinstance(value, str):
         raise ValueError(f"{name}: must be text or null")
@@ -260,7 +279,11 @@ def _text(value: Any, name: str) -> str | None:
 
 
 def _checksum(value: Any) -> str | None:
-    """Return the hash of a policy's file, as `evolve.store.policies.digest` computes it, after a check of its form."""
+    """Return the SHA-256 of a policy's file, or None, after a check.
+
+    Raises:
+        ValueError: the value is neither a SHA-256 in hexadecimal digits nor None.
+    """
     if value is not None and (not isinstance(value, str) or re.fullmatch("[0-9a-f]{64}", value) is None):
         raise ValueError("policy: must be a SHA-256 in 64 lower-case hexadecimal digits, or null")
     return value

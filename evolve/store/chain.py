@@ -1,10 +1,10 @@
 """Checksums of the lines of a record. Each checksum is chained to the line before, as in a write-ahead log.
 
 A line is a JSON object whose last field is its checksum: 16 hexadecimal digits of BLAKE2b over the previous checksum
-and the line without this field. A changed, removed, inserted or moved line therefore does not match its checksum; the
-probability that accidental damage is overlooked is 2^-64. Records written by earlier versions of the program have no
-checksums. If such a run is continued, the chain starts with the first new line, whose checksum also covers all earlier
-lines.
+and the line without this field. If a line is changed, inserted, moved, or removed from the middle, a checksum at this
+place or at the next line does not match. The probability that accidental damage is overlooked is 2^-64. The removal of
+the last lines is not noticed. Records written by older versions of rhabdom have no checksums. If such a run is
+continued, the chain starts with the first new line, whose checksum also covers all earlier lines.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ class Chain:
     begun: bool = False
 
     def sealed(self, line: bytes) -> bytes:
-        """Return the next line, a JSON object, with its checksum. Both lines end with a line feed."""
+        """Return the next line, a JSON object, with its checksum added. The result ends with a line feed."""
         body = line.removesuffix(b"\n")
         return body[:-1] + FIELD + self._next(body) + b'"}\n'
 
     def after(self, line: bytes) -> Chain:
-        """Return the state after one more line, which may end with a line feed.
+        """Return the state after one more line. The line may end with a line feed.
 
         Raises:
             ValueError: the checksum of the line does not match, or is missing although earlier lines have checksums.
@@ -61,7 +61,7 @@ class Chain:
 
 
 def sealed_record(lines: Iterable[str]) -> bytes:
-    """Return the content of a record: these lines, each with its checksum."""
+    """Return the content of a record that consists of these lines, each with its checksum."""
     content, chain = [], Chain()
     for line in lines:
         content.append(chain.sealed(line.encode()))
@@ -75,7 +75,7 @@ def without_checksum(line: bytes) -> bytes:
 
 
 def _split(line: bytes) -> tuple[bytes, bytes | None]:
-    """Return a line without its checksum, and the checksum; None if it has none.
+    """Return a line without its checksum, and the checksum, which is None if the line has none.
 
     Quotation marks in texts are escaped, so the name of the field cannot be part of a text.
     """

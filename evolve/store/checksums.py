@@ -23,7 +23,7 @@ def digest(path: Path) -> str | None:
     """Return the SHA-256 of a file; None if the file is missing.
 
     Raises:
-        OSError: the file cannot be read, or is not a regular file.
+        OSError: the file exists but cannot be read, or is not a regular file.
     """
     try:
         return hashlib.sha256(read(path)).hexdigest()
@@ -44,15 +44,16 @@ def list_checksums(folder: Path, files: Iterable[Path]) -> None:
 
 
 def harmed(folder: Path) -> str | None:
-    """Return a message about EXR files whose content differs from their checksums; None if there are none.
+    """Return a message about EXR files in a folder whose content differs from their checksums; None if there are none.
 
-    Files that were deleted are not reported, because they can be exported again.
+    Deleted files are not reported, because they can be exported again. If a file or the list cannot be read, or if the
+    files are larger than MOST_BYTES together, the message says so instead.
     """
     try:
         known = {match[2]: match[1] for line in _lines(folder) if (match := ENTRY.fullmatch(line))}
         files = {name: path for name in known if (path := folder / name).exists()}
         if (size := sum(path.stat().st_size for path in files.values())) > MOST_BYTES:
-            return f"{folder}: EXR files have {size:,} bytes: checksums of at most {MOST_BYTES:,} are compared"
+            return f"{folder}: EXR files have {size:,} bytes: checksums are compared only up to {MOST_BYTES:,} bytes"
         wrong = [name for name, path in files.items() if digest(path) not in (None, known[name])]
     except OSError as error:
         return f"{error.filename}: cannot be read: {error.strerror}"
@@ -63,7 +64,7 @@ def harmed(folder: Path) -> str | None:
 
 
 def _lines(folder: Path) -> list[str]:
-    """Return the lines of the list of checksums; [] without a list."""
+    """Return the lines of a folder's list of checksums; [] if the folder has no list."""
     try:
         return read(folder / LISTED, LARGEST_LIST).decode(errors="replace").splitlines()
     except FileNotFoundError:

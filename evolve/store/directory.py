@@ -5,7 +5,7 @@ versions.json      versions of the software at each start of the run
 candidates.jsonl   the record: one line per evaluated candidate and rung, in order of completion
 policies/          trained policies
 trainings/         checkpoints of training runs that may still continue with their next rung
-lock               lock that the process working on the run holds
+lock               file that the process working on the run has locked
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PRODUCTS = (EXR, "tensorboard")  # folders of exported files
 
 @dataclass
 class Run:
-    """A run directory: its config, its record, and the paths of its other files."""
+    """A run directory: its config, its record of evaluated candidates, and the paths of its other files."""
 
     path: Path
     config: RunConfig
@@ -57,7 +57,7 @@ class Run:
     def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Self:
         """Create a run in a directory that does not exist yet, or is empty.
 
-        origin: "RUN:ID", the animal from which the run starts; None without one
+        origin: "RUN:ID", the animal whose genes are the start values; None if there is no such animal
 
         Raises:
             RunError: the directory is not empty, or cannot be written.
@@ -83,15 +83,16 @@ class Run:
     def open(cls, path: Path | str, task: str | None = None, before_damage: bool = False) -> Self:
         """Open a run directory.
 
-        task: "FILE.py:CLASS", if the run has a user task. The code of a user task is executed only if the task is named
-            here. The code is needed to continue the run and to let its animals play.
+        task: "FILE.py:CLASS" of a user task, whose code is executed only if the task is named here. The code is needed
+            to continue the run and to play episodes. None: open the run without code
         before_damage: True to use only the lines of the record before the first damaged line, if there is one
 
         Raises:
-            RunError: the directory contains no run, or a line of its record is invalid; the message names the file and
-                the line.
-            ConfigError: the config is invalid, the named task differs from the run's, or its file has changed.
-            StrangeFileError: one of the run's files or folders is a link, FIFO or device.
+            RunError: the directory does not exist or contains no run, or the record cannot be read or has an invalid
+                line; the message names the file and the line.
+            ConfigError: the config is invalid, or the named task differs from the run's, cannot be read or has changed.
+            StrangeFileError: one of the run's files or folders is a link, FIFO or device, or config.toml is too large.
+            OSError: config.toml cannot be read.
         """
         path = Path(path)
         if not path.is_dir():
@@ -100,17 +101,18 @@ class Run:
         try:
             config = from_text(read(path / CONFIG, LARGEST_TOML), str(path / CONFIG))
         except FileNotFoundError:
-            raise RunError(f"{path} is not a run: it holds no {CONFIG}") from None
+            raise RunError(f"{path} is not a run: it contains no {CONFIG}") from None
         if task is not None:
             config = config.with_code(task)
         return cls(path, config, Record.read(path / CANDIDATES, config, before_damage))
 
     @classmethod
     def create_next(cls, config: RunConfig, preset: str, origin: str | None = None) -> Self:
-        """Create a run in the next free directory, even if other processes create runs at the same time.
+        """Create a run in the next free directory runs/TASK-PRESET-N, even if other processes create runs meanwhile.
 
         Raises:
             RunError: the directory cannot be written.
+            LockedError: another process is creating a run there.
         """
         path, tried = next_directory(config.task_name, preset), None
         while path != tried:  # a broken link seems to be free, but cannot be created: stop
@@ -124,10 +126,11 @@ class Run:
         return cls.create(path, config, origin)
 
     def require_present_light(self) -> None:
-        """Check that the run has a format for which light is computed as in its earlier training.
+        """Check that the run can be continued: this version must compute light like the version that started the run.
 
         Raises:
-            RunError: the format is older; the message names the version that can continue it.
+            RunError: the format of config.toml is too old; the message names the version that can continue the run.
+            OSError: config.toml cannot be read.
         """
         number = format_of(parsed_toml(read(self.path / CONFIG, LARGEST_TOML), str(self.path / CONFIG)).tree)
         if number < OLDEST_CONTINUED:
@@ -140,7 +143,7 @@ class Run:
         """Return the lock of this run, a context manager. A process must hold it to write to the run.
 
         Raises:
-            LockedError: another process holds the lock.
+            LockedError: on entry into the context, another process holds the lock.
         """
         self._lock = RunLock(self.path)
         return self._lock
@@ -148,11 +151,13 @@ class Run:
     def repair(self) -> None:
         """Read the record again, and remove an unfinished last line and incomplete files.
 
-        If the run was opened with `before_damage`, the lines from the first damaged one on are also removed. A copy of
-        the damaged record is kept. The caller must hold the lock.
+        If the run was opened with `before_damage`, the first damaged line and all lines after it are also removed, and
+        a copy of the damaged record is kept. The caller must hold the lock.
 
         Raises:
-            RunError: the record is damaged or cannot be written, or config.toml has changed since the run was opened.
+            RunError: the record is damaged or cannot be written, config.toml cannot be read, or its settings have
+                changed since the run was opened.
+            ConfigError: config.toml is invalid.
         """
         try:
             text = read(self.path / CONFIG, LARGEST_TOML)
@@ -180,11 +185,11 @@ class Run:
         self.record.append(candidate)
 
     def policy_path(self, candidate_id: int) -> Path:
-        """Return the path of a candidate's trained policy."""
+        """Return the path of a candidate's trained policy. The file need not exist."""
         return self.path / POLICIES / f"{candidate_id:06d}.safetensors"
 
     def checkpoint_path(self, candidate_id: int, rung: int) -> Path:
-        """Return the path of a candidate's checkpoint at the end of a rung."""
+        """Return the path of a candidate's checkpoint at the end of a rung. The file need not exist."""
         return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
@@ -203,7 +208,7 @@ class Run:
         """Message about damage, in one line; None if there is none.
 
         It lists ignored lines of the record, lost policies, a config.toml that has changed since the last start, and
-        EXR files that do not match their checksums.
+        EXR files that do not match their checksums. An OSError means that config.toml cannot be read.
         """
         found = (
             self.record.notice,
@@ -215,7 +220,7 @@ class Run:
 
     @property
     def best(self) -> Candidate | None:
-        """Candidate with the highest fitness (the earliest of equals); None before a candidate has succeeded."""
+        """Candidate with the highest fitness, or the earliest of several; None before a candidate has succeeded."""
         done = [candidate for candidate in self.candidates if candidate.failure is None]
         return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
 
@@ -223,7 +228,7 @@ class Run:
         """Return the candidate with this id, or the best candidate if the id is None.
 
         Raises:
-            RunError: the candidate has not been evaluated, or no candidate has succeeded.
+            RunError: no evaluated candidate has this id, or, for None, no candidate has succeeded.
         """
         if candidate_id is None:
             if self.best is None:
@@ -235,14 +240,14 @@ class Run:
         raise RunError(f"{self.path}: there is no candidate {candidate_id}; {len(self.candidates)} have been evaluated")
 
     def generation(self, number: int) -> list[Candidate]:
-        """Return the evaluated candidates of one generation."""
+        """Return the evaluated candidates of one generation, in the order of their ids."""
         ids = generation_ids(number, self.config.search.population)
         first, end = (bisect_left(self.candidates, one, key=lambda c: c.id) for one in (ids.start, ids.stop))
         return list(self.candidates[first:end])
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:
-        """Candidates in the order of the record; a candidate that has completed several rungs occurs once for each."""
+        """Candidates in the order of the record; a candidate occurs once for each rung that it has completed."""
         return list(self.record.lines.values())
 
     def on_record(self, candidate_id: int, rung: int) -> Candidate | None:
@@ -250,7 +255,7 @@ class Run:
         return self.record.lines.get((candidate_id, rung))
 
     def steps_of(self, candidate_id: int) -> int:
-        """Return the number of training steps of a candidate on record; 0 if it has not been evaluated."""
+        """Return the number of training steps of a candidate after all recorded rungs; 0 if there are none."""
         steps = rung = 0
         while (line := self.on_record(candidate_id, rung)) is not None:
             steps, rung = max(steps, line.steps), rung + 1
@@ -286,7 +291,7 @@ def _require_plain(path: Path) -> None:
 
 
 def next_directory(task: str, preset: str, base: Path = Path("runs")) -> Path:
-    """Return runs/<task>-<preset>-<n> with the first free number n."""
+    """Return the path runs/<task>-<preset>-<n> with the smallest n, from 1, for which nothing exists."""
     n = 1
     while (base / f"{task}-{preset}-{n}").exists():
         n += 1

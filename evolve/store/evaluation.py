@@ -22,7 +22,8 @@ class Evaluation:
     success_rate: fraction of the evaluation episodes that were solved
     steps: number of agent steps in training
     seconds: wall time of training and evaluation [s]
-    curve: learning curve, (training steps, mean return of the evaluation episodes) at each evaluation
+    curve: learning curve: (training steps, mean return) of each evaluation during training. These evaluations select
+        the policy, and play other episodes than those of `returns`
     failure: message in one line; None if the candidate did not fail
     episode_failures: (message in one line, number of episodes that ended with it), the most frequent first
     """
@@ -38,36 +39,44 @@ class Evaluation:
 
     @classmethod
     def failed(cls, failure: str, seconds: float = 0.0) -> Evaluation:
-        """Return the evaluation of a candidate that failed."""
+        """Return the evaluation of a candidate that failed; the message is put on one line and shortened.
+
+        seconds: wall time until the failure [s]
+        """
         return cls(fitness=-math.inf, seconds=seconds, failure=shortened(_in_one_line(failure)))
 
 
 def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
-    """Return the KINDS most frequent failures with their numbers, followed by the total number of all others."""
-    told: Counter[str] = Counter()
+    """Return the KINDS most frequent messages with their numbers of episodes, the most frequent first.
+
+    If there are other messages, their total number of episodes follows under the name OTHERS.
+
+    failures: number of episodes that ended with each message
+    """
+    counts: Counter[str] = Counter()
     for failure, episodes in failures.items():
-        told[_in_one_line(failure)[:LONGEST]] += episodes
-    others = told.pop(OTHERS, 0)  # failures that an earlier call has summarised
-    ranked = sorted(told.items(), key=lambda item: (-item[1], item[0]))
+        counts[_in_one_line(failure)[:LONGEST]] += episodes
+    others = counts.pop(OTHERS, 0)  # failures that an earlier call has summarised
+    ranked = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
     others += sum(episodes for _, episodes in ranked[KINDS:])
     return (*ranked[:KINDS], (OTHERS, others)) if others else tuple(ranked)
 
 
-def total_episode_failures(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
-    """Return the most frequent failures in several parts of a training run together."""
+def total_episode_failures(*parts: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
+    """Return the most frequent episode failures of several parts of a training run together; see `most_frequent`."""
     counts: Counter[str] = Counter()
-    for part in mishaps:
+    for part in parts:
         counts.update(dict(part))
     return most_frequent(counts)
 
 
 def escaped(text: str) -> str:
-    """Return a text with escapes in place of lone surrogates, which come from bytes in file names, for example."""
+    """Return a text with escapes in place of lone surrogates, which represent invalid bytes in file names."""
     return text.encode(errors="backslashreplace").decode()
 
 
 def shortened(failure: str) -> str:
-    """Return the message of a failure with at most LONGEST_FAILURE characters; the middle of longer ones is omitted."""
+    """Return the message of a failure with at most LONGEST_FAILURE characters; long messages lose their middle."""
     if len(failure) <= LONGEST_FAILURE:
         return failure
     half = LONGEST_FAILURE // 2 - 4

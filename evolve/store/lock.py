@@ -13,16 +13,24 @@ from evolve.store.regular_files import StrangeFileError, opened
 
 __all__ = ["LockedError", "RunLock", "holder"]
 
-PATIENCE_S = 0.5  # time to wait for the lock [s], because `holder` in another process takes it for an instant
-LONGEST = 400  # maximum length of the text in a lock file, which names a process and its machine [bytes]
+PATIENCE_S = 0.5  # [s] time to wait for the lock, because `holder` in another process takes it for an instant
+LONGEST = 400  # [bytes] maximum length of the text in a lock file, which names a process and its machine
 
 
 class LockedError(ValueError):
-    """Another process is working on the run, or the run cannot be written; the message is one line."""
+    """A run cannot be locked, because another process works on it or it cannot be written. The message is one line."""
 
 
 class RunLock:
-    """Lock of the operating system on the file `lock`. It is released when its process ends, even if it is killed."""
+    """Lock of a run: the operating system's lock on the file `lock`, held within a `with` block.
+
+    The operating system releases the lock when the process ends, even if the process is killed.
+
+    run: run directory
+
+    Raises:
+        LockedError: on entry, another process holds the lock, or the file cannot be opened.
+    """
 
     NAME = "lock"
 
@@ -58,7 +66,10 @@ class RunLock:
 
     @property
     def stands(self) -> bool:
-        """True if the lock file still belongs to the run, which may have been deleted or created again."""
+        """True if this process holds the lock, and the lock file is still the run's.
+
+        It is False if the run directory has been deleted, or deleted and created again.
+        """
         if self._file is None:
             return False
         try:

@@ -16,7 +16,7 @@ REMEDY = "restore the file from a copy of the run; only replay, report and expor
 
 
 def lost(candidates: Iterable[Candidate], where: Callable[[int], Path]) -> str | None:
-    """Return a message about policies on record whose files are missing; None if all files exist.
+    """Return a message about recorded policies whose files are missing; None if all files exist.
 
     where: function that returns the path of a candidate's policy
     """
@@ -31,7 +31,8 @@ def require_policy(candidate: Candidate, path: Path) -> None:
     """Check that a file is the policy with which a candidate was evaluated.
 
     Raises:
-        RunError: the file is missing or has a different content, or the candidate never had a policy.
+        RunError: the file is missing or has a different content, or the candidate has failed.
+        OSError: the file cannot be read.
     """
     if candidate.failure is not None:  # if a file exists, it is the policy of an earlier rung
         raise RunError(f"candidate {candidate.id} has no policy, as it failed: {candidate.failure}")

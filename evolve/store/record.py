@@ -34,10 +34,11 @@ class RunError(ValueError):
 class Record:
     """The lines of a record on disk.
 
+    path: the file candidates.jsonl
     lines: candidates by (id, rung), in the order of the file
     candidates: candidates in the order of their ids, each as recorded after the last rung that it has reached
-    notice: message about ignored lines; None without such lines. They are an unfinished last line, for example after a
-        power failure, or a damaged line and all lines after it
+    notice: message about ignored lines; None if there are none. Ignored lines are an unfinished last line, for example
+        after a power failure, or a damaged line and all lines after it
     before_damage: True if only the lines before the first damaged line are used; otherwise, damage is an error
     """
 
@@ -52,12 +53,14 @@ class Record:
 
     @classmethod
     def read(cls, path: Path, config: RunConfig, before_damage: bool = False) -> Record:
-        """Read a record, and check each line: its values, its agreement with `config` and earlier lines, its checksum.
+        """Read a record, and check the values of each line, its checksum, and its agreement with the other lines.
 
+        config: settings of the run, with which the lines must agree
         before_damage: True to use only the lines before the first damaged line, if there is one
 
         Raises:
-            RunError: the file cannot be read, or a line is damaged; the message names the file and the line.
+            RunError: the file cannot be read, or a line is damaged and `before_damage` is False; the message names the
+                file and the line.
         """
         record = cls(path, before_damage=before_damage)
         torn = False
@@ -106,7 +109,7 @@ class Record:
 
     @property
     def unchecked(self) -> int:
-        """Number of lines without a checksum. They are the first ones, which a former version wrote."""
+        """Number of lines without a checksum. They precede all others; an older version of rhabdom wrote them."""
         return self._chain.unchecked
 
     def append(self, candidate: Candidate) -> None:
@@ -137,7 +140,7 @@ class Record:
         self.candidates = _with(self.candidates, candidate)
 
     def cut_off_unused(self) -> None:
-        """Remove ignored lines from the file. If they include a damaged line, keep a copy of the file.
+        """Remove ignored lines from the file. If one of them is damaged, first copy the file to `*.damaged-N`.
 
         Raises:
             RunError: the file cannot be written.
@@ -152,7 +155,7 @@ class Record:
             raise RunError(f"{self.path}: cannot be written: {error.strerror}") from error
 
     def _copy(self, file: BinaryIO) -> None:
-        """Copy the damaged file to the first free path `candidates.jsonl.damaged-N`."""
+        """Copy the damaged file to `candidates.jsonl.damaged-N`, with the first free number N."""
         number = 1
         while os.path.lexists(copy := self.path.with_name(f"{self.path.name}.damaged-{number}")):
             number += 1
@@ -161,10 +164,10 @@ class Record:
 
 
 def _require_readable(candidate: Candidate, path: Path) -> None:
-    """Check that a candidate will read back equal; `Candidate.recordable` returns such candidates.
+    """Check that the line of a candidate restores an equal candidate. Results of `Candidate.recordable` pass the check.
 
     Raises:
-        RunError: it would read back differently, or be refused.
+        RunError: the line would restore a different candidate, or would be refused.
     """
     try:
         if candidate == candidate.recordable():
@@ -193,14 +196,14 @@ def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate,
 def _require_agreement(candidate: Candidate, config: RunConfig, dimension: int, earlier: Lines) -> None:
     """Check that a line of the record agrees with the run's settings and with earlier lines.
 
-    A comparison with the search's proposals is not part of this check; see `evolve.search.same_search`.
+    The genome is not compared with the search's proposals here; see `evolve.search.same_search`.
 
     Raises:
         ValueError: the line disagrees; the message states the reason.
     """
     population, rungs = config.search.population, config.search.rungs
     if (candidate.id, candidate.rung) in earlier:
-        raise ValueError(f"candidate {candidate.id} is there twice")
+        raise ValueError(f"candidate {candidate.id} occurs twice")
     if not 0 <= candidate.rung < rungs:
         raise ValueError(f"rung = {candidate.rung}: must be at least 0 and below search.rungs = {rungs}")
     if candidate.rung and (candidate.id, candidate.rung - 1) not in earlier:

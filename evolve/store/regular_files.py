@@ -51,7 +51,7 @@ def opened(path: Path, mode: Literal["rb", "r+b", "ab"] = "rb", create: bool = F
 
     Raises:
         StrangeFileError: the path is not a regular file, or a file opened for writing has several hard links.
-        OSError: the file does not exist, or cannot be opened.
+        OSError: the file cannot be opened, or does not exist and `create` is False.
     """
     require_regular(path)
     flags = _FLAGS[mode] | (os.O_CREAT if create else 0)
@@ -97,8 +97,8 @@ def folder(path: Path) -> Path:
     """Create a run's folder if it is missing, and return its path. The parent folder must exist.
 
     Raises:
-        StrangeFileError: the path exists, but is not a folder.
-        OSError: the folder cannot be created.
+        StrangeFileError: the path is a link to a folder.
+        OSError: the folder cannot be created, for example because a file has this path.
     """
     path.mkdir(exist_ok=True)
     require_folder(path)
@@ -106,7 +106,7 @@ def folder(path: Path) -> Path:
 
 
 def folders(path: Path, exist_ok: bool = True) -> None:
-    """Create a folder and its missing parents, so that their names survive a power failure.
+    """Create a folder and its missing parents, and synchronise them with the disk.
 
     exist_ok: False to refuse a path that exists
 
@@ -121,7 +121,9 @@ def folders(path: Path, exist_ok: bool = True) -> None:
 
 
 def require_regular(path: Path) -> None:
-    """Check that a path is a regular file or does not exist, before other code opens it by its name.
+    """Check that a path is a regular file or does not exist.
+
+    Code that passes a path to another library calls this function first. Other code uses `opened`, which also checks.
 
     Raises:
         StrangeFileError: the path exists, but is not a regular file.
@@ -161,9 +163,13 @@ def sync_folder(path: Path) -> None:
 def _descriptor(path: Path, flags: int, alone: bool = False) -> int:
     """Open a file, check it, and return its descriptor.
 
-    The check follows the opening, so that the file cannot be replaced between the two.
+    The open file is checked, because a file at this path could be replaced between a check and the opening.
 
     alone: True to refuse a file with several hard links
+
+    Raises:
+        StrangeFileError: the path is not a regular file, or the file has several hard links and `alone` is True.
+        OSError: the file cannot be opened.
     """
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
     found = os.fstat(descriptor)

@@ -18,17 +18,17 @@ FOLDER = "demo"  # run directory within evolve/
 
 
 def copy_shipped_run(directory: Path) -> Run:
-    """Copy the shipped run to a directory, unless it is already there, and return it.
+    """Copy the files of the shipped run that a directory lacks, and return the run in this directory.
 
     Raises:
-        RunError: the directory contains other files.
+        RunError: the directory contains a file of the run with another content, or only other files.
         OSError: the directory cannot be written.
     """
     files = dict(_files(resources.files("evolve") / FOLDER))
     there = [name for name in files if (directory / name).exists()]
     same = all(_same(directory / name, files[name]) for name in there)
     if not same or (not there and directory.exists() and any(directory.iterdir())):
-        raise RunError(f"{directory} holds other files: choose another directory with --out")
+        raise RunError(f"{directory} contains other files: choose another directory with --out")
     directory.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         if name not in there:

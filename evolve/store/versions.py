@@ -48,7 +48,11 @@ PACKAGES = (
 
 
 def present() -> dict[str, str]:
-    """Return the installed versions of the software that influences a run's numbers."""
+    """Return the software versions, architecture and device that influence a run's numbers, by name.
+
+    The names are "python", "machine" (architecture), "commit" (of rhabdom; "" if unknown), "device", and PACKAGES. The
+    version of a missing package is "not installed".
+    """
     versions = {"python": platform.python_version(), "machine": platform.machine(), "commit": _commit()}
     versions["device"] = device()
     for package in PACKAGES:
@@ -69,7 +73,7 @@ def recorded(run: Path) -> dict[str, str]:
 
 
 def commits(run: Path) -> list[str]:
-    """Return the known commits of rhabdom at the starts of a run, in order, each once."""
+    """Return the commits of rhabdom that started or resumed a run, as far as known, in order and each once."""
     known = [start["versions"].get("commit") for start in _starts(run)]
     return list(dict.fromkeys(commit for commit in known if commit))
 
@@ -80,9 +84,9 @@ def machine() -> str:
 
 
 def machines(run: Path) -> list[str]:
-    """Return the machines that started or resumed a run, in order, each once.
+    """Return the machines that started or resumed a run, in order and each once; see `machine`.
 
-    Records of former versions state only the architecture, such as x86_64.
+    For starts by older versions of rhabdom, only the architecture is known, such as x86_64.
     """
     found = []
     for start in _starts(run):
@@ -94,8 +98,7 @@ def machines(run: Path) -> list[str]:
 def run_id(run: Path) -> str:
     """Return the id of a run, which does not depend on its directory: 16 hexadecimal digits of a SHA-256.
 
-    It is computed from the first start of the run, with its time, settings and versions. It is "" if no start is
-    recorded.
+    It is computed from the time, the settings and the versions of the first start. If no start is recorded, it is "".
     """
     starts = _starts(run)
     return hashlib.sha256(json.dumps(starts[0], sort_keys=True).encode()).hexdigest()[:16] if starts else ""
@@ -111,6 +114,9 @@ def provenance(run: Path) -> dict[str, Any]:
     settings: fingerprint of its config.toml
     run_commits: commits of rhabdom that started or resumed the run
     commit: commit of this code
+
+    Raises:
+        OSError: config.toml cannot be read.
     """
     known = {
         "run": run.resolve().name,
@@ -125,10 +131,13 @@ def provenance(run: Path) -> dict[str, Any]:
 def config_change(run: Path, candidates: int) -> str | None:
     """Return a message if a run's config.toml has changed since the last start of the run; None otherwise.
 
-    Records of former versions contain no checksum of the file. Only changes of settings that influence training and
-    evaluation are then noticed.
+    If an older version of rhabdom made the last start, no checksum of the file is recorded. Only changes of settings
+    that influence training and evaluation are then noticed.
 
     candidates: number of candidates that have been evaluated
+
+    Raises:
+        OSError: config.toml cannot be read.
     """
     starts = _starts(run)
     if not starts:
@@ -146,10 +155,10 @@ def config_change(run: Path, candidates: int) -> str | None:
 
 
 def fingerprint(config: str) -> str:
-    """Return the fingerprint of a run's config.toml.
+    """Return the fingerprint of the text of a run's config.toml, 16 hexadecimal digits of a SHA-256.
 
-    The fingerprint ignores lines that do not influence training and evaluation: comments, the number of workers, and
-    the number of generations.
+    It ignores lines that do not influence training and evaluation: comments, the number of workers, and the number of
+    generations.
     """
     left_out = ("workers =", "generations =", "#")
     lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
@@ -162,11 +171,14 @@ def _checksums(config: bytes) -> dict[str, str]:
 
 
 def record_start(run: Path, candidates: int, origin: str | None = None, config: bytes | None = None) -> None:
-    """Record a start of a run with the present versions.
+    """Record a start of a run, with the present versions, in versions.json.
 
     candidates: number of candidates that have been evaluated before this start
-    origin: "RUN:ID", the animal from which the run starts; None without one
-    config: content of the run's config.toml; None: it is read
+    origin: "RUN:ID", the animal whose genes are the start values; None if there is no such animal
+    config: content of the run's config.toml; None: read it from the file
+
+    Raises:
+        OSError: config.toml cannot be read, or versions.json cannot be written.
     """
     start: dict[str, Any] = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -181,13 +193,13 @@ def record_start(run: Path, candidates: int, origin: str | None = None, config: 
 
 
 def origin(run: Path) -> str | None:
-    """Return the animal from which a run started, such as "runs/first:12"; None if no animal is recorded."""
+    """Return the animal whose genes were the start values of a run, such as "runs/first:12"; None if there is none."""
     starts = _starts(run)
     return str(starts[0]["from"]) if starts and "from" in starts[0] else None
 
 
 def _starts(run: Path) -> list[dict[str, Any]]:
-    """Return the recorded starts of a run. A lost or damaged file counts as empty: a run can continue without it."""
+    """Return the recorded starts of a run; [] if the file is missing or damaged, since a run does not need it."""
     try:
         starts = json.loads(read(run / FILE, LARGEST_FILE))
         return [start for start in starts if isinstance(start["versions"], dict)]
@@ -196,7 +208,7 @@ def _starts(run: Path) -> list[dict[str, Any]]:
 
 
 def _processor() -> str:
-    """Return the processor's name if the system provides it."""
+    """Return the processor's name, or the architecture if the system does not provide the name."""
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             if line.startswith("model name"):

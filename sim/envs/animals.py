@@ -29,10 +29,11 @@ class Advanced:
 class Animals:
     """All agents of a batch of worlds, and their observations.
 
-    renderers: for each agent, the renderers of its eyes, or None if its eyes are not used.
-    memory: number of frames in the observations of learning agents.
-    learners: senses of the learning agents.
-    seeing: senses of all agents whose eyes are used, learners first.
+    simulation: the worlds
+    renderers: for each agent, the renderers of its eyes, or None if its eyes are not used
+    memory: number of frames in the observations of learning agents
+    learners: attribute, senses of the learning agents
+    seeing: attribute, senses of all agents whose eyes are used, learners first
     """
 
     def __init__(self, simulation: Simulation, renderers: Sequence[AgentRenderers | None], memory: int) -> None:
@@ -69,8 +70,8 @@ class Animals:
         actions: one array (world, n_actions) for each learning agent
         """
         simulation = self.simulation
-        everyones = self._everyones(actions)
-        failed = simulation.move(np.concatenate(everyones, axis=1) if len(everyones) > 1 else everyones[0])
+        commanded = self._all_actions(actions)
+        failed = simulation.move(np.concatenate(commanded, axis=1) if len(commanded) > 1 else commanded[0])
         first = 0
         for agent, senses in zip(simulation.agents, self._of_agents, strict=True):
             if senses is not None:
@@ -86,7 +87,7 @@ class Animals:
         return Advanced(step, pending)
 
     def seen(self, advanced: Advanced) -> list[Arrays]:
-        """Return the frames after the action, for each agent in `seeing`.
+        """Wait for the frames after an action, and return them for each agent in `seeing`.
 
         Worlds in which the task moved bodies after the action (`Step.changed`) are rendered again first.
         """
@@ -147,7 +148,7 @@ class Animals:
         poses = self.simulation.poses()
         return [senses.launch(poses, worlds) for senses in self.seeing]
 
-    def _everyones(self, actions: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def _all_actions(self, actions: Sequence[np.ndarray]) -> list[np.ndarray]:
         found = list(actions)
         for agent, (other, senses) in zip(self.simulation.agents[len(actions) :], self._frozen, strict=True):
             shape = self.simulation.n, agent.n_actions

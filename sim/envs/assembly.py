@@ -80,16 +80,17 @@ def make_vec_env(
         n_envs, seed, memory, mode, least_return, episode_steps and render_mode may be passed, because the task itself
         defines the rest. The animals of an encounter learn a single policy, and therefore must have the same spaces.
         Arrays then have one row for each animal of each world.
-    eyes: the agent's eyes: one `sim.Eyes`, or several kinds of eyes by name; None: Eyes()
-    n_envs: number of worlds
+    eyes: the agent's eyes: one `sim.Eyes`, or several kinds of eyes by name; None: the default, `sim.Eyes()`
+    n_envs: number of worlds, 1 to 1,000,000
     seed: seed of episodes and noise; None: a random seed
-    memory: number of frames in an observation
-    mode: "training", "evaluation" or "test". In evaluation, objects that the agent reached reappear elsewhere, and
-        reward terms have the weights of the fitness. "test" is an evaluation for final results. It equals "evaluation",
-        unless a user task uses other worlds in this mode.
+    memory: number of frames in an observation, 1 to 1,000,000
+    mode: "training", "evaluation" or "test". In evaluation of a built-in task, objects that the agent reached reappear
+        elsewhere, and reward terms have the weights of the fitness. "test" is an evaluation for final results. It
+        equals "evaluation", unless a user task uses other worlds in this mode.
     rays_per_receptor: number of rays traced for each receptor, in direct light only. "auto": the cheapest fidelity
-        whose error is small compared with the receptors' noise. It includes light that was reflected twice if this
-        light changes signals noticeably. `sim.choose_fidelity(world, eyes, bands="own")` returns the same fidelity.
+        whose error is small compared with the receptors' noise. This fidelity includes light that was reflected twice
+        if this light changes signals noticeably. `sim.choose_fidelity(world, eyes, bands="own")` returns the same
+        fidelity.
     fidelity: a complete `sim.Fidelity` instead of rays_per_receptor, or "auto", which has the same meaning as
         rays_per_receptor="auto". A `sim.Fidelity` may also be passed as rays_per_receptor.
     world_seed, mazes, course, layouts, wall_height: the layout that all worlds share, see `sim.build_world`
@@ -105,10 +106,13 @@ def make_vec_env(
         behind, with the fields of view of its eyes; "eyes": the signals of all eyes, side by side; None: no images
 
     Physics uses the same number of threads as Dr.Jit, but at most one for each world. drjit.set_thread_count limits
-    both.
+    both. A FidelityWarning reports a fidelity that is less accurate than allowed, and a MirrorWarning features of the
+    model that are not rendered.
 
     Raises:
         ValueError: an argument is invalid.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        RuntimeError: a method of a user task fails at the start of the first episode.
     """
     if episode_steps is not None:
         _require_whole("episode_steps", episode_steps, 1)
@@ -148,6 +152,8 @@ def make_parallel_env(
     Raises:
         ValueError: an argument is invalid.
         ImportError: PettingZoo is not installed.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        RuntimeError: a method of a user task fails at the start of the first episode.
     """
     if not isinstance(encounter, Encounter):
         raise ValueError(
@@ -162,7 +168,7 @@ def make_parallel_env(
 
 
 def refuse(options: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
-    """Refuse options that must be left out; `reasons` contains their names, each with the reason."""
+    """Raise a ValueError for an option that must be left out; `reasons` contains their names, each with the reason."""
     for name, why in reasons.items():
         if name in options:
             raise ValueError(f"{name} = {shown(options[name])}: must be left out, {why}")

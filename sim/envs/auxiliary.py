@@ -66,10 +66,12 @@ class Auxiliary:
         self._before = poses
 
     def _flow(self, now: Poses, depth: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Return the optic flow of the points that are visible now.
+        """Return the optic flow of the points that are visible now, (world, eye, 2, height, width); 0 without a hit.
 
         Points are followed from their present positions back to the previous poses. The flow is the negative of this
         motion.
+
+        depth, ids: what the centre of each receptor sees, see `flow_between`
         """
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)

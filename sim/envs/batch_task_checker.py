@@ -55,7 +55,10 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 
 
 def _actions(simulation: Simulation, steps: int) -> list[np.ndarray]:
-    """Return random actions that are the same in all worlds, and that do not depend on the number of worlds."""
+    """Return random actions (world, value) for each step, which are the same in any number of worlds.
+
+    All worlds take the same actions.
+    """
     size = sum(agent.n_actions for agent in simulation.agents)
     random = np.random.default_rng(SEED)
     return [np.tile(random.uniform(-1, 1, size), (simulation.n, 1)).astype(np.float32) for _ in range(steps)]

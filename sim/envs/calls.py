@@ -42,7 +42,7 @@ class CallOrder:
         """Refuse a call before the first reset, after `close`, or while an action is pending.
 
         Raises:
-            RuntimeError: the call came too early or too late.
+            RuntimeError: there has been no reset yet, the environment is closed, or `step_wait` must come first.
         """
         self.require_open()
         if not self._begun:
@@ -94,6 +94,7 @@ def actions_of(name: str, actions: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Return actions as a float32 array. Numbers beyond the range of float32 are limited to it.
 
     name: the actions' name in messages, such as "actions"
+    shape: required shape of the actions
 
     Raises:
         ValueError: the actions are not real numbers, are masked, or have another shape.
@@ -110,7 +111,7 @@ def actions_of(name: str, actions: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def one_worlds_action(name: str, action: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the action of the only world as a float32 array.
+    """Return the action of the only world as a float32 array; the arguments are those of `actions_of`.
 
     Raises:
         ValueError: the action is not finite, or `actions_of` refuses it.

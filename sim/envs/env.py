@@ -21,11 +21,14 @@ _OF_BATCHES = {"seed": IN_RESET, "n_envs": "this is one world: make_vec_env has 
 class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     """One agent with eyes in one world. Spaces, rewards, endings and `info` are documented in docs/tasks.md.
 
-    task, eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, course, layouts, wall_height,
-        least_return, episode_steps, spectra, medium, render_mode: see `sim.make_vec_env`
+    task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its `alone`
+    eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, course, layouts, wall_height, least_return,
+        episode_steps, spectra, medium, vary, auxiliary, render_mode: see `sim.make_vec_env`
 
     Raises:
-        ValueError: an argument is invalid.
+        ValueError: an argument is invalid, or is `seed` or `n_envs`.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        RuntimeError: a method of a user task fails at the start of the first episode.
     """
 
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
@@ -48,12 +51,23 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         """Current state of the world, as a batch of one world.
 
         Its type depends on the physics; for the built-in tasks, it is `WorldState`.
+
+        Raises:
+            RuntimeError: there has been no reset yet.
         """
         return self._batch.state
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Start an episode; return its first observation and `info`.
+
+        seed: new seed of episodes and noise; None: the random numbers continue
+
+        Raises:
+            ValueError: the seed is neither a whole number of at least 0 nor None, or `options` are given.
+            RuntimeError: `close` has been called, or a method of a user task fails.
+        """
         seed = seed_of("seed", seed)
         super().reset(seed=seed)
         if options:
@@ -64,7 +78,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         return _only(observation), self._batch.reset_infos[0]
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
-        """Take one action.
+        """Take one action; return observation, reward, terminated, truncated and `info`.
 
         Raises:
             ValueError: the action is not real, finite numbers of the right shape, or it is masked.
@@ -87,7 +101,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
 
 def make_env(task: str | Task | BatchTask, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
-    """Return a single environment; see `EyesEnv`."""
+    """Return a single world as a Gymnasium environment; see `EyesEnv` for the arguments and errors."""
     return EyesEnv(task, eyes, **options)
 
 

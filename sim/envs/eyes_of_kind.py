@@ -53,7 +53,7 @@ class EyesOfKind:
         self.space = self._space((memory, *frame))
 
     def restart(self, keys: np.ndarray) -> None:
-        """Restart the random generators of the noise with these keys."""
+        """Restart the random generators of the noise with these keys, (world,) uint64."""
         self._normals.restart(keys)
 
     def launch(self, poses: Poses, worlds: np.ndarray | None = None, fresh: bool = False) -> PendingFrame:

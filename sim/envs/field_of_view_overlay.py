@@ -111,6 +111,7 @@ class FieldsOfView:
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """Return the image (y, x, 3) uint8 with the visible part of every eye's field of view drawn into it.
 
+        nearness: function that returns 1 / depth of the surfaces in the image, see `Nearness`
         data: MuJoCo's data with the current poses
         """
         shown = picture.reshape(-1, 3).copy()
@@ -181,13 +182,13 @@ def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field
 
 
 def _fan(eyes: Eyes) -> np.ndarray:
-    """Return the azimuths of the fan's rays, relative to the eye's axis."""
+    """Return the azimuths [rad] of the fan's rays, relative to the eye's axis, (FAN,)."""
     half = np.radians(eyes.fov_deg) / 2
     return np.linspace(-half, half, FAN)
 
 
 def _receptor_rays(eyes: Eyes) -> np.ndarray:
-    """Return the azimuths of receptor columns, see `Eyes.column_azimuths`.
+    """Return the azimuths [rad] of receptor columns, (column,), see `Eyes.column_azimuths`.
 
     If there are more than MOST_RAYS columns, only every second, third, ... column is included.
     """
@@ -212,7 +213,13 @@ def _dot(eye: np.ndarray, view: Viewpoint, size: tuple[int, int], radius: float)
 
 
 def _reach(azimuths: np.ndarray, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Return the distance to the first surface along these azimuths [m], ignoring the agent's own body."""
+    """Return the distance to the first surface along these azimuths [m], ignoring the agent's own body.
+
+    Without a hit, it is FARTHEST.
+
+    azimuths: directions in the world's frame [rad], (n,)
+    eye: x and y of the pupil [m], (2,)
+    """
     n = len(azimuths)
     rays = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(n)], axis=-1)
     hit, distance = np.full(n, -1, np.int32), np.full(n, -1.0)

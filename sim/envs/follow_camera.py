@@ -66,8 +66,8 @@ class FollowCamera:
         nearness: Nearness
         if self._mirror is None:
             assert self._quick is not None
-            look = self._quick.render(self._data, view, width, height)
-            picture, nearness = look.picture, look.inverse_distance
+            image = self._quick.render(self._data, view, width, height)
+            picture, nearness = image.picture, image.inverse_distance
         else:
             picture, nearness = self._slow_image(self._mirror, view, size)
         if self.eyes is None:

@@ -71,8 +71,8 @@ def require_frames(simulation: Simulation, frames: int) -> None:
     """Set the number of frames per action of the simulation's physics.
 
     Raises:
-        ValueError: it is not a divisor of the number of physics steps, differs from that of other eyes, or exceeds 1
-            for a physics without frames.
+        ValueError: the number is not a divisor of the number of physics steps per action, differs from that of other
+            eyes, or exceeds 1 for a physics that has no poses within an action.
     """
     physics = simulation.physics
     if not hasattr(physics, "passed"):
@@ -144,7 +144,7 @@ def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.nda
 
 
 def _responses(dynamics: ReceptorDynamics, signals: np.ndarray, frames: int, seconds: float) -> np.ndarray:
-    """Return the responses at the end of each action if `frames` evenly spaced frames of it are rendered.
+    """Return the responses at the end of each action if `frames` evenly spaced frames are rendered per action.
 
     signals: signals in all frames, (action, frame, world, ...)
     seconds: duration of an action [s]

@@ -22,7 +22,7 @@ def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarr
     """
     optional = {MODELS} if len(like["steps"]) == 1 else set()
     if not isinstance(state, Mapping) or (state.keys() ^ like.keys()) - optional:
-        raise ValueError(f"state: must be what get_state returns, with the entries {', '.join(like)}")
+        raise ValueError(f"state: must be the return value of get_state, with the entries {', '.join(like)}")
     for name, array in like.items():
         if name not in state:
             continue

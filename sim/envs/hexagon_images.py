@@ -45,7 +45,7 @@ def _palette(eye: CompoundEye) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _numbers(eye: CompoundEye) -> np.ndarray:
-    """Return the number of each pixel's ommatidium, (y, x); len(eye) between hexagons."""
+    """Return the index of each pixel's ommatidium, (y, x); len(eye) between hexagons."""
     tree = KDTree(eye.directions)
     two = min(2, len(eye))
     apart = tree.query(eye.directions, k=[two])[0][:, 0] if two == 2 else np.array([ALONE * np.sqrt(3)])
@@ -64,9 +64,14 @@ def _numbers(eye: CompoundEye) -> np.ndarray:
 
 
 def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.ndarray) -> np.ndarray:
-    """Return each pixel's distance from the border between the two nearest ommatidia, relative to half their distance.
+    """Return the distance of each pixel from the border between the directions of the two nearest ommatidia.
 
-    The distance is 1 at the direction of the nearest ommatidium, and 0 on the border.
+    The unit is half of the distance between these two directions. The result is 1 at the direction of the nearest
+    ommatidium, and 0 on the border.
+
+    directions: directions of the ommatidia, unit vectors (n, 3), which `tree` contains
+    ways: directions of the pixels, unit vectors (..., 3)
+    number: index of the ommatidium nearest to each pixel, (...)
     """
     if len(directions) == 1:
         return np.ones(number.shape)
@@ -78,7 +83,7 @@ def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.n
 
 
 def _projected(directions: np.ndarray) -> np.ndarray:
-    """Return Hammer's projection (right, up) of directions (ahead, left, up)."""
+    """Return Hammer's projection (right, up), (n, 2), of directions (ahead, left, up), unit vectors (n, 3)."""
     longitude = np.arctan2(-directions[:, 1], directions[:, 0])
     sine = np.clip(directions[:, 2], -1, 1)
     cosine = np.sqrt(1 - sine**2)

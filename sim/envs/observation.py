@@ -15,6 +15,9 @@ class Memory:
 
     In a world that starts a new episode, the first frame fills the whole memory, as if the agent had seen the same
     frame before. A memory that started with zeros would look as if the agent had come out of darkness.
+
+    Raises:
+        ValueError: `frames` is below 1.
     """
 
     def __init__(self, frames: int) -> None:
@@ -24,10 +27,11 @@ class Memory:
         self._past: list[np.ndarray] = []
 
     def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        """Add a frame (env, ...); `fresh`: indices of the worlds whose episode has just started.
+        """Add a frame (world, ...), and return the memory (world, frames, ...), which the caller may modify.
 
-        Returns an array (env, memory, ...), which the caller may modify. `frame` itself must not be modified
-        afterwards.
+        The caller must not modify `frame` afterwards.
+
+        fresh: indices of the worlds whose episode has just started
         """
         if self.frames == 1:
             self._past = [frame.copy()]
@@ -47,20 +51,23 @@ class Memory:
 
     @property
     def frames_held(self) -> np.ndarray:
-        """All stored frames, (env, memory, ...)."""
+        """All stored frames, (world, frames, ...)."""
         return np.stack(self._past, axis=1)
 
     def restore(self, frames: np.ndarray) -> None:
-        """Replace the stored frames by these, (env, memory, ...)."""
+        """Replace the stored frames by these, (world, frames, ...)."""
         self._past = [frames[:, k].copy() for k in range(self.frames)]
 
     @property
     def newest(self) -> np.ndarray:
-        """The last frame of every world, (env, ...)."""
+        """The last frame of every world, (world, ...)."""
         return self._past[-1]
 
     def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Return the memory of these worlds after a frame (len(worlds), ...), without storing the frame."""
+        """Return the memory of these worlds after a frame (len(worlds), ...), without storing the frame.
+
+        The result is (len(worlds), frames, ...).
+        """
         if self.frames == 1:
             return frame[:, None]
         return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)

@@ -26,7 +26,7 @@ class OneEnvironment(VecEnv):
         """Seed all random streams at the next reset. World i uses streams derived from (seed, i).
 
         Raises:
-            ValueError: the seed is neither a whole number from 0 on nor None.
+            ValueError: the seed is neither a whole number of at least 0 nor None.
         """
         self._seeds = [seed_of("seed", seed)] * self.num_envs
         return self._seeds
@@ -48,6 +48,7 @@ class OneEnvironment(VecEnv):
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
+        """Set an attribute of the environment; ValueError unless `indices` selects all worlds."""
         if len(list(self._get_indices(indices))) != self.num_envs:
             raise ValueError("set_attr: the worlds share one environment; set an attribute for all of them")
         setattr(self, attr_name, value)
@@ -55,6 +56,7 @@ class OneEnvironment(VecEnv):
     def env_method(
         self, method_name: str, *args: Any, indices: int | Iterable[int] | None = None, **kwargs: Any
     ) -> list[Any]:
+        """Call a method of the environment once; ValueError unless `indices` selects all worlds."""
         if len(list(self._get_indices(indices))) != self.num_envs:
             raise ValueError("env_method: the worlds share one environment; call a method for all of them")
         result = getattr(self, method_name)(*args, **kwargs)

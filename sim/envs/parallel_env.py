@@ -55,7 +55,14 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, dict[str, Any]]]:
-        """Start an episode. Options are accepted, because PettingZoo's tests pass some, but have no effect."""
+        """Start an episode; return the observations and infos by animal.
+
+        Options are accepted, because PettingZoo's tests pass some, but have no effect.
+
+        Raises:
+            ValueError: the seed is neither a whole number of at least 0 nor None.
+            RuntimeError: `close` has been called, or a method of a task fails.
+        """
         self._calls.start_reset()
         seed = seed_of("seed", seed)
         if seed is not None:
@@ -74,7 +81,9 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         dict[str, bool],
         dict[str, dict[str, Any]],
     ]:
-        """Take one action of every animal. Steps after the end of an episode have no effect.
+        """Take one action of every animal; return observations, rewards, terminations, truncations and infos by animal.
+
+        Steps after the end of an episode have no effect, and return empty dictionaries.
 
         Raises:
             ValueError: an action is missing, belongs to an unknown animal, has the wrong shape, or is not finite.
@@ -105,7 +114,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
     def render(self) -> np.ndarray | list[np.ndarray] | None:
         """Return an image (y, x, 3) uint8 of the world, or a list with an image of each animal's signals.
 
-        `render_mode` selects which of the two; without a mode, None is returned.
+        `render_mode` selects one of the two. Without a mode, the result is None.
 
         Raises:
             RuntimeError: there is a render mode, and there has been no reset yet.

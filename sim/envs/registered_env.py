@@ -24,6 +24,8 @@ ENDLESS = -1  # Gymnasium's value for episodes without truncation
 class RegisteredEnv(EyesEnv):
     """An `EyesEnv` whose episodes are truncated by Gymnasium's wrapper `TimeLimit`.
 
+    Further errors are those of `EyesEnv`.
+
     Raises:
         ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """
@@ -35,7 +37,8 @@ class RegisteredEnv(EyesEnv):
 class RegisteredVectorEnv(EyesVectorEnv):
     """An `EyesVectorEnv` that truncates its episodes after `max_episode_steps` actions.
 
-    A course or a family of layouts with a smaller number of actions truncates them earlier.
+    A course or a family of layouts with a smaller number of actions truncates them earlier. Further errors are those of
+    `EyesVectorEnv`.
 
     Raises:
         ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.
@@ -52,7 +55,11 @@ def _begun(task: str | Task | type[Task]) -> str | Task:
 
 
 def _steps(asked: int, options: dict[str, Any]) -> int:
-    """Return the number of actions in an episode: the requested number, but at most that of the course or family."""
+    """Return the number of actions in an episode: the requested number, but at most that of the course or family.
+
+    Raises:
+        ValueError: `options` contains `episode_steps`, the number is out of range, or the course is unknown.
+    """
     if "episode_steps" in options:
         raise ValueError(
             f"episode_steps = {options['episode_steps']!r}: must be left out if Gymnasium makes the environment; "

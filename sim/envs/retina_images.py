@@ -39,7 +39,7 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
 
 
 def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the images stacked vertically, padded to the same width with the grey of the gaps."""
+    """Return images (y, x, 3) stacked vertically, padded to the same width with the grey of the gaps."""
     width = max(picture.shape[1] for picture in pictures)
     rows = [np.pad(p, ((GAP, 0), (0, width - p.shape[1]), (0, 0)), constant_values=BETWEEN) for p in pictures]
     return np.concatenate(rows)[GAP:]
@@ -68,6 +68,8 @@ def shares_of(hues: np.ndarray) -> np.ndarray:
     """Return weights (type, 3) with which equal signals of all types give white.
 
     If no type's colour contains a primary, all types contribute equally to this primary.
+
+    hues: linear colour of each type, (type, 3)
     """
     sums = hues.sum(axis=0)
     return np.where(sums > 0, hues / np.where(sums > 0, sums, 1), 1 / len(hues))

@@ -24,11 +24,12 @@ Arrays = dict[str, np.ndarray]  # arrays by name; the first axis is the world
 class Senses:
     """Observations of one agent.
 
+    simulation: the worlds
     number: index of the agent in the simulation
-    renderers: renderers of its eyes
+    renderers: renderers of the agent's eyes
     memory: number of frames in an observation
-    sights: signals of its eyes (`EyesOfKind`), by kind
-    action: its last action, (world, n_actions) float32
+    sights: signals of the agent's eyes (`EyesOfKind`), by kind
+    action: the agent's last action, (world, n_actions) float32
     observation_space, action_space: spaces of one world
     """
 
@@ -88,7 +89,6 @@ class Senses:
         """Add new frames to the memory, and return the observations.
 
         seen: new frames of all worlds, by kind of eyes
-
         fresh: indices of the worlds whose episode has just begun
         """
         remembered = {name: sight.memory.remember(seen[name], fresh) for name, sight in self.sights.items()}
@@ -97,7 +97,7 @@ class Senses:
     def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
         """Return the memory that these worlds would have after the new frames, which are not stored.
 
-        seen: new frames of all worlds
+        seen: new frames of all worlds, by kind of eyes
         """
         return {name: sight.memory.preview(seen[name][worlds], worlds) for name, sight in self.sights.items()}
 

@@ -17,8 +17,8 @@ def set_threads(count: int = 1) -> None:
     """Set the number of threads of Dr.Jit, torch, OpenMP and BLAS in this process and in processes that it starts.
 
     Call this function at the beginning of a training script, before it makes environments or a learner. By default,
-    torch and BLAS use one thread per core. The networks of small eyes are too small for that: most of the time, the
-    threads wait for each other, and waiting takes CPU time. `evolve` uses one thread per process.
+    torch and BLAS use one thread per core. Networks for small eyes give so many threads too little work: most of the
+    time, the threads wait for each other, and waiting takes CPU time. `evolve` uses one thread per process.
 
     Rendering and physics use the threads of Dr.Jit. If a machine executes a single training run, call
     ``drjit.set_thread_count(n)`` afterwards to give them more threads than torch.

@@ -26,15 +26,14 @@ from sim.tasks.simulation import LEAST_RETURN, Simulation
 class EyesVecEnv(OneEnvironment):
     """Many worlds of one task.
 
-    In a `sim.Encounter`, all animals must be alike and learn a single policy. The rows of the first animal in all
+    In a `sim.Encounter`, all animals learn one policy, and have the same spaces. The rows of the first animal in all
     worlds come first, followed by the rows of the second animal. Observations, rewards, endings and `info` are
     documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
     observation is then the first observation of the new episode, and info["terminal_observation"] is the last
     observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
     episodes depend only on the seed and on the world's index, not on the number of worlds.
 
-    simulation: the worlds
-    renderers: renderers of every agent's eyes
+    simulation, renderers: the worlds, and renderers of every agent's eyes
     memory: number of frames in an observation
     render_mode: "rgb_array", "eyes" or None
     failures: number of episodes that ended because of a failure, by reason
@@ -79,7 +78,7 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def eyes(self) -> Any:
-        """`sim.Eyes` of a built-in task's agent; None if a user task places the eyes."""
+        """`sim.Eyes` of a built-in task's agent, or several kinds by name; None if a user task places the eyes."""
         return getattr(self.simulation.task, "eyes", None)
 
     @property
@@ -93,10 +92,10 @@ class EyesVecEnv(OneEnvironment):
         return self._learners[0].renderer
 
     def reset(self) -> Arrays:
-        """Start all episodes; return their first observations.
+        """Start an episode in every world; return the first observations.
 
         Raises:
-            RuntimeError: the environment is closed, or an action is pending after `step_async`.
+            RuntimeError: the environment is closed, an action is pending, or a method of a user task fails.
         """
         self._calls.start_reset()
         if self._seeds[0] is not None:
@@ -110,12 +109,13 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations)
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
-        """Seed each world with its own number at the next reset; None: the world continues its random numbers.
+        """Seed each world with its own seed at the next reset; None: the world continues its random numbers.
 
         An episode is then the same as in a single environment with this seed.
 
         Raises:
-            ValueError: there is not one seed per world, or a seed is not a whole number above or equal to 0.
+            ValueError: there is not one seed per world, or a seed is neither a whole number of at least 0 nor None.
+            RuntimeError: the environment is closed, or an action is pending.
         """
         self._calls.require_open()
         own = self.simulation.streams.episodes
@@ -143,7 +143,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the action is not finite, or `step_async` would refuse it.
-            RuntimeError: there has been no reset yet, or `close` has been called.
+            RuntimeError: there has been no reset yet, `close` has been called, or an action is pending.
         """
         self._calls.require_begun()
         self.step_async(one_worlds_action("action", action, self.action_space.shape)[None])
@@ -154,10 +154,10 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations), step.reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[Arrays, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Take the actions of `step_async`.
+        """Take the actions of `step_async`; return the observations, rewards, ends of episodes and infos of all rows.
 
         Raises:
-            RuntimeError: no action is pending after `step_async`, or the environment is closed.
+            RuntimeError: no action is pending, `close` has been called, or a method fails at the start of an episode.
         """
         advanced = self._advance()
         step = advanced.step
@@ -181,7 +181,7 @@ class EyesVecEnv(OneEnvironment):
         The state does not contain such values.
 
         Raises:
-            RuntimeError: the worlds are not reset or are closed, or the model enables MuJoCo's sleeping bodies.
+            RuntimeError: there was no reset, `close` was called, an action is pending, or MuJoCo's "sleep" is enabled.
         """
         self._calls.require_begun()
         return self.animals.get_state()
@@ -191,7 +191,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
-            RuntimeError: the worlds are not reset or are closed, or the model enables MuJoCo's sleeping bodies.
+            RuntimeError: there was no reset, `close` was called, an action is pending, or MuJoCo's "sleep" is enabled.
         """
         held_state.checked(state, self.get_state())
         chosen = held_state.chosen_worlds(worlds, len(self._everyone))

@@ -28,10 +28,14 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     `reset` accepts one seed or, as Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, world i
     has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.
 
-    task, eyes, memory, mode ...: see `sim.make_vec_env`
+    num_envs: number of worlds
+    task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its `alone`
+    eyes, memory, mode ...: see `sim.make_vec_env`
 
     Raises:
-        ValueError: an argument is invalid.
+        ValueError: an argument is invalid, or is `seed` or `n_envs`.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        RuntimeError: a method of a user task fails at the start of the first episode.
     """
 
     metadata = {  # noqa: RUF012 (Gymnasium's own declaration)
@@ -79,7 +83,11 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         return observation, reward, done & ~truncated, done & truncated, last | self._together(infos)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`."""
+        """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`; None without a mode.
+
+        Raises:
+            RuntimeError: there has been no reset yet.
+        """
         return None if self.render_mode is None else tuple(self._batch.get_images())
 
     def close_extras(self, **kwargs: Any) -> None:

@@ -87,12 +87,12 @@ class _ModelCameras:
         """
         bodies = physics.bodies
         model = bodies.models[world]
-        looks = model.geom_size.tobytes() + model.geom_rgba.tobytes() + model.geom_matid.tobytes()
+        appearance = model.geom_size.tobytes() + model.geom_rgba.tobytes() + model.geom_matid.tobytes()
         place = world if bodies.varied else 0
         known, camera = self._cameras.get(place, (b"", None))
-        if camera is None or looks != known:
+        if camera is None or appearance != known:
             camera = QuickCamera(model, self._animals.learners[0].renderer.spectra)
-            self._cameras[place] = looks, camera
+            self._cameras[place] = appearance, camera
         return camera
 
     def _picture(self, camera: QuickCamera, data: mujoco.MjData) -> np.ndarray:
@@ -107,13 +107,13 @@ class _ModelCameras:
 
 
 def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
-    """Return an image of each world, with a row for each kind of eyes."""
+    """Return an image (y, x, 3) uint8 of each world, with a row for each kind of eyes."""
     rows = [[_drawn(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()]
     return [one_above_another(pictures) for pictures in zip(*rows, strict=True)]
 
 
 def _drawn(frame: np.ndarray, eye: WorldEye) -> np.ndarray:
-    """Return an image of a frame of signals: hexagons of a compound eye, or squares."""
+    """Return an image (y, x, 3) uint8 of one world's signals: hexagons for a compound eye, otherwise squares."""
     if isinstance(eye, CompoundEye):
         return hexagon_map(frame if eye.rows is None else eye.as_frames(frame), eye)
     return side_by_side(frame[:, : eye.channels], eye)

@@ -55,6 +55,7 @@ class ExrError(ValueError):
 def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect: float = 1.0) -> None:
     """Write views to an OpenEXR file, completely or not at all; an existing file is replaced.
 
+    views: views with different names, one or more
     pixel_aspect: width of a pixel divided by its height, with which viewers display the file
 
     Raises:
@@ -94,8 +95,8 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     """Read the views from a file that `write_exr` or another program wrote.
 
     A file of another program needs channels of the spectral layout: radiance (`S0.450,0nm` ...) or reflectance
-    (`T.450,0nm` ...). Its views have the names of their parts, or of the file. An ExrWarning names contents that are
-    not read, such as polarisation.
+    (`T.450,0nm` ...). A view has the name of its part, or of the file if the part has none. An ExrWarning names
+    contents that are not read, such as polarisation.
 
     most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can state any size
 

@@ -26,6 +26,9 @@ def preview_of_receptors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.n
     """Return an image (y, x, 3) whose red, green and blue show channels in order of decreasing wavelength.
 
     A single channel is shown as grey.
+
+    receptors: signals, (channel, y, x)
+    peaks_nm: wavelength of each channel's maximum [nm]; None: the channels are used in the given order
     """
     count = len(receptors)
     order = np.arange(count) if peaks_nm is None else np.argsort(-np.asarray(peaks_nm, float), kind="stable")

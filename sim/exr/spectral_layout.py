@@ -38,12 +38,16 @@ class ExrWarning(UserWarning):
 
 
 def channel(nm: float, quantity: str = RADIANCE) -> str:
-    """Return the name of a channel at a wavelength [nm]."""
+    """Return the name of the channel of a quantity at a wavelength [nm]."""
     return f"{quantity}.{f'{nm:.6f}'.replace('.', ',')}nm"
 
 
 def require_nanometres(name: str, values: Any) -> np.ndarray:
-    """Return wavelengths [nm]; ValueError unless all are finite and plausible. Wavelengths in metres are refused."""
+    """Return wavelengths [nm], (band,), after checking that they are not in metres.
+
+    Raises:
+        ValueError: the wavelengths are not a one-dimensional array of finite numbers of at least SHORTEST_NM.
+    """
     nm = reals(name, values)
     if nm.ndim != 1 or not np.isfinite(nm).all() or (nm < SHORTEST_NM).any():
         raise ValueError(f"{name} = {shown(values)}: must be finite numbers in nanometres (550, not 550e-9), (band,)")
@@ -81,6 +85,8 @@ def fields_of_views(parts: Sequence[Any], stem: str) -> list[dict[str, Any]]:
 
 def _fields_of_view(channels: Mapping[str, np.ndarray], header: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Return the fields of a `View` from the channels (y, x) of a part; empty without spectral channels.
+
+    Channels of other quantities, such as reradiation, are left out with an `ExrWarning`.
 
     Raises:
         ValueError: two channels of a quantity have the same wavelength, or radiance and reflectance have different

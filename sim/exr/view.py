@@ -19,17 +19,22 @@ class View:
     """Image of one eye.
 
     name: name of the eye, such as "left"
-    wavelengths_nm: wavelengths of the bands of radiance and reflectance, (band,)
-    radiance: (band, y, x) float32, or None
-    receptors: (channel, y, x) float32, or None
-    rgb: (y, x, 3) float32 linear sRGB preview of the radiance, or of the reflectance in daylight; None: computed when
-        written
+    wavelengths_nm: wavelengths of the bands of radiance and reflectance [nm], (band,)
+    radiance: spectral radiance, (band, y, x) float32, or None. A white Lambertian surface that faces daylight has the
+        radiance of CIE D65, 1 at 560 nm.
+    receptors: signals of receptors, (channel, y, x) float32, or None
+    rgb: linear sRGB preview of the radiance, or of the reflectance in daylight, (y, x, 3) float32; None: `write_exr`
+        computes it
     attributes: further values that JSON can represent, such as seed, time step or position
-    peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the channel with the longest peak
-        as red. None: channels are in descending order of their peaks.
+    peaks_nm: peak wavelength of each receptor channel [nm], (channel,); the preview shows the channel with the longest
+        peak as red. None: channels are in descending order of their peaks.
     reflectance: reflectance or transmittance, (band, y, x) float32, or None
     directions: viewing directions of the receptors, unit vectors (ahead, left, up) in the frame of the mount, (3, y, x)
         float32, or None
+
+    Raises:
+        ValueError: the name is empty or not printable; there is no radiance, reflectance or receptors; an array has the
+            wrong shape or half precision; or wavelengths are not finite, not distinct, or not in nanometres.
     """
 
     name: str

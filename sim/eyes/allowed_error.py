@@ -10,15 +10,15 @@ from sim.eyes.compound_eye import WorldEye
 # noise.
 SHARE_OF_NOISE = 0.5
 # Chosen: lower limit of the allowed error, relative to the signal of a white surface. It applies if half of the noise
-# is less.
+# is smaller.
 LEAST_TOLERANCE = 5e-3
 
 
 def allowed_error(eye: WorldEye, tolerance: float | None) -> float:
-    """Return the allowed root mean square error of a signal.
+    """Return the allowed root mean square error of a signal, in the unit of signals.
 
-    If the tolerance is None, the allowed error is half of the receptors' noise, but at least LEAST_TOLERANCE times the
-    signal of a white surface behind the eye's pupil.
+    tolerance: the allowed error. If it is None, the allowed error is half of the eye's `noise_sigma` (shot noise is
+        not included), but at least LEAST_TOLERANCE times `throughput`, the eye's signal of a white surface.
 
     Raises:
         ValueError: the tolerance is not positive and finite.
@@ -26,5 +26,5 @@ def allowed_error(eye: WorldEye, tolerance: float | None) -> float:
     if tolerance is None:
         return max(SHARE_OF_NOISE * float(eye.noise_sigma), LEAST_TOLERANCE * float(eye.throughput))
     if not 0 < tolerance < math.inf:
-        raise ValueError(f"tolerance = {tolerance!r}: must be positive")
+        raise ValueError(f"tolerance = {tolerance!r}: must be positive and finite")
     return tolerance

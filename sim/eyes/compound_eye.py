@@ -37,12 +37,12 @@ class CompoundEye:
         converted to unit vectors.
     ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. Ommatidia that are
         the same object share an acceptance function, so zones with equal ommatidia are prepared faster.
-    receptors: receptor types, see `optics.Eye`. Mosaics are not supported here; use `types`
-    types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). One column gives one
-        receptor for each ommatidium, a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7 and R8
-        have different pigments in pale and yellow ommatidia. None: every ommatidium has receptors of all types.
+    receptors: receptor types, see `optics.Eye`. Mosaics are not supported here; use `types`.
+    types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). With one column, each
+        ommatidium has a single receptor, as in a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7
+        and R8 have different pigments in pale and yellow ommatidia. None: every ommatidium has receptors of all types.
     bands: number of spectral bands, 1 to 64
-    noise_sigma: standard deviation of a receptor's Gaussian noise, in the unit of signals
+    noise_sigma: standard deviation of a receptor's Gaussian noise, in the unit of signals, 0 to 1e6
     photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised. A
         wide facet therefore has less shot noise than a narrow one with the same field. None: no shot noise
     rows: number of rows, if the directions are those of `sim.hexagonal_rows`. Observations then have the axes of an
@@ -51,8 +51,8 @@ class CompoundEye:
         None: all facets are at the mount, and may overlap
 
     Raises:
-        ValueError: an argument is invalid, the number of ommatidia is not in 1 to 1,000,000 or no multiple of `rows`,
-            two directions are equal, or facets overlap.
+        ValueError: an argument is invalid, there are no ommatidia or more than 1,000,000, their number is no multiple
+            of `rows`, two directions are equal, or facets overlap.
     """
 
     directions: Any
@@ -101,7 +101,11 @@ class CompoundEye:
     def with_mirror_image(self) -> CompoundEye:
         """Return this eye together with its mirror image on the other side of the body.
 
-        The ommatidia of this eye come first, followed by their mirror images in the same order.
+        The ommatidia of this eye come first, followed by their mirror images in the same order. The new eye has no
+        `rows`.
+
+        Raises:
+            ValueError: an ommatidium overlaps a mirror image, for example if it looks straight ahead.
         """
         both = np.concatenate([self.directions, self.directions * [1, -1, 1]])
         each = self.ommatidium if isinstance(self.ommatidium, optics.Ommatidium) else (*self.ommatidium,) * 2
@@ -109,9 +113,9 @@ class CompoundEye:
         return replace(self, directions=both, ommatidium=each, types=types, rows=None)
 
     def directions_on(self, mounts: Sequence[Mount]) -> np.ndarray:
-        """Return the viewing directions on these mounts, unit vectors (ommatidia of all mounts, 3).
+        """Return the viewing directions of eyes on these mounts, unit vectors (ommatidia of all mounts, 3).
 
-        They are relative to the forward, left and upward directions of the object that carries the mounts.
+        Their components are (ahead, left, up) of the object that carries the mounts.
         """
         ahead, left, up = self.directions.T
         in_eye = np.stack([-left, up, ahead], axis=-1)
@@ -157,7 +161,7 @@ class CompoundEye:
         return tuple(numbers), np.array(index)
 
     def acceptance(self, kind: int) -> AcceptanceFunction:
-        """Return the acceptance function of one of `kinds`, for the eye's bands."""
+        """Return the acceptance function of the ommatidium with this index in `kinds`, for the eye's bands."""
         return acceptance_function(self.kinds[0][kind], self.spectral_bands.wavelengths)
 
     @cached_property
@@ -179,9 +183,10 @@ class CompoundEye:
 
     @property
     def photons(self) -> np.ndarray | None:
-        """Absorbed photons for a signal of 1, (channel, ommatidium); None without a photon budget.
+        """Photons that a receptor absorbs in its integration time if its signal is 1, (channel, ommatidium).
 
-        The number is proportional to the étendue: the facet's area times the acceptance of white light.
+        It is None without a photon budget. The number is proportional to the étendue: the facet's area times the
+        acceptance of white light.
         """
         if self.photon_budget is None:
             return None
@@ -253,14 +258,14 @@ class CompoundEye:
         raise ValueError(f"CompoundEye: facets {one} and {other} overlap: they are {gap}")
 
 
-WorldEye: TypeAlias = optics.Eye | CompoundEye  # eyes that worlds render
+WorldEye: TypeAlias = optics.Eye | CompoundEye  # eyes that can be rendered in worlds
 
 
 def world_eye(name: str, value: Any) -> WorldEye:
-    """Return `value` if it is an eye that worlds render.
+    """Return `value` if it is an eye that worlds can render.
 
     Raises:
-        ValueError: it is not.
+        ValueError: it is neither an optics.Eye nor a CompoundEye; the message begins with `name`.
     """
     if isinstance(value, CompoundEye):
         return value

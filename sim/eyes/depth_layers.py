@@ -19,6 +19,10 @@ class DepthLayers:
 
     farthest, nearest: distances [m]; farthest may be infinite
     count: number of layers; a single layer is at the mean of the inverse distances 1/farthest and 1/nearest
+
+    Raises:
+        ValueError: `nearest` is not positive, or is larger than `farthest`; `count` is less than 1; or there are
+            several layers although `nearest` equals `farthest`.
     """
 
     farthest: float = math.inf
@@ -32,7 +36,8 @@ class DepthLayers:
             )
         if self.count < 1 or (self.count > 1 and self.nearest == self.farthest):
             raise ValueError(
-                f"depth: {self.count} layers from {self.nearest!r} to {self.farthest!r} m: must be 1 or more"
+                f"depth: {self.count} layers from {self.nearest!r} to {self.farthest!r} m: must be 1, or more if the "
+                "distances differ"
             )
 
     @property
@@ -43,7 +48,9 @@ class DepthLayers:
         return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
     def shares(self, inverse_distance: Array) -> list[Array]:
-        """Return the fraction of the light that each layer receives, as Dr.Jit arrays that sum to 1.
+        """Return the fraction of the light that each layer receives: one Dr.Jit array per layer. The sum is 1.
+
+        A single layer receives all light; its fraction is the number 1.
 
         inverse_distance: 1/z of the point from which the light comes [1/m]
         """

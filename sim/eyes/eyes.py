@@ -34,8 +34,8 @@ EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that st
 class Eyes:
     """The eyes of one agent, which differ only in azimuth.
 
-    n_eyes: number of eyes, >= 1
-    resolution: receptors of one eye (height, width), each >= 1
+    n_eyes: number of eyes, 1 to 1,000,000
+    resolution: receptors of one eye (height, width), each 1 to 1,000,000 (for compound eyes 1 to 1000)
     fov_deg: horizontal field of view of one eye [deg], in [0.001, 170]
     placement_range_deg: angle from the leftmost to the rightmost eye [deg], in [0, 360]; at 360 these two eyes look in
         the same direction
@@ -57,16 +57,16 @@ class Eyes:
         receptors. None: receptors are square.
     dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: receptors
         without memory
-    density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: all receptors are
-        alike
+    density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: all receptors have
+        the same size
     ommatidium: an optics.Ommatidium: the eyes are compound eyes. `resolution` is then the number of rows and of
-        ommatidia in a row of `sim.hexagonal_rows`, and fov_deg / width the angle between neighbours. Compound eyes
-        have neither optics, sensor_width, vertical_fov_deg, dynamics nor density. None: the eyes are camera eyes.
-    acute_zone: density of the ommatidia in the middle of a compound eye, see `sim.hexagonal_rows`
+        ommatidia in a row of `sim.hexagonal_rows`; fov_deg / width is the angle between neighbours. Compound eyes
+        have neither optics, waveguide, vertical_fov_deg, dynamics nor density, and ignore sensor_width. None: the eyes
+        are camera eyes.
+    acute_zone: density of ommatidia in the middle of a compound eye, relative to the mean, see `sim.hexagonal_rows`
 
     Raises:
-        ValueError: a value is outside its range, a compound eye has a property of camera eyes, or the receptors are
-            unknown; the message suggests the nearest name.
+        ValueError: a value is invalid or does not fit the others, such as a waveguide that is wider than a receptor.
     """
 
     n_eyes: int = 2
@@ -177,7 +177,10 @@ class Eyes:
         )
 
     def with_perfect_lens(self) -> Eyes:
-        """Return camera eyes behind a perfect lens, with the same receptors and fields of view."""
+        """Return camera eyes behind a perfect lens, with the same receptors and fields of view.
+
+        A vertical field of view above 170 degrees raises a ValueError.
+        """
         vertical = self.vertical_fov_deg if self.ommatidium is None else self.fovy_deg
         camera = replace(self, ommatidium=None, acute_zone=1.0, vertical_fov_deg=vertical)
         return replace(camera, optics=None, waveguide=None, pupil_turned=False)
@@ -219,8 +222,7 @@ class Eyes:
     def column_azimuths(self) -> np.ndarray:
         """Return the azimuth of each column of receptors relative to the eye's axis [rad], (width,), left is positive.
 
-        In a compound eye, rows are shifted to either side of these azimuths by a quarter of the angle between
-        neighbours.
+        A `density` is ignored. In a compound eye, rows are shifted to either side by a quarter of the columns' spacing.
         """
         columns = self.resolution[1]
         if self.ommatidium is not None:
@@ -252,8 +254,7 @@ class Eyes:
     def field_aspect(self) -> float:
         """Width of an eye's field of view divided by its height, on a plane in front of the eye.
 
-        For compound eyes it is the ratio of the lattice's width to its height, in units of the angle between
-        neighbours.
+        For compound eyes it is the angular width of the lattice divided by its angular height.
         """
         if self.ommatidium is not None:
             return self.resolution[1] / (self.resolution[0] * ROW_DISTANCE)
@@ -277,14 +278,14 @@ def _is_pupil(value: Any) -> bool:
 
 
 def eye_positions(azimuths: np.ndarray) -> np.ndarray:
-    """Return the pupil centres in the agent's frame [m], (n, 3), on the equator of its body."""
+    """Return the pupil centres (n, 3) at azimuths [rad], (n,), in the agent's frame [m], on the body's equator."""
     return BODY_RADIUS * np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths)], axis=-1)
 
 
 def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
-    """Return the eyes' frames in the agent's frame, (n, 3, 3), with columns (x right, y up, z optical axis, outwards).
+    """Return the frames (n, 3, 3) of eyes at azimuths [rad], (n,), in the agent's frame.
 
-    These are image coordinates: x × y = -z, so the determinant is -1 (docs/architecture.md, "Coordinates").
+    Columns: x to the right, y up, z outwards along the optical axis (docs/architecture.md, "Coordinates").
     """
     cos, sin, zero, one = np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths), np.ones_like(azimuths)
     right = np.stack([sin, -cos, zero], axis=-1)
@@ -294,5 +295,5 @@ def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
 
 
 def camera_rotations(azimuths: np.ndarray) -> np.ndarray:
-    """Return MuJoCo's camera frames of eyes at these azimuths, (n, 3, 3): x right, y up, view along -z."""
+    """Return `eye_rotations` as MuJoCo defines the frames of cameras: x to the right, y up, view along -z."""
     return eye_rotations(azimuths) * np.array([1.0, 1.0, -1.0])

@@ -26,8 +26,8 @@ BEYOND = 0.015
 class FieldAreas:
     """A lattice of rectangles of the visual field, numbered row by row.
 
-    edges: y of the edges between rows (down), and x of the edges between columns, relative to the eye's axis [receptor
-        pitches]
+    edges: y of the edges of the rows (downwards) [receptor heights], (rows + 1,), and x of the edges of the columns
+        [receptor widths], (columns + 1,), both relative to the eye's axis
     """
 
     edges: tuple[np.ndarray, np.ndarray]
@@ -39,7 +39,7 @@ class FieldAreas:
         At most the fraction `beyond` of the receptors' light comes from outside the rim on each side. With half a row
         per receptor, each row covers two receptors, and the outermost rows may extend beyond the outermost receptors.
 
-        parts: numbers of rows and of columns per receptor
+        parts: numbers of rows and of columns per receptor, which may be smaller than 1
         """
         found = []
         for axis, (n, per_receptor) in enumerate(zip(fields.resolution, parts, strict=True)):
@@ -69,7 +69,7 @@ class FieldAreas:
         The shape is (plane, receptor, rectangle), with a plane for each band of each depth layer. A receptor's weights
         sum to `fields.power`.
 
-        receptors: numbers of the receptors, counted row by row, (receptor,)
+        receptors: indices of the receptors, counted row by row, (receptor,)
         """
         rows, columns = np.divmod(receptors, fields.resolution[1])
         lines = zip(self.edges, fields.resolution, fields.field.shape[1:], (rows, columns), strict=True)
@@ -95,8 +95,9 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
     It is the smallest number for which at most the fraction `beyond` of the light of the line's receptors comes from
     beyond the rim.
 
-    profile: power of a receptor's field in each of its cells along the line
+    profile: power of a receptor's field in each of its cells along the line, (cell,)
     line: number of receptors in the line, and rectangles per receptor
+    cells: number of cells along a receptor's side
     """
     n, per_receptor = line
     # before[k] is the fraction of a field's power in its first k cells.
@@ -112,7 +113,10 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
 def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarray:
     """Return the fraction of each cell of a field that lies between successive edges, (rectangle, cell).
 
+    edges: positions of the edges along a row or a column, in sides of a receptor, in increasing order
     centre: centre of the field, in the same coordinate as the edges
+    size: number of cells along the field
+    cells: number of cells along a receptor's side
     """
     places = (edges - centre) * cells + size / 2
     return np.diff(np.clip(places[:, None] - np.arange(size), 0, 1), axis=0)

@@ -16,14 +16,15 @@ ROW_DISTANCE = math.sqrt(3) / 2  # distance between rows, in units of the distan
 def hexagonal_rows(rows: int, columns: int, fov_deg: float, acute_zone: float = 1.0) -> np.ndarray:
     """Return viewing directions of a hexagonal lattice with rows of equal length, unit vectors (rows * columns, 3).
 
-    The first row is at the top, and each row runs from left to right. The middle of the lattice is ahead. Neighbours in
-    a row are fov_deg / columns apart in azimuth, and every other row is shifted by half of this angle. Elevations
-    follow Mercator's projection, which is conformal: the neighbours of an ommatidium form a regular hexagon everywhere,
-    whose size decreases with the cosine of the elevation.
+    The vectors are (ahead, left, up). The first row is at the top, and each row runs from left to right. The middle of
+    the lattice is ahead. Without an acute zone, neighbours in a row are fov_deg / columns apart in azimuth, and every
+    other row is shifted by half of this angle. Elevations follow Mercator's projection, which is conformal: the
+    neighbours of an ommatidium form a regular hexagon everywhere, whose size decreases with the cosine of the
+    elevation.
 
     rows, columns: numbers of ommatidia, 1 to 1000
-    fov_deg: horizontal field of view [degrees], at most 360
-    acute_zone: density of columns in the middle relative to their mean density, 1 to 5. An azimuth α of the equally
+    fov_deg: horizontal field of view [degrees], above 0 and at most 360
+    acute_zone: density a of columns in the middle relative to their mean density, 1 to 5. An azimuth α of the equally
         spaced lattice, in units of half the field of view, becomes α/a + (1 - 1/a) α³.
 
     Raises:

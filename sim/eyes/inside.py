@@ -7,7 +7,7 @@ import numpy as np
 
 _TYPES = mujoco.mjtGeom
 # Unit vectors in all directions, spaced by the golden angle so that few of them hit edges of meshes. At least one of
-# them passes through any opening in a mesh with an angular diameter of 20 degrees or more.
+# them passes through any round opening in a mesh with an angular diameter of 40 degrees or more.
 _N_WAYS = 64
 _HEIGHTS, _AROUND = 1 - (2 * np.arange(_N_WAYS) + 1) / _N_WAYS, np.arange(_N_WAYS) * np.pi * (3 - np.sqrt(5))
 _WAYS = np.column_stack([np.sqrt(1 - _HEIGHTS**2) * f(_AROUND) for f in (np.cos, np.sin)] + [_HEIGHTS])
@@ -18,8 +18,10 @@ _BEYOND = 1e-9
 def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
     """Return the depth of a point below the surface of a primitive or a closed mesh [m].
 
-    The depth is 0 for points outside the geom, and for geoms of all other types. For ellipsoids and meshes the depth
-    is approximate.
+    The depth is 0 for points outside the geom, and for geoms of all other types. For ellipsoids and meshes the depth is
+    approximate.
+
+    point: position in world coordinates [m], (3,)
     """
     p = data.geom_xmat[geom].reshape(3, 3).T @ (point - data.geom_xpos[geom])
     size, kind = model.geom_size[geom], model.geom_type[geom]
@@ -44,6 +46,8 @@ def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
     """Return the distance to the nearest crossing [m] if the point is inside the mesh; otherwise 0.
 
     From a point inside a closed mesh, rays in all directions cross the mesh an odd number of times.
+
+    point: position in the world [m], (3,)
     """
     if np.linalg.norm(point - data.geom_xpos[geom]) > model.geom_rbound[geom]:
         return 0.0
@@ -59,7 +63,10 @@ def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
 def _crossings(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray, way: np.ndarray
 ) -> list[float]:
-    """Return the distances at which a ray from `point` in the direction `way` crosses a mesh [m], nearest first."""
+    """Return the distances [m] at which a ray crosses a mesh, nearest first.
+
+    point, way: start of the ray [m], and its direction, a unit vector, in the world's frame, (3,)
+    """
     found: list[float] = []
     so_far, beyond = 0.0, _BEYOND * model.geom_rbound[geom]
     while (further := mujoco.mj_rayMesh(model, data, geom, point + so_far * way, way)) >= 0:

@@ -32,14 +32,14 @@ class Mount:
     on: name of a site, a camera or a body of the model
     azimuth_deg: rotation to the left, about the z axis of the object's frame (for a camera: about its upward axis)
     elevation_deg: rotation upwards, applied after the azimuth
-    roll_deg: rotation about the eye's optical axis, which turns its top towards its left; applied last
+    roll_deg: rotation about the optical axis, which turns the eye's top to the left; applied last
     offset: offset of the pupil from the origin of the object's frame [m], (ahead, left, up). The angles do not rotate
         the offset.
-    kind: "site", "camera" or "body", for use if objects of several kinds have the same name; None: the first of these
-        kinds with an object of this name
+    kind: "site", "camera" or "body", to distinguish objects of different kinds with the same name; None: the first of
+        these kinds with an object of this name
 
     Raises:
-        ValueError: `on` is not a name, an angle or offset is not finite, or the kind is unknown.
+        ValueError: `on` is not a nonempty string, an angle or offset is not finite, or the kind is unknown.
     """
 
     on: str
@@ -85,6 +85,8 @@ class Mount:
 
         Both are given in the frame of the object that carries the eye. The columns of the eye's frame are (right, up,
         ahead).
+
+        kind: kind of the object, "site", "camera" or "body"
         """
         ahead, left, up = _AXES[kind]
         azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
@@ -112,20 +114,27 @@ def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
 
 
 def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
-    """Return each mount followed by its mirror image on the other side of the body."""
+    """Return each mount followed by its mirror image on the other side of the body.
+
+    Raises:
+        ValueError: `mounts` does not contain only mounts.
+    """
     return tuple(one for mount in items("mounts", mounts, Mount, EXAMPLE) for one in (mount, mount.mirrored()))
 
 
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
-    """Return mounts in a circle around a body's z axis, from left to right; they look outwards.
+    """Return mounts in a circle around the z axis of an object, from left to right. The eyes look outwards.
 
     `Eyes` uses the same arrangement on the built-in agent.
 
-    The placement range is the angle from the first to the last eye. With a range of 360 (n - 1) / n degrees, n eyes are
-    evenly spaced around the whole circle.
+    on: name of a body, site or camera
+    n_eyes: number of eyes, 1 to 10,000
+    placement_range_deg: angle from the first to the last eye [degrees]. With 360 (n - 1) / n degrees, n eyes are evenly
+        spaced around the whole circle.
+    radius: radius of the circle [m]
 
     Raises:
-        ValueError: `n_eyes` is less than 1, or another argument is invalid.
+        ValueError: an argument is invalid.
     """
     return fan(Mount(on, offset=(finite("radius", radius), 0.0, 0.0)), n_eyes, placement_range_deg)
 
@@ -133,11 +142,15 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:
     """Return mounts from left to right, evenly spaced over a range of azimuths.
 
-    Each eye is a copy of `mount`, including its offset, rotated about the upward axis of the object that carries it,
-    and then rotated upwards by `elevation_deg`. A single eye keeps the azimuth of `mount`.
+    The azimuth of `mount` is the middle of the range. Offsets are rotated with the azimuth, about the upward axis of
+    the object that carries the eyes. A single eye keeps the azimuth of `mount`.
+
+    n_eyes: number of eyes, 1 to 10,000
+    placement_range_deg: angle from the first to the last eye [degrees]
+    elevation_deg: angle that is added to the elevation of `mount` [degrees]
 
     Raises:
-        ValueError: `n_eyes` is less than 1, or another argument is invalid.
+        ValueError: an argument is invalid.
     """
     of_kind("mount", mount, Mount, EXAMPLE)
     n_eyes = whole("n_eyes", n_eyes, 1, MOST_EYES)

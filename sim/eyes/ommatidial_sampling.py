@@ -18,7 +18,7 @@ from sim.eyes.viewing_directions import facet_frames
 
 PATTERNS = 16  # choice: arrangements of rays that equal ommatidia share
 STEPS = 20  # choice: steps of Lloyd's algorithm
-COARSE, CELLS = 7, 30  # choice: iterations use every seventh direction if these are at least 30 per ray
+COARSE, CELLS = 7, 30  # choice: iterations use every seventh direction if at least 30 of these remain for each ray
 CORRECTED = 8  # choice: smallest number of rays with corrected weights; fewer would need negative weights
 
 
@@ -30,6 +30,8 @@ class OmmatidialSampling:
     weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. Equal
     ommatidia share PATTERNS arrangements of rays, one of which is drawn for each ommatidium, so that the errors of
     neighbours are nearly independent.
+
+    depth: a single layer, because facets have a large depth of field
     """
 
     eye: CompoundEye
@@ -59,7 +61,7 @@ class OmmatidialSampling:
         )
 
     def _origins(self, frames: np.ndarray, rays: int) -> np.ndarray | None:
-        """Return the starting points of the rays in the eye's frame [m], (ray, 3); None if they all start at 0."""
+        """Return the starting points of the rays in the eye's frame [m], (ray, 3); None if all start at the origin."""
         if self.eye.radius is None:
             return None
         found: np.ndarray = np.repeat(frames[:, :, 2] * np.float32(self.eye.radius), rays, axis=0)
@@ -105,7 +107,7 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
 
 
 def _tests(places: np.ndarray, spread: float) -> np.ndarray:
-    """Return the values of two scenes at these places: uniform light, and a Gaussian of this variance on the axis."""
+    """Return the light of two scenes at places (place, 2): uniform, and a Gaussian of variance `spread` on the axis."""
     return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
 
 
@@ -115,7 +117,8 @@ def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray,
     All bands share the same rays. Without the correction, the rays would represent a wide acceptance function as too
     narrow.
 
-    at_rays, everywhere: test scenes at the rays and at the places of the table, (place, scene)
+    weights: weights before the correction, (ray, band)
+    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of the table, (place, scene)
     powers: acceptance function of each band at the places of the table, (band, place)
     """
     found = weights.copy()

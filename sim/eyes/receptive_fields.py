@@ -63,7 +63,7 @@ class ReceptiveFields:
 
     @classmethod
     def from_eye(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
-        """Tabulate the receptive fields of an eye.
+        """Tabulate the receptive fields of an eye, with this number of cells along a receptor's side.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -79,9 +79,9 @@ class ReceptiveFields:
 
     @property
     def power(self) -> np.ndarray:
-        """Fraction of the power from the pupil that falls inside a field, (plane,).
+        """Fraction of the pupil's power that falls inside a field, (plane,).
 
-        If receptors are waveguides, this is multiplied by the fraction of the power that a waveguide accepts.
+        If receptors are waveguides, it is multiplied by the fraction of the power that a waveguide accepts.
         """
         power: np.ndarray = self.field.sum(axis=(1, 2))
         return power
@@ -155,8 +155,9 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
 def kernels_of(eye: optics.Eye, cells: int, depth: DepthLayers) -> np.ndarray:
     """Return the kernel of each depth layer, rotated by 180°, (plane, y, x).
 
-    The signal of the receptor at r is the convolution Σ_v K(r - v) L(v). The weights of the light L as a function of v
-    are therefore the kernel K, rotated by 180° and centred on the receptor.
+    A plane is a band of a depth layer, and a receptor's side consists of `cells` cells. The signal of the receptor at r
+    is the convolution Σ_v K(r - v) L(v). The weights of the light L as a function of v are therefore the kernel K,
+    rotated by 180° and centred on the receptor.
     """
     return _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
 
@@ -179,7 +180,7 @@ def receptive_fields_of(
 ) -> ReceptiveFields:
     """Return the receptive fields of an eye, tabulated on the finest cells on which its PSF can be computed.
 
-    kind: class of the table; `sim.eyes.varied_fields` for receptors with a `density`
+    kind: class of the table; `sim.eyes.varied_fields.VariedFields` for receptors with a `density`
 
     Raises:
         optics.AccuracyError: the pupil spreads light too far even for the coarsest cells.
@@ -231,7 +232,10 @@ def _as_wide(kernels: list[np.ndarray]) -> np.ndarray:
 
 
 def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
-    """Return the kernel convolved with a receptor's square, which is `cells` cells wide, (plane, y, x)."""
+    """Return the kernel (plane, y, x) convolved with a receptor's square, which is `cells` cells wide.
+
+    The result has `cells` - 1 more rows and columns than the kernel.
+    """
     fields = kernel.astype(np.float64)
     for axis in (1, 2):
         ends = [(0, 0)] * 3
@@ -244,7 +248,13 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 
 
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
-    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields."""
+    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
+
+    field: field of every receptor, (plane, y, x) [cells]
+    resolution: rows and columns of receptors
+    cells: number of cells along a receptor's side
+    receptors: indices of the receptors, counted row by row
+    """
     one = (field / field.sum(axis=(1, 2), keepdims=True)).mean(axis=0)
     total = np.zeros([size + cells * (n - 1) for size, n in zip(one.shape, resolution, strict=True)])
     for i, j in zip(*np.divmod(receptors, resolution[1]), strict=True):

@@ -129,6 +129,10 @@ def of_components(
     """Return the function that maps light along rays to signals by one matrix product per component and channel.
 
     The factors of bands and channels are multiplied into the weights in advance.
+
+    weights: sparse matrices (receptor, ray), one for each band
+    resolution: rows and columns of receptors
+    mixing, basis: see `ReceptorSums`
     """
     products = [
         RowProduct.from_weights([_mixed(weights, channel * component) for channel in mixing], resolution)
@@ -148,6 +152,9 @@ def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarr
     """Return the function that maps light along rays to signals by one matrix product per band.
 
     This is cheaper than `of_components` if there are fewer bands than pairs of a component and a channel.
+
+    products: sums over rays, one for each band
+    mixing, basis: see `ReceptorSums`
     """
     mixing, basis = mixing.astype(np.float32), basis.astype(np.float32)
     every = np.array_equal(basis, np.eye(len(basis)))

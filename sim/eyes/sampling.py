@@ -131,7 +131,7 @@ class BoxSampling:
         return directions_of(self.eye, from_receptors(self.eye, points.reshape(-1, 2)))
 
     def _corners(self) -> np.ndarray:
-        """Return the upper left corner of every receptor's square, (receptor, 1, 2)."""
+        """Return the upper left corner of every receptor's square, from the middle, in sides, (receptor, 1, 2)."""
         height, width = self.eye.resolution
         row, column = (index.ravel() for index in np.indices((height, width)))
         return np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
@@ -144,7 +144,7 @@ class FieldSampling:
     If the requested number leaves a receptor without a ray, more rays are drawn until every receptor has one.
 
     tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. White light from beyond each side of the lattice
-        of areas contributes at most this amount to a signal.
+        of areas contributes at most this amount to a signal, on average over the receptors.
     """
 
     eye: optics.Eye
@@ -229,8 +229,8 @@ class FieldSampling:
 def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[float, float]:
     """Return the numbers of rows and columns of areas per receptor.
 
-    One or more areas per receptor are rounded to a whole number. If `per_receptor` is below 1, several receptors share
-    an area, so there is less than one column per receptor, and with `in_rows` also less than one row.
+    A `per_receptor` of 1 or more is rounded to a whole number. If it is below 1, several receptors share an area, so
+    there is less than one column per receptor, and with `in_rows` also less than one row. aspect: see `parts_of`
     """
     if per_receptor >= 1:
         return parts_of(round(per_receptor), in_rows, aspect)
@@ -287,6 +287,7 @@ def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers =
 def negligible_share(eye: optics.Eye) -> float:
     """Return the fraction of a receptor's weights that can be omitted.
 
-    Omitting a fraction s changes a signal by at most s times the throughput of the aperture.
+    Omitting a fraction s changes a signal by at most s times the throughput of the aperture, in scenes nowhere brighter
+    than white in full daylight.
     """
     return min(NEGLIGIBLE * eye.noise_sigma / eye.aperture_throughput, eye.tolerance)

@@ -154,6 +154,7 @@ class OmmatidialSensor(ReadOnlyArrays):
     facets: weights and starting points of the rays
     white: sum in each band for white light, (ommatidium, band)
     depth: a single layer, because facets have a large depth of field
+    extent: always None, because the samples are rays
     """
 
     directions: np.ndarray

@@ -12,8 +12,8 @@ import optics
 def from_receptors(eye: optics.Eye, counted: np.ndarray) -> np.ndarray:
     """Return points of the tangent plane (x right, y down) [average receptor widths and heights], (n, 2).
 
-    counted: the same points in coordinates in which every receptor has the size 1. They differ if the eye's receptors
-        have a `density`.
+    counted: the same points in coordinates in which every receptor has the size 1. The two differ only if the eye's
+        receptors have a `density`.
     """
     return counted if eye.lattice is None else eye.lattice.places(counted)
 
@@ -22,6 +22,8 @@ def to_receptors(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
     """Convert points of the tangent plane to coordinates in which every receptor has the size 1, (..., 2).
 
     This is the inverse of `from_receptors`.
+
+    plane: points (x right, y down) [average receptor widths and heights], (..., 2)
     """
     return plane if eye.lattice is None else eye.lattice.counted(plane)
 
@@ -53,8 +55,8 @@ def tangent_size(eye: optics.Eye) -> tuple[float, float]:
 def parts_of(count: int, in_rows: bool, aspect: float = 1.0) -> tuple[int, int]:
     """Return the rows and columns of a receptor that is divided into this number of parts.
 
-    With `in_rows`, the parts are as nearly square as possible. If two numbers of rows are equally good, the smaller one
-    is used.
+    With `in_rows`, the parts are as nearly square as possible; if two numbers of rows are equally good, the result is
+    the smaller one. Without `in_rows`, there is a single row.
 
     aspect: height of a receptor divided by its width
     """

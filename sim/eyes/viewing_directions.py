@@ -24,8 +24,8 @@ def unit_directions(name: str, given: Any) -> np.ndarray:
     given: unit vectors (ahead, left, up), (n, 3), or angles [degrees] (azimuth to the left, elevation upwards), (n, 2)
 
     Raises:
-        ValueError: the shape is wrong, the number of directions is not in 1 to MOST_OMMATIDIA, or a value is not
-            finite. Elevations must be within ±90 degrees, and the length of a vector must be 1 to within OFF_UNIT.
+        ValueError: the shape is wrong, there are no directions or more than MOST_OMMATIDIA, or a value is not finite.
+            Elevations must be within ±90 degrees, and the length of a vector must be 1 to within OFF_UNIT.
     """
     if is_sized(given) and len(given) > MOST_OMMATIDIA:
         raise ValueError(f"{name}: {len(given)} ommatidia: must be at most {MOST_OMMATIDIA}")
@@ -63,6 +63,8 @@ def facet_frames(directions: np.ndarray) -> np.ndarray:
     """Return the frames of facets in the eye's frame (right, up, ahead), (n, 3, 3), with columns (right, up, axis).
 
     A facet is turned like a `sim.Mount` with the same azimuth and elevation: its x axis is horizontal.
+
+    directions: axes of the facets, unit vectors (ahead, left, up), (n, 3)
     """
     ahead, left, up = directions.T
     level = np.hypot(ahead, left)
@@ -76,10 +78,10 @@ def facet_frames(directions: np.ndarray) -> np.ndarray:
 def hexagonal_patch(
     rings: int, interommatidial_deg: float, azimuth_deg: float = 0.0, elevation_deg: float = 0.0
 ) -> np.ndarray:
-    """Return viewing directions in hexagonal rings around a direction, unit vectors (n, 3).
+    """Return viewing directions in hexagonal rings around a direction, unit vectors (n, 3) of (ahead, left, up).
 
-    15 rings have 721 ommatidia, like an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere by Lambert's
-    equal-area projection, so every ommatidium has the same solid angle.
+    15 rings have 721 ommatidia, about as many as an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere
+    by Lambert's equal-area projection, so every ommatidium has the same solid angle.
 
     rings: number of rings around the central ommatidium, 0 to 60
     interommatidial_deg: angle between neighbours at the centre [degrees]
@@ -106,9 +108,9 @@ def hexagonal_patch(
 def whole_head(interommatidial_deg: float) -> np.ndarray:
     """Return viewing directions all around a head, unit vectors (n, 3).
 
-    They are the 10 f² + 2 nodes of an icosahedron whose edges are divided into f parts. All but twelve of them have six
-    neighbours. The number f is the smallest for which the mean angle between neighbours is at most the given one; 5.8
-    degrees give 1442 ommatidia.
+    The vectors are (ahead, left, up), in no particular order. They are the 10 f² + 2 nodes of an icosahedron whose
+    edges are divided into f parts. All but twelve of them have six neighbours. The number f is the smallest for which
+    the mean angle between neighbours is at most `interommatidial_deg`; 5.8 degrees give 1442 ommatidia.
 
     interommatidial_deg: largest mean angle between neighbours [degrees]
 

@@ -32,7 +32,7 @@ class Motion:
     """Motion of the agents during one action.
 
     path: positions at the end of each substep [m], (n, substep, 2)
-    velocity: velocity at the last substep [m/s], (n, 2)
+    velocity: velocity after the last substep [m/s], (n, 2)
     contact: True if the agent touched something in any substep, (n,) bool
     unstable: True if the simulation broke down, (n,) bool; the agent then stays in place with velocity 0
     """
@@ -43,7 +43,7 @@ class Motion:
     unstable: np.ndarray
 
     def put(self, worlds: np.ndarray, motion: Motion) -> None:
-        """Overwrite the motion of these worlds. Use this only while a result is being assembled."""
+        """Overwrite the motion of the worlds with these indices. Use this only while a result is being assembled."""
         for name, array in vars(self).items():
             array[worlds] = getattr(motion, name)
 
@@ -57,12 +57,14 @@ class Agents:
     velocity: np.ndarray
 
     def take(self, some: np.ndarray) -> Agents:
+        """Return the agents with these indices only."""
         return Agents(self.position[some], self.heading[some], self.velocity[some])
 
 
 class AgentPhysics:
     """Batched physics of the agents in one world's model.
 
+    world: the world, whose model all agents share
     threads: threads of MuJoCo's batched step, see `sim.physics.mujoco_batch`
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
         obstacles are simulated in models of these obstacles alone (`local_contacts`). The attribute `free_motion` or
@@ -90,34 +92,37 @@ class AgentPhysics:
         self.local_contacts = local_contacts_of(world, model, self.free_motion, threads)
 
     def step(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """Move all agents by one action: SUBSTEPS substeps with a constant commanded velocity [m/s], (n, 2)."""
+        """Move all agents by one action: SUBSTEPS substeps.
+
+        velocity: commanded velocity, which is constant during the action [m/s], (n, 2)
+        """
         if self.free_motion is None:
             return self._simulate(agents, velocity)
         path, speed = self.free_motion(agents.velocity, velocity)
-        met, n = self.free_motion.obstacles_in_reach(agents.position, path), len(velocity)
-        simulated = np.asarray(met.any(axis=1))
+        in_reach, n = self.free_motion.obstacles_in_reach(agents.position, path), len(velocity)
+        simulated = np.asarray(in_reach.any(axis=1))
         # Comparisons are also false for NaN, so that MuJoCo simulates these agents.
         if not (np.abs(velocity).max() <= self.free_motion.strongest and _slow(agents.velocity).all()):
             simulated |= ~(self.free_motion.obeys(velocity) & _slow(agents.velocity).all(axis=-1))
         (near,) = simulated.nonzero()
         if len(near) == n:
-            return self._near(agents, velocity, met)
+            return self._near(agents, velocity, in_reach)
         motion = Motion(agents.position[:, None] + path, speed, np.zeros(n, bool), np.zeros(n, bool))
         if len(near):
-            motion.put(near, self._near(agents.take(near), velocity[near], met[near]))
+            motion.put(near, self._near(agents.take(near), velocity[near], in_reach[near]))
         return motion
 
-    def _near(self, agents: Agents | WorldState, velocity: np.ndarray, met: np.ndarray) -> Motion:
+    def _near(self, agents: Agents | WorldState, velocity: np.ndarray, in_reach: np.ndarray) -> Motion:
         """Simulate agents that may touch something, each in a model of the geoms within its reach.
 
         An agent is simulated in the whole world instead if too many geoms are within reach, if a contact deflects it
         towards other geoms, or if the simulation breaks down.
 
-        met: obstacles within reach of each agent, (n, obstacle) bool
+        in_reach: obstacles within reach of each agent, (n, obstacle) bool
         """
         if self.local_contacts is None:
             return self._simulate(agents, velocity)
-        few = self.local_contacts.few(met)
+        few = self.local_contacts.few(in_reach)
         motion = self._motion(agents.position, *self.local_contacts.step(few, *self._start_of(agents, velocity)))
         strayed = self.local_contacts.strayed(agents.position, motion.path - agents.position[:, None], few)
         (again,) = (strayed | motion.unstable).nonzero()
@@ -154,7 +159,10 @@ class AgentPhysics:
     def _untouched(
         self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's path and velocity with contacts disabled, for these speeds and commands (n, 2).
+        """Return MuJoCo's paths [m] and velocities [m/s] with contacts disabled, (n, substep, 2) each.
+
+        speed, command: initial and commanded velocities [m/s], (n, 2)
+        displacement: displacements of the starting points from the agent's initial position [m], (n, 2)
 
         See `sim.physics.free_motion.FreeSteps`.
         """
@@ -216,7 +224,7 @@ class _Columns:
 
 
 def _slow(velocity: np.ndarray) -> np.ndarray:
-    """Return a mask of the components of velocities [m/s] that are possible; False for NaN."""
+    """Return a mask of the components of velocities [m/s] below UNSTABLE_SPEED; False for NaN."""
     slow: np.ndarray = np.abs(velocity) < UNSTABLE_SPEED
     return slow
 

@@ -23,7 +23,11 @@ _MOCAP = {"mocap_pos": ("MOCAP_POS", 3), "mocap_quat": ("MOCAP_QUAT", 4)}
 class ArrayWorlds(MujocoWorlds):
     """`n` worlds of one model, as arrays whose first axis is the world.
 
-    qpos, qvel, act, ctrl, mocap_pos, mocap_quat, userdata, time: arrays that tasks may write in `reset` and `act`
+    The arguments are those of `sim.physics.mujoco_worlds.MujocoWorlds`, and `sim.Physics` describes the methods.
+
+    qpos, qvel, act, ctrl, userdata: arrays that tasks may write in `reset` and `act`, (n, value)
+    mocap_pos, mocap_quat: further such arrays, (n, mocap body, 3) and (n, mocap body, 4)
+    time: further such array [s], (n, 1)
 
     All other arrays of mjData (`xpos`, `geom_xpos`, `site_xpos`, `sensordata`, `cvel` ...) are read-only. They are
     stacked when they are first read after a step.

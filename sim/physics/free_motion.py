@@ -34,7 +34,7 @@ class FreeMotion:
     obstacles: ids of the geoms that could be touched (n,)
     lower, upper: axis-aligned bounding boxes of the obstacles in the horizontal plane (n, 2) [m]
     reach: distance of the agent's centre from a box beyond which the agent cannot touch the obstacle [m]
-    strongest: largest command that does not saturate the servo
+    strongest: largest command that does not saturate the servo [m/s]
     """
 
     response: np.ndarray
@@ -48,6 +48,8 @@ class FreeMotion:
         """Return the path of each agent, and the velocity at its end (n, 2) [m/s].
 
         The path (n, substep, 2) [m] is relative to the agents' positions.
+
+        velocity, command: velocities before the action, and commanded velocities [m/s], (n, 2)
         """
         # The terms are summed explicitly, since the rounding of a matrix product depends on the number of worlds.
         paths, speeds = self.response
@@ -59,7 +61,7 @@ class FreeMotion:
 
     @cached_property
     def _within(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Limits of an agent's centre within reach of each box [m]: lower x, lower y, upper x, upper y."""
+        """Limits of an agent's centre within reach of each box [m]: lower x, lower y, upper x, upper y, (box,) each."""
         return (*(self.lower - self.reach).T.copy(), *(self.upper + self.reach).T.copy())
 
     def obstacles_in_reach(self, position: np.ndarray, path: np.ndarray) -> np.ndarray:
@@ -73,11 +75,11 @@ class FreeMotion:
         high = position + np.maximum.reduce(steps, axis=0, initial=0.0)
         x_from, y_from, x_to, y_to = self._within
         # The axes are compared one at a time, so that NumPy's inner loop is over the boxes.
-        met: np.ndarray = low[:, :1] < x_to
-        met &= high[:, :1] > x_from
-        met &= low[:, 1:] < y_to
-        met &= high[:, 1:] > y_from
-        return met
+        in_reach: np.ndarray = low[:, :1] < x_to
+        in_reach &= high[:, :1] > x_from
+        in_reach &= low[:, 1:] < y_to
+        in_reach &= high[:, 1:] > y_from
+        return in_reach
 
     def obeys(self, command: np.ndarray) -> np.ndarray:
         """Return a mask of the commands (n, 2) that do not saturate the servos, (n,) bool."""
@@ -91,7 +93,7 @@ def free_motion_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest:
     The result is None if the motion is not linear, or if an obstacle moves or is infinite.
 
     run: simulation of the model with contacts disabled
-    strongest: largest command
+    strongest: largest command [m/s]
     """
     obstacles = _obstacles(model, agent)
     if obstacles is None:

@@ -46,14 +46,14 @@ class LocalContacts:
         self._models: dict[bytes, mujoco.MjModel] = {}
         self._step = BatchedStep(self._alone, threads)
 
-    def few(self, met: np.ndarray) -> np.ndarray:
+    def few(self, in_reach: np.ndarray) -> np.ndarray:
         """Return the obstacles of each agent's small model, (n, obstacle) bool.
 
         They are all obstacles within reach, or none if a small model has too few boxes for all of them.
 
-        met: obstacles within reach of each agent, (n, obstacle) bool
+        in_reach: obstacles within reach of each agent, (n, obstacle) bool
         """
-        few: np.ndarray = met & (met.sum(axis=1, keepdims=True) <= len(self._slots))
+        few: np.ndarray = in_reach & (in_reach.sum(axis=1, keepdims=True) <= len(self._slots))
         return few
 
     def step(self, few: np.ndarray, initial: np.ndarray, control: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

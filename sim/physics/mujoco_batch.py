@@ -19,7 +19,7 @@ POOLED = 128
 
 
 class BatchedStep:
-    """Open-loop steps of many worlds whose models differ only in numbers.
+    """Open-loop steps of many worlds whose models differ only in values, not in the sizes of arrays.
 
     like: a model with the same sizes of arrays as all models that will be stepped
     threads: number of threads for batches of at least POOLED worlds; smaller batches are stepped on the calling thread

@@ -23,12 +23,18 @@ _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL,
 
 
 class MujocoWorlds:
-    """`n` worlds of one model; see `sim.physics.physics.Physics`.
+    """`n` worlds of one model; `sim.Physics` describes the methods.
 
     given: the source from which the model was compiled
+    model: the compiled model
+    threads: number of threads on which worlds are stepped
     substeps: physics steps per action
-    datas: mjData of every world
-    bodies: models of the worlds: one that all worlds share, or one for each world
+    variation: ranges of quantities that differ between episodes; None: there are none
+    datas: attribute, mjData of every world
+    bodies: attribute, models of the worlds: one that all worlds share, or one for each world
+
+    Raises:
+        ValueError: `variation` names an object that the model lacks or that cannot vary.
     """
 
     def __init__(

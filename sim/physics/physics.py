@@ -41,7 +41,10 @@ class Physics(Protocol):
         """Current state of all worlds, in the type that this kind of physics uses."""
 
     def start_episode(self, world: int, drawn: Mapping[str, Drawn]) -> None:
-        """Reset one world before its task starts an episode; drawn: values of the varied quantities."""
+        """Reset one world before its task starts an episode.
+
+        drawn: values of the varied quantities in this episode, by name
+        """
 
     def settle(self, worlds: np.ndarray) -> None:
         """Compute the poses after the task has started episodes in these worlds."""
@@ -65,7 +68,7 @@ class Physics(Protocol):
         """
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:
-        """Advance all worlds except the skipped ones by one action; return the reasons of failures, by world."""
+        """Advance all worlds except the skipped ones by one action; return the reason of each failure, by world."""
 
     def poses(self) -> Poses:
         """Return the current poses."""

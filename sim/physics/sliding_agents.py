@@ -26,10 +26,19 @@ UNSTABLE = "unstable physics"
 class SlidingAgents:
     """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
 
+    `sim.Physics` describes the methods that are not described here.
+
     world: layout, model and starting positions
-    before, state: all worlds before and after the last action
-    motion: motion of the agents during that action
-    chance: random streams of the worlds
+    n: number of worlds
+    threads: number of threads that may step them
+    variation: ranges of quantities that differ between episodes; None: there are none
+    before, state: attributes, all worlds before and after the last action
+    motion: attribute, motion of the agents during that action; None before the first
+    chance: attribute, random streams of the worlds
+
+    Raises:
+        ValueError: the model lacks a part of the agent, an object could collide, or `variation` names an object that
+            the model lacks or that cannot vary.
     """
 
     def __init__(self, world: World, n: int, threads: int = 1, variation: Variation | None = None) -> None:
@@ -106,7 +115,7 @@ class SlidingAgents:
         self._moved = objects, courses
 
     def put_objects(self, objects: np.ndarray) -> None:
-        """Move objects to new positions after an action, (n, k, 3) [m]."""
+        """Move objects to these positions after an action, (n, k, 3) [m]."""
         self._state = replace(self.state, objects=objects)
 
     def count(self, goals: np.ndarray, adversaries: np.ndarray) -> None:
@@ -193,7 +202,11 @@ class SlidingAgents:
 
 
 def _steered(heading: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return headings [rad] (n,) after turning, and commanded velocities [m/s] (n, 2)."""
+    """Return headings [rad] (n,) after turning, and commanded velocities [m/s] (n, 2).
+
+    heading: headings before turning [rad], (n,)
+    actions: forward speed and change of heading, each in [-1, 1], (n, 2)
+    """
     speed, turn = actions.astype(np.float64).T
     heading = wrap_angle(heading + MAX_TURN * turn)
     speed = MAX_SPEED * (speed + 1.0) / 2.0

@@ -42,7 +42,7 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
     """Return the varied appearances; None if only light varies.
 
     Raises:
-        ValueError: the model has no such object, or the object cannot vary.
+        ValueError: the model has no such object, the object cannot vary, or a starting position varies.
     """
     if starts := variation.of_things(START):
         raise ValueError(
@@ -52,7 +52,11 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
 
 
 def _weightless(model: mujoco.MjModel, thing: str, name: str) -> int:
-    """Return the id of the geom `thing`, after checking that its size may differ between worlds of one layout."""
+    """Return the id of the geom `thing`, after checking that its size may differ between worlds of one layout.
+
+    Raises:
+        ValueError: there is no such geom, agents touch it, or it is not a plain primitive.
+    """
     geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, thing)
     if geom < 0:
         known = ", ".join(model.geom(g).name for g in range(model.ngeom) if model.geom(g).name)

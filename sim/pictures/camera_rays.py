@@ -1,6 +1,6 @@
 """The rays of an image as one frozen Dr.Jit kernel, and the direct light along them.
 
-A ray is specified by a whole number: 8 times the number of its pixel, plus the number of its sample within the pixel.
+A ray is specified by a whole number: 8 times the index of its pixel, plus the index of its sample within the pixel.
 Every light is sampled once per ray, whereas Mitsuba's `direct` draws one of them at random. Point lights and
 directional lights therefore cause no noise. Skies and glowing geoms cause noise, but the samples of a pixel are fixed,
 so the noise is the same in every frame.
@@ -53,8 +53,8 @@ class RayLight:
     """Light along rays, and the planes that they hit.
 
     linear: sRGB, not clipped, (3, ray)
-    plane: tangent plane at the hit point, as coefficients of its inverse depth: 1 / depth [1/m] = plane @ (across,
-        above, 1) for all rays of the image (`plane_coordinates`); 0 without a hit, (3, ray)
+    plane: coefficients of the tangent plane at each hit point, (3, ray); 0 without a hit. Any ray of the image meets
+        this plane at 1 / depth = plane @ (across, above, 1) [1/m], see `plane_coordinates`.
     """
 
     linear: np.ndarray
@@ -108,7 +108,7 @@ class CameraRays:
     def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
         """Return the light along rays of an image of size (height, width).
 
-        codes: numbers of the rays, see the module's docstring, (ray,)
+        codes: whole numbers that specify the rays, see the module's docstring, (ray,)
         """
         traced = self._inside if self.mirror.surrounds(view.position) else self._outside
         suns = {k: self.mirror.towards(name, view) for k, name in self._suns.items()}
@@ -167,7 +167,11 @@ class CameraRays:
 
 
 def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
-    """Return the first hits of rays that pass through the inner sides of closed shapes."""
+    """Return the first hits of rays that pass through the inner sides of closed shapes.
+
+    si: first hits of the rays, including inner sides
+    closed: see `CameraInputs`
+    """
 
     def leaving(si: Array, ray: Array, turn: Array) -> Array:
         out = si.is_valid() & (dr.dot(si.n, ray.d) > 0) & (turn < NESTED)

@@ -21,7 +21,7 @@ def with_eyes(
     """Return an image (y, x, 3) uint8 of a model with marks of its eyes.
 
     eyes: pupils [m] (eye, 3) and frames (eye, 3, 3), columns (right, up, ahead)
-    fov_deg: horizontal field of view of the eyes
+    fov_deg: horizontal field of view of the eyes [degrees]
     reach: length of the borders that are drawn [m]
     """
     shown, half = picture.astype(np.float64), np.radians(fov_deg) / 2
@@ -43,7 +43,12 @@ def with_eyes(
 
 
 def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: float) -> np.ndarray | None:
-    """Return the position (x, y) of a point in an image [pixels]; None if it is behind the camera."""
+    """Return the position (x, y) of a point in an image [pixels]; None if it is behind the camera.
+
+    point: position in the world [m], (3,)
+    size: height and width of the image [pixels]
+    reach: length [m]; points that are less than NEAREST times `reach` in front of the camera count as behind it
+    """
     right, up, back = (point - view.position) @ view.rotation
     if -back < NEAREST * reach:
         return None
@@ -52,7 +57,11 @@ def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: flo
 
 
 def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distances of the pixels' centres from a line segment [pixels], (y, x)."""
+    """Return the distances of the pixels' centres from a line segment [pixels], (y, x).
+
+    start, end: ends of the segment, (x, y) [pixels]
+    size: height and width of the image [pixels]
+    """
     y, x = np.indices(size) + 0.5
     along = end - start
     length = float(along @ along)

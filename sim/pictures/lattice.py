@@ -19,7 +19,7 @@ class Lattice:
     """The pixels of an image that are traced first.
 
     size: size of the image (height, width)
-    pixels: numbers of the lattice's pixels, row by row, and of border pixels that are adjacent to none of them, (n,)
+    pixels: indices of the lattice's pixels, row by row, and of border pixels that are adjacent to none of them, (n,)
     nearest: for each pixel, the index in `pixels` of the nearest one, (height · width,)
     pairs: neighbours in the lattice, as indices in `pixels`, (2, m)
     """

@@ -69,7 +69,10 @@ class MergedMirror(Mirror):
         return np.asarray(direction / np.linalg.norm(direction))
 
     def surrounds(self, point: np.ndarray) -> bool:
-        """Return whether a point may be inside a geom, because it is inside the geom's bounding box."""
+        """Return whether a point is inside the bounding box of a geom, enlarged by `near`; planes have no box.
+
+        The point may then be inside the geom.
+        """
         sizes, bounded = self.model.geom_rbound[self.geoms], self.model.geom_rbound[self.geoms] > 0
         offset = point - self._places.geom_xpos[self.geoms]
         local = np.einsum("gij,gi->gj", self._places.geom_xmat[self.geoms].reshape(-1, 3, 3), offset)

@@ -36,7 +36,8 @@ def read_photograph(path: str | Path) -> np.ndarray:
     """Read an image file as sRGB values (y, x, 3) in [0, 1], rotated according to its EXIF orientation.
 
     Raises:
-        ValueError: the file is no image, is damaged or too large, has one channel, or has transparent pixels.
+        ValueError: the file is no image, is damaged or too large, has transparency, or does not have three channels of
+            8 bits.
         OSError: the file cannot be read.
     """
     from PIL import Image, ImageOps, UnidentifiedImageError
@@ -89,26 +90,27 @@ def see_photograph(
 ) -> ReceptorMosaic:
     """Return the signals of an animal's receptors for a photograph, which covers a part of its visual field.
 
-    Each colour becomes one of the many reflectances with this colour (`optics.spectra.spectrum.srgb_basis`), in
-    daylight. The light passes the optics of the animal's eye (`optics.animals`) and excites its receptors. A white
+    Each colour is converted to one of the many reflectances that have this colour
+    (`optics.spectra.spectrum.srgb_basis`). Daylight illuminates these reflectances. The reflected light passes the
+    optics of the animal's eye (`optics.animals`) and excites its receptors. A white
     surface gives a signal of 1. Receptors that are finer than the photograph are replaced by one for each pixel, at
     most 40,000 in all.
 
     photograph: sRGB values in [0, 1], (y, x, 3), of a camera that maps straight lines to straight lines.
     animal: one of "blowfly", "dragonfly", "fruit_fly", "honeybee", "megalopta", "eagle", "goldfish", "human",
         "jumping_spider" and "mouse".
-    width_deg: angular width of the photograph, in [0.1, 120].
-    uv: fraction of ultraviolet light, in [0, 1], that a white surface reflects. A photograph does not contain it. Below
-        400 nm, the reflectances of `srgb_basis` are multiplied by it.
-    depth: distance [m] of the scene along the axis, a number or one for each pixel (y, x). Eyes are focused at
-        infinity, so near surfaces are blurred, and they hide parts of far ones (`optics.Eye.see`). None: infinity.
+    width_deg: angular width of the photograph [degrees], in [0.1, 120].
+    uv: fraction of ultraviolet light, in [0, 1], that a white surface reflects. A photograph does not contain this
+        information. Below 400 nm, the reflectances of `srgb_basis` are multiplied by `uv`.
+    depth: distance [m] of the scene along the axis, a single number or an array (y, x). Eyes are focused at infinity,
+        so near surfaces are blurred, and they hide parts of far ones (`optics.Eye.see`). None: infinity.
         Compound eyes accept None only, because their small facets are in focus at all distances.
     progress: function that is called with the completed fraction. None: no calls.
 
     Raises:
         ValueError: an argument is outside its range, the image or `depth` has the wrong shape, the field has more than
             40,000 ommatidia, or `depth` is given for a compound eye.
-        AccuracyError: the depth varies too much for the kernels of one image; see `optics.Eye.see`.
+        optics.AccuracyError: the depth varies too much for the kernels of one image; see `optics.Eye.see`.
     """
     one_of("animal", animal, ANIMALS)
     width = in_range("width_deg", width_deg, 0.1, 120.0)
@@ -132,7 +134,12 @@ def _checked(photograph: Any) -> np.ndarray:
 
 
 def _checked_depth(depth: Any, shape: tuple[int, ...], animal: str) -> np.ndarray:
-    """Return the distances [m] of all pixels, (y, x)."""
+    """Return the distances [m] of all pixels, (y, x), from the argument `depth` of `see_photograph`.
+
+    Raises:
+        ValueError: the eye is a compound eye and `depth` is not None, or `depth` has another shape, or a distance is
+            not positive.
+    """
     if depth is None:
         return np.full(shape, math.inf)
     if animal in animals.COMPOUND:
@@ -228,7 +235,7 @@ def _camera(
 
 
 def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the means of a photograph over the cells of a grid of this size, (y, x, 3)."""
+    """Return the means of a photograph (y, x, 3) over the cells of a grid of this size (rows, columns)."""
     from PIL import Image
 
     planes = [Image.fromarray(plane.astype(np.float32)) for plane in np.moveaxis(linear, -1, 0)]
@@ -236,7 +243,7 @@ def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def _nearest(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distance in the middle of each cell of a grid of this size, (y, x).
+    """Return the distance (y, x) in the middle of each cell of a grid of this size (rows, columns).
 
     Means over cells would lie between the distances of two surfaces.
     """

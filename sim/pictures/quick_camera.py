@@ -37,7 +37,7 @@ class QuickImage:
 
     picture: sRGB, (y, x, 3) uint8
     planes: planes that rays hit, see `RayLight`, (3, ray)
-    ray: for each pixel, the number of the ray through its middle, or through the nearest lattice pixel, (pixel,)
+    ray: for each pixel, the index of the ray through its middle, or through the nearest lattice pixel, (pixel,)
     fovy_deg: vertical field of view of the camera
     """
 
@@ -59,9 +59,12 @@ class QuickCamera:
     """A camera for any MuJoCo model that works without OpenGL. It renders the model's mirror in direct light.
 
     model, spectra: see `sim.mirror`
-    mirror: the mirror, a Mitsuba scene that is a copy of the model (`sim.mirror`)
+    mirror: attribute, the Mitsuba scene that is a copy of the model (`sim.mirror`)
 
     Transparent geoms are rendered dark and opaque, and named in a warning (`sim.MirrorWarning`).
+
+    Raises:
+        ValueError: the model has no visible geoms, or `spectra` is invalid.
     """
 
     def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:
@@ -78,12 +81,16 @@ class QuickCamera:
         camera: name or id of a camera of the model, or a Viewpoint
 
         Raises:
-            ValueError: the camera is unknown, the image has less than one pixel, or `Mirror.sync` refuses the data.
+            ValueError: the camera is unknown or no plain perspective, the image has less than one pixel, or
+                `Mirror.sync` refuses the data.
         """
         return self.render(data, camera, width, height).picture
 
     def render(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> QuickImage:
-        """Return the same image as `picture`, as a `QuickImage`, which can also compute inverse distances."""
+        """Return the same image as `picture`, as a `QuickImage`, which can also compute inverse distances.
+
+        Errors are as in `picture`.
+        """
         check_size(width, height, 1)
         self.mirror.sync(data)
         view, size = self.mirror.viewpoint(camera), (height, width)
@@ -91,14 +98,14 @@ class QuickCamera:
         if size not in self._lattices:
             self._lattices[size] = Lattice.for_size(size)
         lattice = self._lattices[size]
-        look, linear = self._middles(view, lattice)
-        edges = np.flatnonzero(_on_edges(look.picture))
+        image, linear = self._middles(view, lattice)
+        edges = np.flatnonzero(_on_edges(image.picture))
         if len(edges):
             codes = CODES * edges[:, None] + np.arange(1, len(SAMPLES))
             more = self._rays.trace(view, size, codes.ravel()).linear.reshape(3, len(edges), -1).sum(axis=2)
-            mean = (linear[:, look.ray[edges]] + more) / len(SAMPLES)
-            look.picture.reshape(-1, 3)[edges] = _displayed(mean).T
-        return look
+            mean = (linear[:, image.ray[edges]] + more) / len(SAMPLES)
+            image.picture.reshape(-1, 3)[edges] = _displayed(mean).T
+        return image
 
     def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[QuickImage, np.ndarray]:
         """Return an image in which each pixel has the colour of its middle.

@@ -27,8 +27,9 @@ class ReceptorMosaic:
     animal: name of the animal.
     signals: signals (channel, row, column), from the top left of the visual field. A white surface gives 1.
     peaks_nm: peak wavelength of each channel, (channel,).
-    width_deg: angular width of the photograph.
-    hexagons: True for ommatidia. Rows with odd numbers are then shifted to the right by half an ommatidium.
+    width_deg: angular width of the photograph [degrees].
+    hexagons: True for ommatidia. Every second row, beginning with the second, is then shifted to the right by half an
+        ommatidium.
     """
 
     animal: str

@@ -3,8 +3,8 @@
 one_ray             see: one world, one ray for each receptor
 eye_renderer        EyeRenderer: all eyes of all worlds of any scene as one wavefront
 prepared_scene      PreparedScene: a model and its eyes, built once for choosing a fidelity and for rendering
-ray_kernel          kernel that traces rays: lanes, rays, light, depth layers, sums
-area_kernel         kernel of area sampling
+ray_kernel          kernel that traces one ray per lane and sums the light for each receptor
+area_kernel         kernel that computes the mean light in areas of the visual field
 eye_rays            rays of upright eyes, and of eyes that may be anywhere
 edge_rays           adaptive edge sampling: many rays at edges, few in other places
 light_factors       factors by which the light of each world is multiplied
@@ -13,7 +13,7 @@ optic_flow          motion on the retina
 batched_renderer    BatchedRenderer: eyes of the agents in a built-in world
 world_scene         WorldScene: a built-in world, prepared
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model
-renderable          check of a fidelity against an eye
+renderable          check that a fidelity fits an eye
 reference_renderer  ReferenceRenderer: Mitsuba's integrators, slow
 fidelity            Fidelity: samples, bands, depth layers and light, and the reasons for them
 fidelity_choice     cheapest: the cheapest fidelity whose error is small compared with receptor noise

@@ -28,10 +28,10 @@ from sim.tracing.areas.patch import Area
 class BorderInputs:
     """Horizontal directions to the borders between columns of areas.
 
-    lanes: index of each border of each eye
+    lanes: index of each lane; there is one lane for each border of each eye in each world
     counts: number of borders of an eye, and number of eyes of a world
     along: directions to the borders
-    sides: numbers of each area's left and right border
+    sides: indices of each area's left and right border
     """
 
     lanes: Array
@@ -46,7 +46,7 @@ class AreaInputs(KernelInputs):
 
     extent: width and height of areas on the tangent plane
     borders: directions to the borders that areas share; None: areas share no borders
-    places: numbers of the points on the bodies of all worlds at which illumination is computed; None: bodies reflect no
+    places: indices of the points on the bodies of all worlds at which illumination is computed; None: bodies reflect no
         light onto other surfaces
     """
 
@@ -58,7 +58,7 @@ class AreaInputs(KernelInputs):
 class AreaKernel(RayKernel):
     """A kernel that computes the light in areas.
 
-    areas: tracer
+    areas: tracer that computes the light in areas
     eyes: upright eyes
     sensor: directions and extent of the areas
     n_envs, n_eyes: numbers of worlds, and of eyes in each world
@@ -71,7 +71,11 @@ class AreaKernel(RayKernel):
         self._borders = Borders.from_middles(sensor.directions[:, 0], sensor.extent[0])
 
     def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None, facets: Facets | None = None) -> AreaInputs:
-        """See RayKernel; ways: directions to the middles of areas."""
+        """Return the inputs of the kernel; see `RayKernel.inputs`.
+
+        ways: centres of the areas on the plane at distance 1, (area, 3)
+        bounces, facets: ignored, because areas do not use them
+        """
         whole, places = super().inputs(ways), self._areas.places
         return AreaInputs(
             whole.lanes,
@@ -103,13 +107,13 @@ class AreaKernel(RayKernel):
         width, height = (dr.gather(mi.Float, inputs.extent, i) for i in range(2))
         area = Area.from_extent(seen.ray, seen.axis.xy, (width, height))
         borders = inputs.borders
-        met = (
+        faces = (
             self._areas.border_faces(area, inputs.tables)
             if borders is None
             else self._shared_border_faces(frame, inputs, borders, lane)
         )
         bodies = self._areas.bodies(frame.things, lane.world, seen.body)
-        return self._areas.radiance(area, met, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
+        return self._areas.radiance(area, faces, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
         """Return the fractions of the lights that reach each point on the bodies of each world, flat (world, point)."""

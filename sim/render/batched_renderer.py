@@ -29,11 +29,13 @@ class BatchedRenderer(EyeRenderer):
     tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto": the closed
         form if the world has one. The tracer in use is in `.tracer.name`, and the reason for its choice in
         `.tracer.why`
-    brightest: signal of a white surface that faces all lights at once
+    brightest: attribute, the signal of a white surface that faces all directional lights at once, or of veiling light
+        if it is larger
 
     Raises:
         ValueError: n_envs is below 1, the rays do not fit into memory, the world does not support the fidelity, or
             tracer="closed_form" is given for a world without a closed form.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
 
     def __init__(

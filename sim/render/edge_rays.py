@@ -31,7 +31,7 @@ FIRST = 4  # number of first rays, which are traced through every receptor's squ
 class EdgeRays:
     """The sums of `RayKernel.sums` over many rays per receptor, estimated from fewer rays.
 
-    kernel: kernel that follows the rays
+    kernel: kernel that traces the rays
     sampling: sampling of the receptors
     rays: number of rays for a receptor at an edge
     signals: contribution of a component to the signal of each type of receptor, (channel, component)

@@ -38,8 +38,8 @@ class Counts:
 class Lane:
     """One lane of a kernel: a sample of an eye in a world.
 
-    world, eye, sample: their numbers
-    row: number of the eye among all eyes of all worlds
+    world, eye, sample: index of the world, of the eye in this world, and of the sample of this eye
+    row: index of the eye among all eyes of all worlds
     """
 
     world: Array
@@ -72,7 +72,7 @@ class Directions:
 
 
 class EyeRays(Protocol):
-    """Eyes of a number of worlds, and the rays that leave them."""
+    """The eyes of all worlds, and the rays that start at them."""
 
     def fill(self, poses: Poses) -> None:
         """Write the eyes of these worlds to the kernel's buffer."""

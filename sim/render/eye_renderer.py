@@ -48,6 +48,8 @@ class EyeRenderer:
     scene: the model and its eyes
     n_envs: number of worlds
     fidelity: samples, depth layers and light; its number of bands must equal that of the scene
+
+    Further attributes:
     eye, mounts, model: the scene's eye, mounts and model
     sensor: the sampled directions
     tracer: the method of tracing rays, see `sim.tracing.tracer.Tracer`
@@ -58,6 +60,7 @@ class EyeRenderer:
 
     Raises:
         ValueError: n_envs is below 1, the rays do not fit into memory, or the scene does not support the fidelity.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
@@ -88,7 +91,11 @@ class EyeRenderer:
         self._set_width(n_envs)
 
     def resized(self, n_envs: int) -> Self:
-        """Return a renderer of another number of worlds with the same eyes; the scene is shared, not loaded again."""
+        """Return a renderer of another number of worlds, which shares this renderer's scene and eyes.
+
+        Raises:
+            ValueError: n_envs is below 1, or the rays do not fit into memory.
+        """
         other = copy.copy(self)
         other._check_memory(n_envs, other._samples_per_receptor)
         for of_width in ("_few", "labels"):
@@ -144,22 +151,25 @@ class EyeRenderer:
         Raises:
             ValueError: the number of worlds or the shape of `light` is wrong; the poses belong to another model, are
                 not finite or have not been computed yet; or the worlds differ from the model in a part that is not in
-                `varied`.
+                `varied` (see `sim.ModelRenderer`).
         """
         return self.launch(poses, light).wait()
 
     begin, begin_some = renamed("launch"), renamed("launch_some")
 
     def launch(self, poses: Placed, light: np.ndarray | None = None) -> PendingFrame:
-        """Start rendering in the background, and return a frame, whose `wait` returns the same signals as `signals`."""
+        """Start rendering in the background, and return a frame whose `wait` returns the result of `signals`.
+
+        The arguments and errors are those of `signals`.
+        """
         factors = None if light is None else LightFactors.from_light(light, (self.n_envs, self.eye.bands))
         return self._launched(poses).then(lambda found: self._signals(found, factors))
 
     def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
         """Start rendering only some of the worlds; the signals are (len(worlds), eye, channel, height, width).
 
-        Up to FEW worlds are rendered in separate buffers, so that a frame of all worlds may be pending at the same
-        time.
+        `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to FEW worlds
+        are rendered in separate buffers, so that a frame of all worlds may be pending at the same time.
         """
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
@@ -173,7 +183,10 @@ class EyeRenderer:
         return self.resized(FEW)
 
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
-        """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
+        """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32.
+
+        The unit is that of `sim.mirror` (white facing a light of diffuse 1: D65, 1 at 560 nm). Errors: see `signals`.
+        """
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())
         sums = np.einsum("lkn,kb->lbn", layers, self.tracer.basis.astype(np.float32))
@@ -181,30 +194,30 @@ class EyeRenderer:
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, len(self.mounts), height, width)
 
     def radiance(self, poses: Placed) -> np.ndarray:
-        """Return the spectral radiance along every ray, (env, eye, ray, band) float32."""
+        """Return the spectral radiance along every ray, (env, eye, ray, band) float32; see `receptor_radiance`."""
         layers = self._components(self._launched(poses, self._rays).wait())
         rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
         return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)
 
     def eye_frames(self, poses: Placed) -> EyeFrames:
-        """Return the eyes' frames in the world."""
+        """Return the pupils [m], (env, eye, 3), and the eyes' frames, (env, eye, 3, 3), in the world."""
         return self.scene.places.frames(self.scene.placed(poses))
 
     @cached_property
     def labels(self) -> Labels:
-        """Depth, geom ids and optic flow at the receptors' centres, as exact numbers."""
+        """Renderer of depth, geom ids and optic flow at the receptors' centres; ValueError for a compound eye."""
         return Labels(self.scene, self.n_envs)
 
     def depth(self, poses: Placed) -> np.ndarray:
-        """See `Labels.depth`."""
+        """Return the depth at each receptor's centre [m], (env, eye, height, width); see `Labels.depth`."""
         return self.labels.depth(poses)
 
     def ids(self, poses: Placed) -> np.ndarray:
-        """See `Labels.ids`."""
+        """Return the geom id at each receptor's centre, (env, eye, height, width); see `Labels.ids`."""
         return self.labels.ids(poses)
 
     def flow(self, poses: Placed, later: Placed) -> np.ndarray:
-        """See `Labels.flow`."""
+        """Return the optic flow between two moments [receptors], (env, eye, 2, height, width); see `Labels.flow`."""
         return self.labels.flow(poses, later)
 
     def brightest_in(self, light: np.ndarray) -> float:
@@ -223,7 +236,7 @@ class EyeRenderer:
 
     @property
     def only_directional(self) -> bool:
-        """True if all light comes from directional lamps: there are no points, spots, sky or glowing surfaces."""
+        """True if all light comes from directional lamps: no point lights, spotlights, sky or glowing geoms."""
         scene = self.scene.scene
         return all(light.kind == "directional" for light in scene.lights.found) and not (scene.has_sky or scene.glows)
 

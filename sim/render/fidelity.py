@@ -39,7 +39,7 @@ class Level:
 
 @dataclass(frozen=True)
 class Fidelity:
-    """Accuracy with which a world is rendered for given eyes. Printing it gives a table.
+    """Accuracy with which a world is rendered for given eyes. `print` shows it as a table.
 
     rays_per_receptor: average number of samples (rays or areas) per receptor. Behind a pupil it may be below 1, since
         receptors share rays and may share areas.
@@ -50,8 +50,9 @@ class Fidelity:
     samples: "rays", "areas" or "edges". With "areas", each receptor's square is divided into rays_per_receptor
         rectangles, and the mean light in each of them is computed in closed form. Behind a pupil, there are also
         rectangles around the receptors, and receptors share larger rectangles if rays_per_receptor is below 1. Areas
-        need an upright world. "edges" is adaptive edge sampling: four rays per receptor, and rays_per_receptor rays if
-        these differ. It needs a perfect lens and direct light, and is chosen automatically only for user models.
+        need a world of upright walls, a floor and spheres. "edges" is adaptive edge sampling: four rays per receptor,
+        and rays_per_receptor rays if the signals of the four differ. It needs a perfect lens and direct light, and is
+        chosen automatically only for user models.
     frames: number of rendered frames per action, for receptors with `dynamics`: a divisor of the number of physics
         steps per action. None: environments choose the fewest whose error is allowed
     tolerance: allowed error of a receptor's signal (root mean square); None if nothing was chosen. In adaptive edge
@@ -59,8 +60,8 @@ class Fidelity:
     levels: chosen level of each stage, with its reason
 
     Raises:
-        ValueError: bands, rays_per_receptor or tolerance is not a number or is out of range, light or samples is
-            unknown, or light = "all" is combined with another kind of samples than areas.
+        ValueError: bands, rays_per_receptor, tolerance or frames is not a number or is out of range, light or samples
+            is unknown, or light = "all" is combined with another kind of samples than areas.
     """
 
     rays_per_receptor: float
@@ -115,7 +116,7 @@ class Fidelity:
 
 
 def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
-    """Return the fidelity with this number of rays in direct light, or None for "auto", which is chosen later.
+    """Return the fidelity with this number of rays, direct light and the eyes' own bands; None for "auto".
 
     Raises:
         ValueError: the value is neither a positive number nor "auto".

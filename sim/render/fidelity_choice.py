@@ -1,9 +1,9 @@
 """Choice of the cheapest fidelity, in four stages: bands, depth layers, light and samples.
 
-The allowed error is half of the receptors' noise. A brain could not distinguish such an error from the noise. Every
-stage has levels, ordered by cost. The cheapest level whose predicted error is allowed is chosen, and stored with the
-reason. The available levels and their errors depend on the kind of scene (`world_fidelity`, `model_fidelity`). The rule
-for choosing a level is the same for all scenes.
+By default, the allowed error is half of the receptors' noise. A brain could not distinguish such an error from the
+noise. Every stage has levels, ordered by cost. The cheapest level whose predicted error is allowed is chosen, and
+stored with the reason. The available levels and their errors depend on the kind of scene (`world_fidelity`,
+`model_fidelity`). The rule for choosing a level is the same for all scenes.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Allowed:
 class Shares:
     """Fractions of the tolerance that the stages before the samples may use.
 
-    The squares of the errors of all stages add up. The samples may use the remainder.
+    Errors of different stages are independent, so their squares add up. The samples may use the remainder.
     """
 
     bands: float
@@ -71,7 +71,6 @@ class Shares:
         """Return the remainder of an allowed error, which the samples may use.
 
         allowed: allowed error of all stages together
-
         has_layers: True if the eye has depth layers
         light: error due to the omitted light
         """
@@ -86,6 +85,8 @@ class Stages(Protocol):
     eye: its receptor noise determines the allowed error
     allowed: allowed error of a signal due to all stages (root mean square)
     shares: fractions of the allowed error; None: each stage may use all of it
+
+    In the methods, `allowed` is the largest error that the stage may cause.
     """
 
     eye: optics.Eye
@@ -96,7 +97,7 @@ class Stages(Protocol):
         """Return the eye's own bands, and their error."""
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
-        """Return the depth layers for which the eye has a PSF, and the chosen level; None if there was no choice."""
+        """Return the depth layers for which the eye has a PSF, and the chosen level (None if there was no choice)."""
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
         """Return the level of light: which reflections are followed."""

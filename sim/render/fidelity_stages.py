@@ -28,7 +28,13 @@ NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the 
 
 
 def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = None) -> tuple[int, Level]:
-    """Return the smallest number of bands that `optics.Eye` needs for scenes of any colour, and for the medium."""
+    """Return the smallest number of bands with an allowed error for surfaces of any colour, and its `Level`.
+
+    If no number is accurate enough, return the eye's own number; in a medium, return FINEST.
+
+    allowed: allowed error of a signal
+    medium: if it is given, the error for white and black in it must also be allowed
+    """
     within = min(max(allowed / eye.throughput, 1e-6), 0.5)  # the tolerances that an Eye accepts
     try:
         bands = int(replace(eye, bands="auto", tolerance=within).bands)
@@ -65,7 +71,10 @@ def own_bands(world: World, eye: optics.Eye) -> Level:
 
 
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
-    """Return a single PSF for infinity if its error is certainly allowed, else the fewest layers for random views.
+    """Return the smallest number of depth layers with an allowed error, and its `Level`.
+
+    It is a single PSF for infinity if the bound below is allowed. Otherwise, the errors of several numbers of layers
+    are computed in random views. If the PSF cannot be computed for them, the result is one PSF for the mean depth.
 
     Consider light that passes the pupil at the position p. On the retina, light from a point at the distance z is
     displaced by (Δx, Δy) = f p/z relative to light from infinity, with the focal length f. The means of |Δx| and |Δy|
@@ -97,7 +106,8 @@ def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Leve
     """Return direct light if a second reflection adds little, otherwise light after one and two reflections.
 
     In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
-    further reflection to the one before is assumed to be the ratio of the second reflection to direct light.
+    further reflection to the one before is assumed to be the ratio of the second reflection to direct light. If the
+    tracer cannot follow a second reflection, the result is direct light with an unknown error.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

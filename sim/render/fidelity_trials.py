@@ -167,7 +167,7 @@ class FidelityTrials:
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Return root mean square differences to the signals with the finest layers, for the same rays.
 
-        The nodes of each count must be among the nodes of the finest layers.
+        For each number n in `counts`, the n layers must be among the finest layers.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -186,7 +186,7 @@ class FidelityTrials:
         return found
 
     def distances(self) -> np.ndarray:
-        """Return the distances of hit points along the eyes' axes [m], sorted; infinite without a hit."""
+        """Return distances of hit points along the eyes' axes in all views [m], sorted; infinite without a hit."""
         _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
         return np.sort(np.array(z))
 
@@ -198,7 +198,7 @@ class FidelityTrials:
         trial: samples of each eye, and their weights
         depth: layers among which light is divided
         light: level of light
-        views: None: the views of the trials
+        views: views of the signals; None: the views of the trials
         most: largest number of rays in all views together
         """
         rays = len(trial.directions)
@@ -242,7 +242,7 @@ class FidelityTrials:
             return [np.array(c) for c in components]
 
     def _lit(self, tracer: AreaTracer, bodies: list[np.ndarray]) -> list[Array]:
-        """Return the tracer's table of illuminated bodies, for their centres (view, 3)."""
+        """Return the tracer's table of illuminated bodies, for bodies with these centres, (view, 3) each."""
         if not tracer.places:
             return []
         place = dr.arange(mi.UInt32, tracer.places * len(bodies[0])) % tracer.places

@@ -27,6 +27,8 @@ class Labels:
 
     scene: the model and its eyes; Mitsuba traces all rays
 
+    All methods raise a ValueError for poses that `EyeRenderer.signals` refuses.
+
     Raises:
         ValueError: the eye is a compound eye, which has no flat retina on which depth and flow are defined.
     """
@@ -56,12 +58,12 @@ class Labels:
     def depth(self, poses: Placed) -> np.ndarray:
         """Return the depth of each receptor centre's hit point along the eye's axis [m].
 
-        (env, eye, height, width) float32; infinite without a hit
+        The shape is (env, eye, height, width), float32. The depth is infinite without a hit.
         """
         return self._at_centres(self._distances, self._scenes, poses)
 
     def ids(self, poses: Placed) -> np.ndarray:
-        """Return the geom that each receptor's centre sees, (env, eye, height, width) int32; -1 without a hit."""
+        """Return the id of the geom at each receptor's centre, (env, eye, height, width) int32; -1 without a hit."""
         scene = self.scene.scene
         apart, geoms = scene.one_shape_per_geom
         found = self._at_centres(self._hits, Scenes(apart, self._scenes.meshes), poses).astype(int)
@@ -79,7 +81,7 @@ class Labels:
         return flow_between(self.eye, self.depth(moments[0]), self.ids(moments[0]), moments, frames)
 
     def eye_frames(self, poses: Placed) -> EyeFrames:
-        """Return the eyes' frames in the world."""
+        """Return the pupils [m], (env, eye, 3), and the eyes' frames, (env, eye, 3, 3), in the world."""
         return self.scene.places.frames(self.scene.placed(poses))
 
     @property

@@ -18,10 +18,10 @@ class LightFactors:
 
     @classmethod
     def from_light(cls, light: np.ndarray, shape: tuple[int, int]) -> LightFactors:
-        """Return a copy of the factors `light`.
+        """Return a copy of the factors `light`, which must have this shape, (env, band).
 
         Raises:
-            ValueError: the shape is not (env, band).
+            ValueError: `light` has another shape.
         """
         if np.shape(light) != shape:
             raise ValueError(f"light has shape {np.shape(light)}: must be (env, band), {shape}")
@@ -38,8 +38,9 @@ class LightFactors:
         return self.bands[:, :1, None, None, None]
 
     def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:
-        """Return light (layer, component, all rays of all views) times these factors, converted to bands.
+        """Return light in bands, multiplied by these factors, (layer, band, all rays of all views).
 
+        layers: light in components, (layer, component, all rays of all views)
         basis: contribution of a component to each band, (component, band); None: components are bands
         """
         if basis is not None:

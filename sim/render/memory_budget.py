@@ -61,7 +61,7 @@ def check_memory(demand: Demand) -> None:
     """Refuse rendering that does not fit into memory.
 
     Raises:
-        ValueError: too many rays; the message states how many fit.
+        ValueError: there is too little memory; the message states how many rays per receptor fit.
     """
     free = available()
     excess = max(demand.bytes / free, demand.elements / INDICES)

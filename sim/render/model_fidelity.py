@@ -73,16 +73,16 @@ def choose_model_fidelity(
     If there is none, a FidelityWarning states by how much the tolerance is exceeded. Bands are the eye's own.
 
     model, eye, mounts: see `ModelRenderer`
-    poses: poses that are typical of later use, one set per moment
+    poses: poses at several moments that are typical of later use, as a list of MjData or as `sim.Poses`
     tolerance: allowed error of a signal (root mean square), over receptors whose field is not uniform; None: half of
-        the receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE` times the signal of a white surface
-        behind the eye's pupil
+        the eye's `noise_sigma`, but at least 0.005 times the signal of a white surface
     groups, spectra, varied, medium: see `ModelRenderer`
     light: "direct" or "bounce", see `Fidelity`; "auto": "bounce" if direct light alone has an error above the tolerance
         at these moments, over receptors that bounced light reaches
 
     Raises:
         ValueError: the tolerance is not positive, `light` is unknown, or ModelRenderer refuses an argument.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
     if light not in (*FOLLOWED, AUTO):
         raise ValueError(f"light = {light!r}: must be 'direct', 'bounce' or 'auto'")
@@ -104,6 +104,9 @@ def choose_model_fidelity(
 class ModelStages:
     """Levels of fidelity for a model, tried at moments of its worlds; see `Stages`.
 
+    scene: the model and its eyes
+    moments: poses in which signals are compared
+    allowed: allowed error of a signal (root mean square)
     light: see `choose_model_fidelity`
     """
 

@@ -32,21 +32,22 @@ class ModelRenderer(EyeRenderer):
     eye: optics and retina of all eyes (`optics.Eye`), or a `sim.CompoundEye`; the fidelity's bands replace its bands
     mounts: places of the eyes on the model
     n_envs: number of worlds
-    fidelity: samples, bands and light. None: 16 rays per receptor, direct light of lamps, and the eye's own bands, 4 by
-        default. light="bounce" adds light after a second reflection, and the light of the sky and of glowing geoms.
-        samples="edges" traces all rays only where the first four differ; it needs a perfect lens and direct light.
-        samples="areas" uses closed forms instead of rays, if the model has them
+    fidelity: samples, bands, depth layers and light. None: 16 rays per receptor, direct light of lamps, and the eye's
+        own bands, 4 by default. light="bounce" adds light after a second reflection, and the light of the sky and of
+        glowing geoms. samples="edges" traces all rays only where the first four differ; it needs a perfect lens and
+        direct light. samples="areas" uses closed forms instead of rays, if the model has them
     groups, spectra: see `sim.mirror`
     varied: names of geoms whose size or colour may differ between worlds. The poses that are rendered then contain the
         size and colour of each geom in each world. A mapping such as {"floor": ("sand", "grass")} also lists materials
         that a geom may have; the colour of such a geom depends only on its material
     tracer: "mitsuba" (any shapes), "closed_form" (upright walls, a floor and spheres), or "auto": the closed form if
-        the model has one. The tracer in use is in `.tracer.name`
+        the model has one. Compound eyes need "mitsuba". The tracer in use is in `.tracer.name`
     medium: water or air between surfaces and eyes, see `sim.build_world`
-    brightest: signal of a white surface that faces all directional lights at once, or of veiling light if it is larger
+    brightest: attribute, the signal of a white surface that faces all directional lights at once, or of veiling light
+        if it is larger
 
-    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Others name lamps with spectral
-    lines for which the eye has too few bands.
+    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
+    with spectral lines for which the eye has too few bands.
 
     Raises:
         ValueError: an argument is invalid, the model lacks the part on which an eye is mounted, an eye has an

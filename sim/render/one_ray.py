@@ -21,6 +21,10 @@ from sim.worlds.world import World
 def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarray:
     """Return the noise-free signals of one world of a state, (eye, channel, height, width).
 
+    Channels are the types of receptors. A pupil, a waveguide and a mosaic of receptors are ignored.
+
+    index: index of the world in the state
+
     Raises:
         ValueError: the world has a medium, the receptors have a density, or the eyes are compound eyes.
     """
@@ -48,7 +52,7 @@ def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarr
 def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> np.ndarray:
     """Return the viewing direction of a receptor's centre, (3,); row 0 is at the top.
 
-    axis: optical axis of the eye, (3,)
+    axis: optical axis of the eye, a horizontal unit vector (3,)
     """
     height, width = eyes.resolution
     right, up = np.array([axis[1], -axis[0], 0]), np.array([0, 0, 1])
@@ -61,7 +65,10 @@ def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> n
 def radiance(scene: MitsubaObject, ray: Array, wavelengths_nm: np.ndarray) -> np.ndarray:
     """Return the radiance along a ray, ρ/π sum_l E_l cos θ_l over all unobstructed lamps l, (band,).
 
-    ρ is the reflectance of the surface, E_l the irradiance from lamp l, and θ_l its angle of incidence.
+    ρ is the reflectance of the surface, E_l the irradiance from lamp l, and θ_l its angle of incidence. The radiance is
+    0 if the ray hits no surface.
+
+    wavelengths_nm: centres of the bands [nm], (band,)
     """
     hit, total = scene.ray_intersect(ray), np.zeros(len(wavelengths_nm))
     for b, wavelength in enumerate(wavelengths_nm if hit.is_valid() else ()):

@@ -16,7 +16,10 @@ Frames = tuple[np.ndarray, np.ndarray]  # pupils [m] (world, eye, 3), eyes' fram
 
 
 def receptor_centres(eye: optics.Eye) -> np.ndarray:
-    """Return the receptors' centres, x to the right and y down, in receptors from the middle, (receptor, 2)."""
+    """Return the receptors' centres (receptor, 2), from the middle of the eye, in sides of a receptor.
+
+    x points to the right and y down.
+    """
     height, width = eye.resolution
     row, column = (index.ravel() for index in np.indices((height, width)))
     return np.stack([column + 0.5 - width / 2, row + 0.5 - height / 2], axis=-1)
@@ -50,7 +53,11 @@ def flow_between(
 
 
 def _carried(points: np.ndarray, geoms: np.ndarray, moments: tuple[Poses, Poses]) -> np.ndarray:
-    """Return the positions, at the second moment, of points (world, eye, receptor, 3) that are fixed to these geoms."""
+    """Return the positions, at the second moment, of points (world, eye, receptor, 3) that are fixed to these geoms.
+
+    points: positions in the world at the first moment [m]
+    geoms: id of each point's geom, (world, eye, receptor)
+    """
     world = np.arange(len(points))[:, None, None]
     (old_place, old_turn), (place, turn) = (
         (poses.geom_xpos[world, geoms], poses.geom_xmat[world, geoms]) for poses in moments

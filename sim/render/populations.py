@@ -24,7 +24,7 @@ ON_OBJECT = 0.02  # a receptor sees an object that fills more than this fraction
 class Population:
     """Views, and the receptors whose errors are computed in them.
 
-    receptors: numbers of the receptors, row by row
+    receptors: indices of the receptors, row by row
     counted: True if a receptor counts in a view, (view, receptor)
     """
 
@@ -65,7 +65,7 @@ def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int
 def _drawn(weights: np.ndarray) -> np.ndarray:
     """Draw up to RECEPTORS receptors with probabilities proportional to their weights.
 
-    Return their numbers in increasing order.
+    The result contains their indices in increasing order.
     """
     chance = weights / weights.sum()
     return np.sort(np.random.default_rng(0).choice(len(weights), min(RECEPTORS, len(weights)), replace=False, p=chance))

@@ -44,8 +44,8 @@ class PreparedScene:
     varied: see `sim.ModelRenderer`
     tracer: method of tracing rays, see `sim.BatchedRenderer`
     stand: the body that carries the eyes, if all eyes stand upright on one body; None: derived from the mounts
-    medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the
-        facets of a compound eye keep the index in front of them. None: clear air
+    medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the facets of a compound
+        eye keep the index in front of them. None: clear air
 
     Raises:
         ValueError: the model lacks the part on which an eye is mounted, an eye is inside a geom in the model's
@@ -120,7 +120,7 @@ class PreparedScene:
         """Return the tracer that uses area sampling.
 
         Raises:
-            ValueError: the world has no closed form.
+            ValueError: the world has no closed forms for areas, or the tracer is "mitsuba", which traces only rays.
         """
         return self.tracers.areas(light)
 
@@ -151,7 +151,7 @@ class PreparedScene:
         tolerance: allowed error of a signal, see `sim.eyes.allowed_error`
 
         Raises:
-            optics.AccuracyError: the light of a pupil spreads too far to be computed.
+            optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         """
         if depth not in self._samplings:
             self._samplings[depth] = eye_sampling(self.eye, depth)

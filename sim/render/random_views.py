@@ -23,7 +23,7 @@ class RandomViews:
     """Views of single eyes; the first axis is the view.
 
     position: position of the agent [m], (n, 2)
-    heading: [rad], (n,)
+    heading: azimuth to which the agent looks [rad], (n,)
     objects: centres [m], (n, k, 3)
     eye: index of the eye to which the view belongs, (n,)
     """
@@ -55,7 +55,7 @@ class RandomViews:
         return self.agents + self._turned(eye_positions(azimuths)[self.eye]), self._turned(in_agent)
 
     def _turned(self, vectors: np.ndarray) -> np.ndarray:
-        """Return vectors (n, ..., 3) of the agents' frames in the world's frame, which is turned about z."""
+        """Rotate vectors (n, ..., 3) about z, from the agents' frames to the world's frame."""
         heading = self.heading.reshape(-1, *[1] * (vectors.ndim - 2))
         cos, sin, (x, y) = np.cos(heading), np.sin(heading), (vectors[..., 0], vectors[..., 1])
         turned: np.ndarray = vectors.copy()
@@ -99,7 +99,11 @@ def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def on_objects(views: RandomViews, origins: np.ndarray, directions: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return which of the directions (n, r, 3) hit an object's ball, (n, r)."""
+    """Return which of the directions (n, r, 3) hit the ball of an object, (n, r).
+
+    origins: positions of the eyes [m], (n, 3)
+    radii: radius of each object's ball [m], (k,)
+    """
     found = np.zeros(directions.shape[:2], bool)
     for k, radius in enumerate(radii):
         way = views.objects[:, k] - origins
@@ -128,7 +132,12 @@ def _stray(rng: np.random.Generator) -> np.ndarray:
 
 
 def _clear_of(objects: np.ndarray, draw: Callable[[], np.ndarray], clearance: float = CLEARANCE) -> np.ndarray:
-    """Return the first of TRIES random places that is clear of objects, or the last one if none is."""
+    """Return the first of TRIES random places (2,) that is clear of objects, or the last one if none is.
+
+    objects: centres of the objects [m], (k, 2)
+    draw: function that returns a random place [m], (2,)
+    clearance: distance from all objects' centres that a clear place exceeds [m]
+    """
     place = np.zeros(2)
     for _ in range(TRIES):
         place = draw()

@@ -52,7 +52,11 @@ class KernelInputs:
 
 @dataclass(frozen=True)
 class Frame:
-    """Inputs of a kernel for all worlds at one moment: their eyes, and the tracer's rows."""
+    """Inputs of a kernel for all worlds at one moment.
+
+    eyes: buffer of the eyes, see `EyeRays.array`
+    things: the tracer's rows, see `sim.tracing.tracer.Buffers`
+    """
 
     eyes: Array
     things: Any
@@ -83,8 +87,8 @@ class Moving:
 class RayKernel:
     """A kernel that traces rays. Its body is recorded once, so only arrays that are passed to it may change.
 
-    tracer: intersects rays
-    eyes: generate rays
+    tracer: tracer that intersects the rays and computes their light
+    eyes: eyes at which the rays start
     n_envs, n_eyes: numbers of worlds, and of eyes in each world
     depth: layers among which light is divided
     """
@@ -93,12 +97,14 @@ class RayKernel:
         self.tracer, self.eyes, self.n_envs, self.n_eyes, self.depth = tracer, eyes, n_envs, n_eyes, depth
 
     def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None, facets: Facets | None = None) -> KernelInputs:
-        """Return the inputs for these samples (ray, 3) of every eye.
-
-        facets: weights and starting points of the samples; None: all weights are 1, and samples start at the pupil
+        """Return the inputs for these samples of every eye.
 
         The samples are inputs and not constants, so that eyes of any resolution and field of view, in any number of
         worlds, share a kernel.
+
+        ways: directions of the samples in the eye's frame, (ray, 3)
+        bounces: points in the unit square, (ray, 2), see `sim.eyes.sensor.BoxSensor`; None: direct light only
+        facets: weights and starting points of the samples; None: all weights are 1, and samples start at the pupil
         """
         lanes = self.n_envs * self.n_eyes * len(ways)
         more = None
@@ -152,7 +158,7 @@ class RayKernel:
 def launched(
     frozen: Any, scenes: Any, frame: Callable[[], Frame], inputs: KernelInputs, variant_name: str
 ) -> Callable[[], np.ndarray]:
-    """Launch a frozen kernel, and return a function that waits for its output."""
+    """Launch a frozen kernel in this variant of Mitsuba, and return a function that waits for its output."""
     with variant(variant_name), GarbageKept():
         found = frozen(scenes, frame(), inputs)
     return lambda: _read(found)

@@ -33,7 +33,7 @@ FEW = 8  # number of worlds of a second, narrower kernel
 class Normals:
     """Standard normal numbers, an array of shape `shape` per world and frame.
 
-    keys: one per world, (n,) uint64
+    keys: Philox key of each world, (n,) uint64
     shape: shape of one world's receptors
     """
 
@@ -53,13 +53,13 @@ class Normals:
         return np.stack([self._keys, self._frames.astype(np.uint64)], axis=1)
 
     def go_on_from(self, place: np.ndarray) -> None:
-        """Restore the state from `place`."""
+        """Restore the state from `place`, (world, 2)."""
         self._keys, self._frames = place[:, 0].astype(np.uint64), place[:, 1].astype(np.uint32)
 
     def launch(self, worlds: np.ndarray | None = None) -> PendingFrame:
         """Start drawing the next frame of these worlds (None: all), (len(worlds), *shape) float32.
 
-        It runs asynchronously.
+        The kernel runs asynchronously.
         """
         n, chosen = len(self._keys), slice(None) if worlds is None else worlds
         count = n if worlds is None else len(worlds)
@@ -81,7 +81,11 @@ class Normals:
 
 
 class _Kernel:
-    """A kernel that is recorded once per width, with its own buffers of keys and frame numbers."""
+    """A kernel that is recorded once per width, with its own buffers of keys and of indices of frames.
+
+    worlds: number of worlds
+    draws: number of draws in each world
+    """
 
     def __init__(self, worlds: int, draws: int) -> None:
         self._slot, self._variant = FrameSlot(), default_variant()
@@ -106,7 +110,7 @@ class _Kernel:
     ) -> PendingFrame:
         """Start drawing normal numbers.
 
-        keys, frames: key and frame number of each world
+        keys, frames: key and index of the frame, for each world
         frame_of: function that converts the arrays on the device to the values of the frame
         """
 
@@ -141,9 +145,10 @@ class NoiseModel:
     def in_frames(self, share: float) -> tuple[NoiseModel | None, NoiseModel | None]:
         """Return the shot noise of a frame that lasts a part of the integration time, and the remaining noise.
 
-        share: duration of the frame, as a fraction of the integration time
+        Each is None if it is 0. Receptors with dynamics sum the photons of their frames. Only the shot noise passes
+        their filters.
 
-        Receptors with dynamics sum the photons of their frames. Only the shot noise passes their filters.
+        share: duration of the frame, as a fraction of the integration time
         """
         shot = None if self.photons is None else NoiseModel(0.0, (self.photons * share).astype(np.float32))
         return shot, NoiseModel(self.sigma) if self.sigma > 0 else None

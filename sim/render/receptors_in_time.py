@@ -19,8 +19,10 @@ class ReceptorsInTime:
     """Receptors of `n` worlds.
 
     dynamics: their temporal properties
+    n: number of worlds
     shape: shape of one world's signals, (eye, channel, height, width)
     seconds: duration of a frame [s]
+    state: attribute, the state of all filters, (world, filter, *shape) float32
 
     Raises:
         ValueError: the latency is longer than MOST_DELAYED frames.
@@ -35,9 +37,9 @@ class ReceptorsInTime:
             )
         low = dynamics.order
         self._low, self._delayed = slice(0, low), slice(low, low + self._delay)
-        self._others = (
-            low + self._delay
-        )  # first the adaptation's mean, or the events' reference and count; then the mean of the motion detectors
+        # The remaining rows are the adaptation's mean, or the events' reference and count, and then the mean of the
+        # motion detectors.
+        self._others = low + self._delay
         self._moved = self._others + (2 if dynamics.event_threshold else int(dynamics.adaptation != "none"))
         self.state = np.zeros((n, self._moved + int(dynamics.motion != "none"), *shape), np.float32)
         self._before = self.state.copy()
@@ -58,7 +60,7 @@ class ReceptorsInTime:
         self.state[worlds] = rows
 
     def store(self, worlds: np.ndarray) -> None:
-        """Store the state of these worlds before their last frame, see `undo`."""
+        """Store the state of these worlds, to which `undo` returns."""
         self._before[worlds] = self.state[worlds]
 
     def undo(self, worlds: np.ndarray) -> None:
@@ -66,7 +68,10 @@ class ReceptorsInTime:
         self.state[worlds] = self._before[worlds]
 
     def step(self, signals: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Advance these worlds by a frame with these signals, and return their responses, (len(worlds), *shape)."""
+        """Advance these worlds by a frame with these signals (len(worlds), *shape), and return their responses.
+
+        The responses are (len(worlds), eye, channel, height, width). Motion detectors double the number of channels.
+        """
         rows = self.state[worlds]
         found = self._filtered(rows, signals)
         if self.dynamics.event_threshold:
@@ -87,7 +92,10 @@ class ReceptorsInTime:
             self.state[worlds, self._others + 1] = 0
 
     def _filtered(self, rows: np.ndarray, signals: np.ndarray) -> np.ndarray:
-        """Return the signals after low-pass filter and latency."""
+        """Return the signals (world, *shape) after low-pass filter and latency, and advance these filters.
+
+        rows: states of the filters of these worlds, (world, filter, *shape), changed in place
+        """
         x = self._ms / self.dynamics.time_constant_ms
         low, decay = rows[:, self._low], np.float32(math.exp(-x))
         away = low - signals[:, None]
@@ -103,7 +111,10 @@ class ReceptorsInTime:
         return out
 
     def _adapted(self, rows: np.ndarray, signals: np.ndarray) -> np.ndarray:
-        """Return the signals after gain control, and update the mean that determines the gain."""
+        """Return the signals (world, *shape) after gain control, and update the mean that determines the gain.
+
+        rows: see `_filtered`
+        """
         mean = rows[:, self._others]
         if self.dynamics.adaptation == "naka_rushton":
             light = np.maximum(signals, 0)
@@ -123,7 +134,9 @@ class ReceptorsInTime:
     def _motion(self, signals: np.ndarray, past: np.ndarray) -> np.ndarray:
         """Return the output of the motion detectors between each receptor and its right neighbour.
 
-        In the last column, it is 0.
+        In the last column, the output is 0.
+
+        signals, past: present signals (world, *shape), and the same signals after the detectors' low-pass filter
         """
         found = np.zeros_like(signals)
         a, b, past_a, past_b = signals[..., :-1], signals[..., 1:], past[..., :-1], past[..., 1:]
@@ -134,7 +147,7 @@ class ReceptorsInTime:
         return found
 
     def _steady(self, signals: np.ndarray) -> np.ndarray:
-        """Return the responses to constant signals, without motion."""
+        """Return the responses to constant signals (world, *shape), without motion detectors."""
         if self.dynamics.event_threshold or self.dynamics.adaptation == "logarithmic":
             return np.zeros_like(signals)
         if self.dynamics.adaptation == "none":

@@ -28,19 +28,22 @@ MOST_PIXELS = 16  # chosen: the largest number of pixels along a cell's side
 
 
 class ReferenceRenderer:
-    """A renderer of one eye at a time: a path-traced image on the tangent plane, then `Eye.see`.
+    """A renderer of one eye at a time: it traces an image on the tangent plane, and passes it to `optics.Eye.see`.
 
     world, eyes: as in `sim.BatchedRenderer`
-    integrator: Mitsuba's integrator: "path", "direct", or a description, {"type": "path", "max_depth": 3}
-    spp: samples per cell of an image
-    samples_per_receptor: cells along a receptor's side; None: 1 for a perfect lens (cells are pixels), 4 behind a
-        pupil, more for narrow rhabdoms
+    integrator: Mitsuba's integrator: "path", "direct", or a description such as {"type": "path", "max_depth": 3}
+    spp: samples per pixel of an image; a cell is one pixel if receptors are square, and several otherwise
+    samples_per_receptor: cells along a receptor's side; None: 1 for a perfect lens, 4 behind a pupil, and more for
+        narrow rhabdoms
     depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
         blurred like light from infinity
     depth_layers: number of kernels between these distances, or "auto"
     sampler: Mitsuba's sampler: "independent", or "multijitter" for less noise
-    variant: spectral variant of Mitsuba; None: the device's; scalar_spectral runs without LLVM
+    variant: spectral variant of Mitsuba, such as "scalar_spectral", which runs without LLVM; None: the default of this
+        machine
     seed: seed of the samples; the attribute may be changed between images
+
+    Warnings (`sim.MirrorWarning`) name lamps with spectral lines for which the eye has too few bands.
 
     Raises:
         ValueError: an argument is invalid, the world has a medium, the eyes are compound eyes, or the sides of a
@@ -85,7 +88,7 @@ class ReferenceRenderer:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Cells (Y, X) of an image, which covers the fields of all receptors."""
+        """Numbers of rows and columns of cells (Y, X) of an image, which covers the fields of all receptors."""
         sides = np.max([kernel.shape[1:] for kernel in self.sight.kernels.values()], axis=0)
         height, width = (
             n * self.samples_per_receptor + 2 * (int(side) // 2)

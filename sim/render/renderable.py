@@ -1,4 +1,4 @@
-"""A check whether a fidelity fits the eye that it is used for."""
+"""A check that a fidelity fits the eye for which it is used."""
 
 from __future__ import annotations
 

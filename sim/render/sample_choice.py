@@ -105,7 +105,7 @@ def _areas(
 def _fewest(
     error: Callable[[float], float], numbers: tuple[float, ...], allowed: float, kind: str
 ) -> tuple[float, Level, bool]:
-    """Return the lowest number of samples whose error is allowed, its level, and whether it is accurate enough.
+    """Return the lowest number of samples whose error is allowed, its `Level`, and whether it is accurate enough.
 
     If all errors are too large, return the lowest number whose error is close to the smallest one. Errors are assumed
     to fall at most like 1/n, so numbers that are certainly too low are skipped.

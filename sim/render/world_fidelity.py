@@ -34,14 +34,15 @@ def choose_fidelity(
 
     world, eyes: the world, and the eyes of every agent in it
     tolerance: allowed error of a receptor's signal (root mean square), both over all receptors and over receptors that
-        see a nearby object; None: half of the receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE`
-        times the signal of a white surface behind the eyes' pupil
+        see a nearby object; None: half of the eyes' `noise_sigma`, but at least 0.005 times the signal of a white
+        surface
     bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments.
         Compound eyes always have their own.
     tracer: tracer for the trials, see `sim.BatchedRenderer`
 
     Raises:
-        ValueError: the tolerance is not positive, the bands are unknown, or BatchedRenderer refuses the world.
+        ValueError: the tolerance is not positive, `bands` is unknown, or BatchedRenderer refuses the world.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
     of_kind("world", world, World, "sim.build_world('detection')")
     of_kind("eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")

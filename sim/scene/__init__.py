@@ -22,7 +22,7 @@ inventory        messages about features without a counterpart in the scene
 color            sRGB and linear light
 device_arrays    aligned arrays for kernels
 variant          Mitsuba's variant during a call
-poses            Poses: poses, sizes and colours in all worlds
+poses            Poses: poses, sizes, colours and materials in all worlds
 moved_bodies     poses of models in which only a few bodies move
 variation        ranges of quantities that differ between episodes
 world_models     a model for each world, if worlds differ

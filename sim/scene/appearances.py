@@ -50,13 +50,14 @@ def appearances_of(
 ) -> list[Appearance]:
     """Return all visible appearances of these geoms.
 
+    geoms: ids of visible geoms
     materials: ids of the materials that may be drawn for a geom, by its id
     """
     found = []
     for geom in geoms:
         if geom in materials:
             drawn = (in_material(model, geom, material) for material in materials[geom])
-            found += [look for look in drawn if look.alpha > 0]
+            found += [appearance for appearance in drawn if appearance.alpha > 0]
         else:
             found.append(Appearance(geom, model))
     return found
@@ -95,10 +96,14 @@ def varied_geoms(
 ) -> dict[int, tuple[int, ...]]:
     """Return the geoms that differ from world to world, with the ids of the materials that they may have.
 
-    A geom whose size or colour differs has no ids.
+    A geom for which `varied` lists no materials has no ids.
+
+    seen: ids of the visible geoms
+    varied: names of the geoms, or names of the materials of each geom by its name
 
     Raises:
-        ValueError: no visible geom or material has this name, or its reflectance is a measured spectrum.
+        ValueError: no visible geom or no material has a name in `varied`, or a geom without listed materials has a
+            measured spectrum.
     """
     known = {model.geom(g).name: g for g in seen if model.geom(g).name}
     found = {}

@@ -55,7 +55,7 @@ def require_modest(text: str, name: str) -> None:
 def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset()) -> None:
     """Check a file, and all files that it includes, as `require_modest` does.
 
-    Every existing file that it names must be a regular file, since MuJoCo would wait for a pipe forever.
+    Every existing file that is named in these files must be a regular file, since MuJoCo would wait for a pipe forever.
 
     Raises:
         ValueError: there are too many elements or cells, or a file is not regular. The message names the cause.
@@ -81,7 +81,7 @@ def require_finite(model: mujoco.MjModel, name: str) -> None:
     """Refuse a model with a position, size or colour that is not finite.
 
     Raises:
-        ValueError: an element is refused; the message names it.
+        ValueError: a value is not finite; the message names its element.
     """
     for key in PLACES:
         wrong = ~np.isfinite(getattr(model, key)).all(axis=1)

@@ -33,7 +33,10 @@ def is_open(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def mirror_share(model: mujoco.MjModel, geom: int) -> float:
-    """Return the fraction of the light that a plane or the top of a box reflects as a mirror."""
+    """Return the fraction of the light that a plane or the top of a box reflects as a mirror.
+
+    The result is 0 for other geoms, and for geoms that are not opaque.
+    """
     material = model.geom_matid[geom]
     flat = surfaces.geom_type(model, geom) in (_TYPES.mjGEOM_PLANE, _TYPES.mjGEOM_BOX)
     if material < 0 or not flat or surfaces.rgba(model, geom)[3] < _OPAQUE:
@@ -52,8 +55,12 @@ def bsdf(
 
     It is two-sided for planes and meshes, which may be open, and transparent according to the alpha of the geom's rgba.
 
+    to_uv: matrix from the shape's texture coordinates to MuJoCo's, (3, 3); None: they are equal
     measured: a reflectance that replaces the geom's colour
     mirrors: True if the material's mirror reflection is included
+
+    Raises:
+        ValueError: the geom has a measured reflectance and a texture that is not grey.
     """
     if measured is None:
         description = _matter(model, geom, surfaces.reflectance_texture(model, geom, to_uv))
@@ -74,7 +81,7 @@ def bsdf(
 def matt(
     model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None, measured: Spectrum | None = None
 ) -> MitsubaObject:
-    """Return the Lambertian, opaque part of a geom's BSDF, two-sided."""
+    """Return the Lambertian, opaque part of a geom's BSDF, two-sided; see `bsdf` for arguments and errors."""
     if measured is None:
         color = surfaces.reflectance_texture(model, geom, to_uv)
         description: Description = {"type": "diffuse", "reflectance": color}
@@ -132,7 +139,14 @@ def _measured(
     spectrum: Spectrum,
     matter: Callable[[mujoco.MjModel, int, Description], Description],
 ) -> Description:
-    """Return the Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one."""
+    """Return the Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one.
+
+    to_uv: see `bsdf`
+    matter: function that returns the BSDF of the geom's material with a given colour
+
+    Raises:
+        ValueError: the texture is not grey.
+    """
     whole = matter(model, geom, spectra.described(spectrum))
     texture = surfaces.texture_id(model, geom)
     if texture < 0 or not surfaces.is_mirrored(model, geom, texture):

@@ -22,8 +22,8 @@ from sim.scene.variant import MitsubaObject
 class Viewpoint:
     """A pinhole camera.
 
-    position: (3,) [m]
-    rotation: (3, 3), in MuJoCo's camera frame (x right, y up, looking along -z)
+    position: centre of projection [m], (3,)
+    rotation: the camera's axes as columns, (3, 3): x to the right, y up, and z backwards, as in MuJoCo
     fovy_deg: vertical field of view [deg]
     """
 
@@ -33,7 +33,13 @@ class Viewpoint:
 
     @staticmethod
     def looking_at(origin: np.ndarray, target: np.ndarray, fovy_deg: float = 45.0) -> Viewpoint:
-        """Return a viewpoint at `origin` that looks at `target` [m], with z up (y up if the direction is vertical)."""
+        """Return a viewpoint at `origin` that looks at `target` [m], with z up (y up if the direction is vertical).
+
+        `origin` and `target` are points (3,), which must differ.
+
+        Raises:
+            ValueError: `origin` or `target` does not consist of real numbers.
+        """
         origin, target = reals("origin", origin), reals("target", target)
         back = origin - target
         back /= np.linalg.norm(back)
@@ -43,7 +49,7 @@ class Viewpoint:
         return Viewpoint(origin, rotation, fovy_deg)
 
     def rays(self, width: int, height: int) -> np.ndarray:
-        """Return directions through the centres of the pixels, of unit depth along the axis, (y, x, 3)."""
+        """Return directions in the world through the pixels' centres, of unit depth along the axis, (y, x, 3)."""
         half = np.tan(np.radians(self.fovy_deg) / 2)
         y, x = np.indices((height, width))
         across, up = (2 * (x + 0.5) - width) / height * half, (1 - 2 * (y + 0.5) / height) * half
@@ -51,7 +57,7 @@ class Viewpoint:
 
 
 def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | PoseSnapshot, camera: str | int | Viewpoint) -> Viewpoint:
-    """Return the current viewpoint of a camera of the model.
+    """Return the current viewpoint of a camera of the model; a `Viewpoint` is returned unchanged.
 
     Raises:
         ValueError: the camera is unknown, or its projection is not a plain perspective.
@@ -68,7 +74,10 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | PoseSnapshot, camera:
 
 
 def sensor(view: Viewpoint, width: int, height: int, near: float) -> MitsubaObject:
-    """Return a Mitsuba perspective sensor (of the active variant) of width x height pixels."""
+    """Return a Mitsuba perspective sensor (of the active variant) of width x height pixels.
+
+    near: distance of the near clipping plane [m]
+    """
     matrix = np.eye(4)
     matrix[:3, :3] = view.rotation @ np.diag([-1.0, 1.0, -1.0])
     matrix[:3, 3] = view.position

@@ -29,7 +29,7 @@ ALIGNED = 0.999  # smallest cosine between the normals of coincident surfaces
 class Coincidences:
     """Geoms whose surfaces coincide.
 
-    pairs: ids of two geoms; the geom that is defined later comes second
+    pairs: ids of the two geoms of each pair; the geom that is defined later comes second
     lifts: distances by which surfaces are moved outwards [m], by geom; others are not moved
     """
 
@@ -56,7 +56,7 @@ class Coincidences:
 
 
 def coincidences(data: mujoco.MjData, geoms: Sequence[int]) -> Coincidences:
-    """Return which of these geoms are in the same place in this pose."""
+    """Return which of these geoms have coinciding surfaces in the poses of `data`."""
     model, pairs, lifts = data.model, [], dict[int, float]()
     near = list(_near(data, sorted(int(geom) for geom in geoms)))
     samples = {geom: _points(data, geom) for geom in {geom for pair in near for geom in pair}}
@@ -115,7 +115,11 @@ def _points(data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom: int, apart: float) -> bool:
-    """Return whether any of the points is closer than `apart` to a geom's surface, and the normals there are equal."""
+    """Return whether any of the points is closer than `apart` to a geom's surface, and the normals there are equal.
+
+    points, normals: points of another surface [m], and its normals there, unit vectors, in the world's frame, (n, 3)
+    apart: distance [m]
+    """
     model, turn = data.model, data.geom_xmat[geom].reshape(3, 3)
     kind, box = surfaces.geom_type(model, geom), model.geom_aabb[geom]
     local = (points - data.geom_xpos[geom]) @ turn
@@ -134,7 +138,12 @@ def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom:
 def _ray_distance(
     data: mujoco.MjData, geom: int, kind: mujoco.mjtGeom, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
 ) -> float:
-    """Return the distance of a geom along a ray, negative for a miss, and write the normal there to `normal`."""
+    """Return the distance [m] of a geom along a ray, and write the normal there to `normal`; negative for a miss.
+
+    kind: type of the geom
+    start, direction: start of the ray [m], and its direction, a unit vector, in the world's frame, (3,)
+    normal: array (3,) that receives the surface's unit normal
+    """
     if kind == _TYPES.mjGEOM_MESH:
         return float(mujoco.mj_rayMesh(data.model, data, geom, start, direction, normal))
     if kind == _TYPES.mjGEOM_SDF:  # MuJoCo ends the process if it casts a ray at the mesh of a signed distance field

@@ -23,6 +23,8 @@ def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:
 
     Each band represents the wavelengths that are nearer to it than to other bands. With few bands the colours are
     approximate.
+
+    wavelengths_nm: centres of the bands [nm], (band,)
     """
     from optics.spectra.bands import cie_1931, daylight
 

@@ -41,6 +41,8 @@ def padded(pixels: np.ndarray) -> np.ndarray:
 def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uniform: bool) -> np.ndarray:
     """Return the directions of MuJoCo's cube texture lookups, (n, 3), for points (n, 3) in a geom's frame.
 
+    kind: type of the geom
+    uniform: True if the material has `texuniform`
     size: half sizes (3,) along x, y, z; for a capsule, those of its cylindrical side. On a capsule's caps, the distance
         beyond the end of the side is divided by the radius.
     """
@@ -104,7 +106,11 @@ def _face_of(pieces: np.ndarray) -> np.ndarray:
 
 
 def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
-    """Return the triangles, cut into two or three if `side` (triangle, corner) changes its sign."""
+    """Return the triangles, cut into two or three if `side` changes its sign within a triangle.
+
+    pieces: values at the corners of each triangle, (triangle, corner, value), interpolated where a triangle is cut
+    side: linear function that is 0 on the seam and changes its sign there, at the corners, (triangle, corner)
+    """
     side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
     crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)
     whole, cut, side = pieces[~crossed], pieces[crossed], side[crossed]

@@ -20,10 +20,12 @@ from optics.numerics.precision import aligned
 class SharedBuffer:
     """NumPy memory that kernels read directly.
 
-    LLVM's kernels receive it once, because passing it at every launch would take longer than rendering a small world. A
-    GPU has its own memory and receives a copy at every access.
+    LLVM's kernels receive the memory once, because passing it at every launch would take longer than rendering a small
+    world. A GPU has its own memory and receives a copy at every access.
 
-    values: flat; must not be written to while a kernel reads them
+    n: number of values
+    kind: type of the array on the device (float32, uint32 or uint64); None: mi.Float
+    values: attribute, the values (n,), which must not be changed while a kernel reads them
     """
 
     def __init__(self, n: int, kind: Any = None) -> None:
@@ -101,8 +103,8 @@ def counted(n: int) -> Array:
     """Return 0 ... n - 1 in separate memory, which sets the width of a frozen kernel that reads it lane by lane.
 
     If a kernel reads only tables, Dr.Jit 1.5 derives the kernel's width from one of them. Which table it uses depends
-    on the state of the process. In one case it replayed 126 of 128 lanes, and left the last receptors dark without a
-    message. tests/test_parameters.py repeats each training run and detects this error.
+    on the state of the process. In one case, Dr.Jit replayed 126 of 128 lanes, and left the last receptors dark without
+    a message. tests/test_parameters.py repeats each training run and detects this error.
     """
     found = dr.arange(mi.UInt32, n)
     dr.eval(found)

@@ -34,7 +34,7 @@ class FrozenKernel:
         self._frozen: Any = dr.freeze(recorded)
 
     def __call__(self, scenes: Any, moving: Any, fixed: Any) -> Any:
-        """Launch the kernel."""
+        """Launch the kernel, and return its output arrays; the first call records it."""
         if moving is not self._moving or fixed is not self._fixed:
             self._moving, self._fixed = moving, fixed
             self._arrays = _arrays_of(moving) + _arrays_of(fixed)
@@ -73,7 +73,8 @@ def _with_arrays(inputs: Any, arrays: Iterator[Array]) -> Any:
 class GarbageKept:
     """Context that suspends Python's garbage collection.
 
-    If it freed another renderer's kernels or scene during the recording of a kernel, Dr.Jit would abort the process.
+    If the collection freed another renderer's kernels or scene while a kernel is recorded, Dr.Jit would abort the
+    process.
     """
 
     def __enter__(self) -> None:

@@ -84,7 +84,11 @@ def _others(model: mujoco.MjModel, groups: Sequence[int]) -> list[str]:
 
 
 def _alpha(model: mujoco.MjModel, rgba: np.ndarray, material: np.ndarray) -> np.ndarray:
-    """Return the alpha of each element by MuJoCo's rule: that of its own colour if set, else that of its material."""
+    """Return the alpha of each element by MuJoCo's rule: that of its own colour if set, else that of its material.
+
+    rgba: colours of the elements, (n, 4)
+    material: ids of their materials, (n,); -1: no material
+    """
     unset = (rgba == np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)).all(axis=1) & (material >= 0)
     return np.where(unset, model.mat_rgba[material, 3] if model.nmat else 1.0, rgba[:, 3])
 

@@ -39,6 +39,7 @@ _UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 
 class Emitter:
     """A light, whose position and direction follow the data.
 
+    name: name in Mitsuba's scene
     light: id in the model; -1: not one of the model's lights (the camera's headlight, the sky)
     description: Mitsuba's description of the light, with shadows
     casts_shadow: False for the headlight, as in MuJoCo
@@ -83,7 +84,9 @@ def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) ->
 def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: Spectrum | None) -> Description | None:
     """Return the radiance of a geom with an emissive material; None if the geom does not glow.
 
-    It is the material's emission times the radiance that the geom would have in full daylight.
+    The radiance is the material's emission times the radiance that the geom would have in full daylight.
+
+    to_uv, measured: see `sim.scene.bsdfs.bsdf`
     """
     material = model.geom_matid[geom]
     if material < 0 or model.mat_emission[material] <= 0:
@@ -140,13 +143,17 @@ def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tu
 
 
 def pose(data: mujoco.MjData, light: int) -> MitsubaObject:
-    """Return Mitsuba's to_world of a light: at its position, +z along its direction."""
+    """Return Mitsuba's `to_world` of a light: the origin is the light's position, and +z points along its direction."""
     origin, direction = data.light_xpos[light], data.light_xdir[light]
     return aimed(origin, direction)
 
 
 def aimed(origin: np.ndarray, direction: np.ndarray) -> MitsubaObject:
-    """Return a to_world with +z along `direction`; the rotation about it does not matter for a light."""
+    """Return a `to_world` for Mitsuba with +z along `direction`; the rotation about this axis is arbitrary.
+
+    origin: position of the light [m], (3,)
+    direction: direction in which the light shines, of any length, (3,)
+    """
     z = direction / np.linalg.norm(direction)
     x = np.cross([1.0, 0, 0] if abs(z[0]) < 0.9 else [0, 1.0, 0], z)
     x /= np.linalg.norm(x)
@@ -192,7 +199,10 @@ def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: S
 
 
 def _profile(cutoff_deg: float, exponent: float) -> Description:
-    """Return the image that a spot projects over its cone: cos(θ)**exponent at the angle θ to its axis."""
+    """Return the image that a spot projects over its cone: cos(θ)**exponent at the angle θ to its axis.
+
+    cutoff_deg: angle between the cone's axis and its side [degrees]
+    """
     tangent = np.tan(np.radians(cutoff_deg)) * (2 * (np.arange(_PROFILE) + 0.5) / _PROFILE - 1)
     cosine = 1 / np.sqrt(1 + tangent[:, None] ** 2 + tangent[None, :] ** 2)
     bitmap = mi.Bitmap(np.ascontiguousarray(cosine**exponent, dtype=np.float32)[..., None])

@@ -56,14 +56,14 @@ def is_linear(model: mujoco.MjModel, texture: int) -> bool:
 
 
 def resolved(model: mujoco.MjModel) -> list[int]:
-    """Return the colour textures that the model declares as linear, although their values are display colours."""
+    """Return the indices of colour textures that are declared as linear, although they contain display colours."""
     sky = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     colors = {*sky.tolist(), *model.mat_texid[:, _ROLES].ravel().tolist()} - {-1}
     return [k for k in sorted(colors) if model.tex_colorspace[k] == _LINEAR and not is_linear(model, k)]
 
 
 def request(spec: mujoco.MjSpec, textures: Iterable[int]) -> mujoco.MjSpec:
-    """Return a copy of a specification that requests linear light for these textures."""
+    """Return a copy of a specification that requests linear light for the textures with these indices."""
     found = spec.copy()
     for k in textures:
         found.textures[k].colorspace = _LINEAR
@@ -71,7 +71,11 @@ def request(spec: mujoco.MjSpec, textures: Iterable[int]) -> mujoco.MjSpec:
 
 
 def _marked(model: mujoco.MjModel) -> set[int]:
-    """Return the textures that are marked as linear."""
+    """Return the indices of the textures that are marked as linear.
+
+    Raises:
+        ValueError: a mark lists an object that is not a texture.
+    """
     found = set[int]()
     for k in range(model.ntuple):
         if not (name := model.tuple(k).name).endswith(MARK):

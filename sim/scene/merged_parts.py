@@ -37,6 +37,6 @@ def merged(parts: Iterable[PlacedPart], prefix: str) -> Description:
 
 
 def _placed(triangles: Triangles, pose: np.ndarray) -> Triangles:
-    """Return triangles transformed from a geom's frame to the world's."""
+    """Return triangles transformed from a geom's frame to the world's; pose: the geom's frame, (4, 4)."""
     normals = None if triangles.normals is None else triangles.normals @ pose[:3, :3].T
     return replace(triangles, vertices=triangles.vertices @ pose[:3, :3].T + pose[:3, 3], normals=normals)

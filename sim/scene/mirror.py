@@ -47,7 +47,7 @@ def mirror(
     data: initial poses; None: the model's reference pose
     bodies: names of the bodies whose geoms are included ("world" is the static body); None: all bodies
     groups: visible geom groups; a geom with alpha 0 is never visible
-    variant: a spectral Mitsuba variant; None: the device's. scalar_spectral runs without LLVM, but slowly.
+    variant: a spectral Mitsuba variant; None: that of this machine. "scalar_spectral" runs without LLVM, but slowly.
     spectra: reflectances of materials and emission of lights, by name, which replace their colours. Values are
         `optics.Spectrum`, or names accepted by `optics.reflectance` and `optics.illuminant`. "headlight" is the name of
         the camera's light: {"headlight": "A"}
@@ -55,8 +55,8 @@ def mirror(
     A MirrorWarning lists features that have no counterpart.
 
     Raises:
-        ValueError: the model does not compile or has no visible geoms, a body is unknown, the variant has no spectra,
-            or `spectra` contains names that the model does not have.
+        ValueError: the model does not compile or has no visible geoms, a body is unknown, `sync` would refuse the data,
+            the variant has no spectra, or `spectra` names an unknown material or one with a coloured texture.
     """
     return Mirror(
         source.load(model), data, bodies=bodies, groups=groups, variant=variant or default_variant(), spectra=spectra
@@ -64,7 +64,7 @@ def mirror(
 
 
 class Mirror:
-    """A Mitsuba scene that mirrors a MuJoCo model.
+    """A Mitsuba scene that mirrors a MuJoCo model, built by `mirror`.
 
     model, variant: see `mirror`
     scene: mi.Scene; shape ids are "geom_<geom id>_<part>"
@@ -113,7 +113,7 @@ class Mirror:
         A scene in which nothing moved is not rebuilt.
 
         Raises:
-            ValueError: the data belong to another model, or a position is not finite.
+            ValueError: the data belong to another model, contain no poses yet, or a pose is not finite.
         """
         self._places = PoseSnapshot.from_data(_checked(self.model, data))
         with in_variant(self.variant):
@@ -128,7 +128,7 @@ class Mirror:
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
-        """Return the BSDF of a geom, even if it is not in the scene."""
+        """Return the BSDF of a geom, even if it is not in the scene; KeyError if the model has no such geom."""
         index = self.model.geom(geom).id
         with in_variant(self.variant):
             return self._bsdf(index)
@@ -146,19 +146,20 @@ class Mirror:
     ) -> np.ndarray:
         """Return the spectral radiance at `wavelengths` [m], (band, y, x) float32, averaged over each pixel's square.
 
+        Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
+
         camera: name or id of a camera of the model, or a Viewpoint
-        integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
+        width, height: size of the image [pixels]
+        integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}.
+            "direct" shows only emitters behind a transparent geom; a MirrorWarning names such geoms once.
         spp: samples per pixel
         seed: seed of the samples
         sampler: "independent", or "multijitter", which has less noise in images
 
-        Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
-
-        "direct" does not show what is behind a transparent geom; a MirrorWarning names such geoms once.
-
         Raises:
-            ValueError: the camera is unknown, there is less than one pixel or sample, a wavelength is outside 300 to
-                780 nm, or Mitsuba would apply the integrator or the sampler incorrectly.
+            ValueError: the camera is unknown or no plain perspective, the integrator is unknown, there is less than one
+                pixel or sample, a wavelength is outside 300 to 780 nm, or Mitsuba would apply an argument incorrectly.
+            RuntimeError: Mitsuba has no such sampler.
         """
         view = self.viewpoint(camera)
         rays.check_size(width, height, spp)
@@ -180,15 +181,15 @@ class Mirror:
         self._has_warned_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
-        """Return the viewpoint of a camera of the model at the last `sync`."""
+        """Return the viewpoint of a camera of the model at the last `sync`; errors are those of `cameras.viewpoint`."""
         return cameras.viewpoint(self.model, self._places, camera)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
-        """Return the id of the geom visible at the centre of each pixel, (y, x) int32, -1 for none."""
+        """Return the id of the geom visible at each pixel's centre, (y, x) int32, -1 for none. Errors: see `render`."""
         return self._first_hits(camera, width, height)[0]
 
     def render_depth(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
-        """Return the depth along the camera's axis [m] at the centre of each pixel, (y, x) float32, inf for none."""
+        """Return the depth along the camera's axis [m] at each pixel's centre, (y, x) float32; infinite for no geom."""
         return self._first_hits(camera, width, height)[1]
 
     def _first_hits(self, camera: str | int | Viewpoint, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
@@ -223,7 +224,7 @@ class Mirror:
         return mi.load_dict(description)
 
     def _glow(self, geom: int) -> Description | None:
-        """Return the emission of a geom with an emissive material."""
+        """Return the radiance of a geom with an emissive material; None if the geom does not glow."""
         to_uv = shapes.uv_transform(self.model, geom)
         return lights.glow(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
 
@@ -283,7 +284,7 @@ def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
 
 
 def _checked(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """Return the data if they belong to this model and all their poses are finite."""
+    """Return the data if they belong to this model and all their poses are finite; otherwise raise a ValueError."""
     if data.geom_xpos.shape != (model.ngeom, 3) or data.xpos.shape != (model.nbody, 3):
         raise ValueError(
             f"mirror: data has {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies, but the model has "

@@ -16,7 +16,7 @@ _STRUCTS = ("opt", "stat")
 
 
 class ModelSettings:
-    """Current settings of one model."""
+    """Current settings of one model: the values of all fields that physics uses (see the module's docstring)."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         fields = [("", model), *((f"{name}.", getattr(model, name)) for name in _STRUCTS)]

@@ -1,7 +1,4 @@
-"""Snapshot of a model when its renderer is built.
-
-It refuses worlds that differ in ways that the renderer cannot show.
-"""
+"""Snapshot of a renderer's model, which refuses worlds that differ in ways that the renderer cannot show."""
 
 from __future__ import annotations
 
@@ -28,11 +25,12 @@ _THINGS = (
 class ModelSnapshot:
     """The state of a model when its renderer was built. Arrays are copies, since tasks may change the model later.
 
-    geoms: visible geoms
-    hidden: geoms that are invisible only because their alpha is 0
-    moving: geoms that the renderer can show in any pose
-    resizable: geoms whose sizes may differ
-    varied: geoms that may differ, with the ids of the materials that each may have (`appearances.varied_geoms`)
+    geoms: ids of the visible geoms
+    hidden: ids of the geoms that are invisible only because their alpha is 0
+    moving: ids of the geoms that the renderer can show in any pose
+    resizable: ids of the geoms whose sizes may differ
+    varied: ids of the geoms that may differ, with the ids of the materials that each may have
+        (`appearances.varied_geoms`)
     """
 
     def __init__(
@@ -78,7 +76,7 @@ class ModelSnapshot:
         """Refuse worlds that differ from the model in a way that the renderer cannot show.
 
         Raises:
-            ValueError: there is such a difference.
+            ValueError: a world differs in such a way; the message names the element.
         """
         self._refuse_other_materials(poses)
         for what, name in (("size", "geom_size"), ("colour", "geom_rgba"), ("material", "geom_matid")):

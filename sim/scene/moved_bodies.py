@@ -72,6 +72,7 @@ class ReferencePose:
 class MovedBodies(Poses):
     """Poses of worlds in which all bodies are in the reference pose, except the moved ones.
 
+    reference: the model in its reference pose, and the ids of the moved bodies
     positions: positions of the moved bodies [m], (world, body, 3)
     rotations: rotations of the bodies that may turn, which are the first ones, (world, turning body, 3, 3)
     models: models of all worlds, if their sizes, colours or materials differ; None: as in the renderer's model

@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class PoseSnapshot:
-    """Copies of the fields of mjData with these names: positions [m] (n, 3), directions (n, 3) and rotations (n, 9)."""
+    """Copies of some fields of mjData: positions [m] (n, 3), directions (n, 3) and rotations (n, 9)."""
 
     geom_xpos: np.ndarray
     geom_xmat: np.ndarray

@@ -43,20 +43,23 @@ HEADLIGHT = ("active", "diffuse")
 
 @dataclass(frozen=True)
 class Poses:
-    """Positions [m] (world, element, 3) and rotations (world, element, 3, 3), as in mjData after mj_forward.
+    """Positions [m], (world, element, 3), and rotations, (world, element, 3, 3), as in mjData after mj_forward.
 
-    geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat: of geoms, sites and cameras
-    xpos, xmat: of bodies
+    geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat: positions and rotations of geoms, sites and cameras
+    xpos, xmat: positions and rotations of bodies
     light_xpos, light_xdir: positions and directions of lights
 
-    The other arrays are from each world's mjModel. None: as in the renderer's model.
+    The other arrays contain values of each world's mjModel. An array that is None is the same as in the renderer's
+    model.
 
-    geom_size: (world, geom, 3)
-    geom_rgba: (world, geom, 4)
-    geom_matid: (world, geom)
-    mat_rgba, mat_emission, light_diffuse, light_active: as in mjModel, for each world
-    heights: a checksum of each height field's many heights, (world, hfield)
+    geom_size, geom_rgba, geom_matid: sizes [m], colours and materials of geoms, (world, geom, 3), (world, geom, 4) and
+        (world, geom)
+    mat_rgba, mat_emission, light_diffuse, light_active: properties of materials and lights; the first axis is the world
+    heights: a checksum of the heights of each height field, (world, hfield)
     others: a checksum of each field in OTHERS and in HEADLIGHT, (world, field)
+
+    Raises:
+        ValueError: an array has half precision or less.
     """
 
     geom_xpos: np.ndarray
@@ -101,7 +104,7 @@ class Poses:
 
     @classmethod
     def joined(cls, *parts: Poses) -> Poses:
-        """Concatenate the worlds of several poses."""
+        """Return the poses of the worlds of all parts together."""
         found: dict[str, list[Any]] = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
         joined: dict[str, Any] = {n: None if each[0] is None else np.concatenate(each) for n, each in found.items()}
         return cls(**joined)
@@ -118,12 +121,13 @@ class Poses:
     def geom_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
         """Return the rotations of these geoms, (world, geom, 3, 3).
 
-        The result may be shared. If no geom turns, it may be (1, geom, 3, 3), and the same object at every call.
+        The result may share memory with the poses. If no geom turns, it may be (1, geom, 3, 3), and the same object at
+        every call.
         """
         return self.geom_xmat[:, geoms]
 
     def take(self, worlds: np.ndarray) -> Poses:
-        """Return the poses of these worlds only."""
+        """Return the poses of the worlds with these indices."""
         arrays: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         taken: dict[str, Any] = {name: None if array is None else array[worlds] for name, array in arrays.items()}
         return Poses(**taken)
@@ -141,7 +145,7 @@ def of_models(models: Sequence[mujoco.MjModel], name: str) -> np.ndarray:
     """Return the field `name`, one of OF_MODELS, from the current state of these models, (world, ...)."""
     if all(model is models[0] for model in models):
         field = of_model(models[0], name).copy()  # copied, since the model may be changed later
-        # A quarter of the time of np.broadcast_to
+        # This takes a quarter of the time of np.broadcast_to.
         return np.ndarray((len(models), *field.shape), field.dtype, field, strides=(0, *field.strides))
     return np.stack([of_model(model, name) for model in models])
 

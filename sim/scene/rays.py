@@ -26,6 +26,7 @@ NESTED = 64  # limit for the number of nested bodies that contain a camera
 
 
 def check_size(width: int, height: int, spp: int) -> None:
+    """Raise a ValueError if the width, the height or the number of samples per pixel is less than 1."""
     for name, value in (("width", width), ("height", height), ("spp", spp)):
         if value < 1:
             raise ValueError(f"{name} = {value}: must be at least 1")
@@ -81,6 +82,10 @@ class Camera:
         sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel. Its noise is lower
             than the standard error of independent samples. It is not available in scalar variants, or for an spp that
             it would round.
+
+        Raises:
+            ValueError: the integrator is unknown, Mitsuba would apply it incorrectly, or the sampler is not available.
+            RuntimeError: Mitsuba has no such sampler.
         """
         width, height = self.size
         method = _integrator(integrator)
@@ -99,9 +104,9 @@ class Camera:
         return np.concatenate(bands).reshape(-1, height, width).astype(np.float32)
 
     def first_hits(self) -> tuple[list[str], np.ndarray]:
-        """Return the name of the shape visible at each pixel's centre, and the hit points (n, 3).
+        """Return the name of the shape visible at each pixel's centre, and the hit points [m], (n, 3), row by row.
 
-        The names are listed row by row, with "" where no shape is visible.
+        Where no shape is visible, the name is "" and the point is not finite.
         """
         width, height = self.size
         y, x = (a.ravel() for a in np.indices((height, width)))

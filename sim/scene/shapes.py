@@ -32,7 +32,7 @@ _ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF, _TYPES.mjGEOM_HFIELD)
 
 
 # Half side of an infinite plane in units of the model's extent. An eye one extent above the plane sees its edge 1e-4
-# rad below the horizon, and float32 is accurate to 1e-3 of an extent for texture and shadows on it. (Hits on triangles
+# rad below the horizon, and float32 is accurate to 1e-3 of an extent for texture and shadows there. (Hits on triangles
 # of this size would be wrong; see also LONG.)
 INFINITY = 1e4
 # Largest ratio of a plane's sides for which it is a single rectangle. Embree's hit points on a rectangle have an error
@@ -61,11 +61,12 @@ class Part:
         return {"to_world": mi.Transform4f((pose @ self.local).tolist())}
 
     def vertices(self, pose: np.ndarray) -> np.ndarray:
-        """Return the vertices in the world, flat float32."""
+        """Return the vertices in the world [m] at a geom's pose (4, 4), flat float32."""
         assert self.triangles is not None
         return as_floats(self.triangles.vertices @ pose[:3, :3].T + pose[:3, 3])
 
     def normals(self, pose: np.ndarray) -> np.ndarray:
+        """Return the vertex normals in the world at a geom's pose (4, 4), flat float32."""
         assert self.triangles is not None
         assert self.triangles.normals is not None
         return as_floats(self.triangles.normals @ pose[:3, :3].T)
@@ -86,6 +87,7 @@ def has_shape(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def is_textured(model: mujoco.MjModel, geom: int) -> bool:
+    """Return whether a texture is visible on a geom."""
     texture = surfaces.texture_id(model, geom)
     return texture >= 0 and surfaces.is_mirrored(model, geom, texture)
 
@@ -97,7 +99,7 @@ def _is_cubic(model: mujoco.MjModel, geom: int) -> bool:
 def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
     """Return the matrix (3, 3) from a shape's Mitsuba texture coordinates to MuJoCo's, including repeats.
 
-    None if the triangles already have MuJoCo's coordinates, or if no texture needs them.
+    Return None if the triangles already have MuJoCo's coordinates, or if no texture needs them.
     """
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if not is_textured(model, geom) or _is_cubic(model, geom):
@@ -144,7 +146,7 @@ def parts(model: mujoco.MjModel, geom: int, lift: float = 0.0) -> list[Part]:
 
 
 def lifted_size(kind: mujoco.mjtGeom, lift: float) -> np.ndarray:
-    """Return the increase of MuJoCo's sizes of a primitive (3,) if its surface is moved outwards."""
+    """Return the increase of MuJoCo's sizes of a primitive (3,) if its surface is moved outwards by `lift` [m]."""
     return lift * np.array([1, kind != _TYPES.mjGEOM_CAPSULE, 1])
 
 
@@ -189,7 +191,7 @@ def _wrapped(model: mujoco.MjModel, geom: int, triangles: Triangles, size: np.nd
 
 
 def half_sizes(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """Return the half sizes along x, y, z that MuJoCo's renderer uses."""
+    """Return the half sizes along x, y, z that MuJoCo's renderer uses [m], (3,)."""
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if kind == _TYPES.mjGEOM_SPHERE:
         return np.repeat(size[0], 3)
@@ -199,7 +201,10 @@ def half_sizes(model: mujoco.MjModel, geom: int) -> np.ndarray:
 
 
 def _plane(sides: np.ndarray, height: float) -> Part:
-    """Return a plane with these half sides; its texture coordinates are those of Mitsuba's rectangle."""
+    """Return a plane with these half sides [m], (2,); its texture coordinates are those of Mitsuba's rectangle.
+
+    height: distance by which the plane is moved along its normal [m]
+    """
     if sides.max() > LONG * sides.min():
         return Part(triangles=tessellation.strip(sides).lifted(height))
     return Part("rectangle", _placed(sides[0], sides[1], 1.0, z=height))
@@ -222,7 +227,11 @@ def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:
 
 
 def build(part: Part, pose: np.ndarray, name: str, bsdf: MitsubaObject, radiance: Description | None) -> MitsubaObject:
-    """Return the Mitsuba shape (of the active variant) of a part, as an emitter if `radiance` is not None."""
+    """Return the Mitsuba shape (of the active variant) of a part, as an emitter if `radiance` is not None.
+
+    pose: frame of the part's geom in the world, (4, 4)
+    name: id of the shape in Mitsuba
+    """
     if part.triangles is None:
         assert part.local is not None
         placed = mi.ScalarTransform4f((pose @ part.local).tolist())

@@ -20,7 +20,7 @@ def load(source: Source) -> mujoco.MjModel:
     """Return the model of an MjModel, an MjSpec, a file (MJCF, URDF or MJB), or MJCF text (which starts with "<").
 
     Raises:
-        ValueError: the source does not give a model; one line names it.
+        ValueError: the source does not give a model; the message is one line that names the source and the reason.
     """
     if isinstance(source, mujoco.MjModel):
         return source
@@ -36,7 +36,7 @@ def specification(source: mujoco.MjSpec | str | Path) -> mujoco.MjSpec:
     It is a copy of an MjSpec, or is read from a file (MJCF or URDF) or from MJCF text.
 
     Raises:
-        ValueError: the source does not give a specification; one line names it.
+        ValueError: the source does not give a specification; the message is one line that names the source.
     """
     read, name = _specification(source)
     return _reported(read, name).copy()
@@ -66,7 +66,11 @@ def with_compiled_color_spaces(source: Source) -> Source:
 
 
 def _specification(source: mujoco.MjSpec | str | Path) -> tuple[Callable[[], mujoco.MjSpec], str]:
-    """Return a function that reads a specification, and the source's name in messages."""
+    """Return a function that reads a specification, and the source's name in messages.
+
+    Raises:
+        ValueError: the source has another type, or the file does not exist, or the text or file is too large.
+    """
     if isinstance(source, mujoco.MjSpec):
         return lambda: source, f"MjSpec {source.modelname!r}"
     if isinstance(source, str) and source.lstrip().startswith("<"):
@@ -89,7 +93,10 @@ def _checked(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjMo
 
 
 def _reported(make: Callable[[], Made], name: str) -> Made:
-    """Return the result of `make`, and report MuJoCo's errors in one line."""
+    """Return the result of `make`; raise an error of MuJoCo as a ValueError with a message of one line.
+
+    name: the source's name in messages
+    """
     try:
         return make()
     except (ValueError, mujoco.FatalError) as error:

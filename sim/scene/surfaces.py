@@ -23,9 +23,9 @@ _ROLES = mujoco.mjtTextureRole
 
 
 def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
-    """Return a geom's kind as an enum.
+    """Return a geom's kind as a member of the enum.
 
-    A comparison of NumPy's integer with the enum's members would work in one direction only.
+    NumPy's integer is converted, because comparing it with the enum's members works in one order only.
     """
     return mujoco.mjtGeom(int(model.geom_type[geom]))
 
@@ -75,7 +75,7 @@ def require_geoms(model: mujoco.MjModel, geoms: Sequence[int], where: str = "") 
 
 
 def texture_id(model: mujoco.MjModel, geom: int) -> int:
-    """Return the colour texture of a geom's material, -1 for none."""
+    """Return the index of the colour texture of a geom's material, -1 for none."""
     material = model.geom_matid[geom]
     if material < 0:
         return -1
@@ -88,8 +88,9 @@ def texture_id(model: mujoco.MjModel, geom: int) -> int:
 def texture_repeat(model: mujoco.MjModel, geom: int, size: np.ndarray) -> np.ndarray:
     """Return the texture's repeats (u, v) over a geom.
 
-    They are the material's repeats, multiplied by the geom's size along x and y if the material's texture is
-    uniform.
+    They are the material's repeats, multiplied by the geom's size along x and y if the material has `texuniform`.
+
+    size: half sizes of the geom, see `sim.scene.shapes.half_sizes`
     """
     material = model.geom_matid[geom]
     repeat = model.mat_texrepeat[material].astype(float)
@@ -126,7 +127,7 @@ def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray
 def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> Description:
     """Return the Mitsuba texture of a geom's reflectance.
 
-    to_uv: map from the shape's texture coordinates to MuJoCo's, (3, 3)
+    to_uv: matrix from the shape's texture coordinates to MuJoCo's, (3, 3); None: they are equal
     """
     color = rgba(model, geom)[:3]
     texture = texture_id(model, geom)
@@ -136,7 +137,10 @@ def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | No
 
 
 def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
-    """Return the repeating Mitsuba texture of an image (height, width, 1 or 3), row 0 at the top."""
+    """Return the repeating Mitsuba texture of a linear image (height, width, 1 or 3), row 0 at the top.
+
+    to_uv: matrix from the shape's texture coordinates to MuJoCo's, (3, 3); None: they are equal
+    """
     # A bitmap that is passed as an object has its first row at v = 0, as in MuJoCo. (Mitsuba would interpret a bitmap's
     # `data` as coefficients of spectra instead of RGB.)
     picture = mi.Bitmap(np.ascontiguousarray(values, dtype=np.float32))

@@ -88,10 +88,10 @@ _QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 def box(half_size: np.ndarray) -> Triangles:
     """Return a box around the origin.
 
-    half_size: half the lengths [m] along x, y and z, (3,)
-
     Faces ±x have (u, v) = (y, -z), faces ±y (x, -z), faces ±z (x, -y), each over [0, 1]. Opposite faces show mirror
     images of each other.
+
+    half_size: half the lengths [m] along x, y and z, (3,)
     """
     parts = []
     for axis, (u_axis, v_axis) in enumerate(((1, 2), (0, 2), (0, 1))):
@@ -111,6 +111,8 @@ def strip(half_sides: np.ndarray) -> Triangles:
     """Return a horizontal rectangle, divided into pieces along its longer side.
 
     Each piece is about as long as its distance from the middle. (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2).
+
+    half_sides: half lengths (sx, sy) of the sides [m], (2,)
     """
     short, long = np.sort(half_sides)
     ahead = np.geomspace(short, long, int(np.ceil(np.log2(long / short))) + 1)
@@ -124,12 +126,18 @@ def strip(half_sides: np.ndarray) -> Triangles:
 
 
 def ellipsoid(semi_axes: np.ndarray) -> Triangles:
-    """Return an ellipsoid: u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere before scaling."""
+    """Return an ellipsoid: u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere before scaling.
+
+    semi_axes: lengths of the semi-axes along x, y, z [m], (3,)
+    """
     return _revolved(*_arc(0, np.pi), scale=semi_axes, v=np.linspace(0, 1, STACKS + 1))
 
 
 def cylinder(radius: float, half_length: float) -> Triangles:
-    """Return a cylinder. Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2)."""
+    """Return a cylinder. Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2).
+
+    radius, half_length: radius r [m], and half of the length along z, h [m]
+    """
     side = _revolved(
         np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])
     )
@@ -149,8 +157,10 @@ def cylinder(radius: float, half_length: float) -> Triangles:
 def capsule(radius: float, half_length: float) -> Triangles:
     """Return a capsule.
 
-    Its side is as in a cylinder. Each cap has its own v = 0 ... 1: from the pole to the side at the top, and from the
-    side to the pole at the bottom.
+    Its side has the texture coordinates of a cylinder's side. On each cap, v runs from 0 to 1: from the pole to the
+    side at the top, and from the side to the pole at the bottom.
+
+    radius, half_length: radius [m], and half of the length of the cylindrical side along z [m]
     """
     side = _revolved(
         np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])
@@ -165,10 +175,9 @@ def capsule(radius: float, half_length: float) -> Triangles:
 def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
     """Return a mesh asset with one vertex per corner of each face.
 
-    This is necessary because normals and texture coordinates have separate indices.
-
-    As in MuJoCo's renderer, a corner of a mesh without texture gets the normal of its face if its own normal deviates
-    from it.
+    Vertices are not shared, because normals and texture coordinates have separate indices. As in MuJoCo's renderer, a
+    corner of a mesh without texture coordinates gets the normal of its face if its own normal deviates from it by more
+    than 37°.
     """
     faces = slice(model.mesh_faceadr[mesh_id], model.mesh_faceadr[mesh_id] + model.mesh_facenum[mesh_id])
     vertices = model.mesh_vert[model.mesh_face[faces].ravel() + model.mesh_vertadr[mesh_id]].astype(float)
@@ -207,7 +216,7 @@ def height_field(model: mujoco.MjModel, field: int) -> Triangles:
 
 
 def _wall(edge: np.ndarray, base: float) -> Triangles:
-    """Return the wall from an edge (n, 3) of the surface down to the base."""
+    """Return the wall from an edge (n, 3) of the surface down to the base, at z = -`base` [m]."""
     n = len(edge)
     foot = np.column_stack([edge[:, :2], np.full(n, -base)])
     i = np.arange(n - 1)
@@ -228,6 +237,10 @@ def _revolved(radius: np.ndarray, height: np.ndarray, scale: np.ndarray, v: np.n
     """Return the surface of revolution of the profile (radius, height), from top to bottom, scaled afterwards.
 
     The vertices of the seam are doubled, since u is 0 on one side of it and 1 on the other.
+
+    radius, height: profile of the unit shape, (n,)
+    scale: factors along x, y, z [m], (3,)
+    v: texture coordinate of each point of the profile, (n,)
     """
     azimuth = np.linspace(0, 2 * np.pi, SLICES + 1)
     circle = np.column_stack([np.cos(azimuth), np.sin(azimuth)])

@@ -50,9 +50,9 @@ def computed(*values: Any) -> None:
 def variant(name: str | None = None) -> Iterator[None]:
     """Set Mitsuba's variant inside the block, and restore the previous one, if any, afterwards.
 
-    name: the variant; None: that of the device
+    Mitsuba's own `mi.variant_context` fails if no variant was set before.
 
-    (`mi.variant_context` fails if no variant was set before.)
+    name: the variant; None: that of the device
 
     Raises:
         optics.BackendError: LLVM is requested and cannot run.

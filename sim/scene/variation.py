@@ -40,9 +40,10 @@ Drawn = float | np.ndarray | str
 class Variation:
     """Ranges of the quantities that differ between episodes.
 
-    ranges: (low, high) by name: "light", "color_temperature", and "NAME.size", "NAME.color" or "NAME.start" of objects.
-        For colours and points in space, low and high have three numbers each, and are opposite corners of a box. If low
-        = high, the value is the same in all episodes. "NAME.material": names of materials; one is drawn.
+    ranges: (low, high) by name: "light" (a factor of all lights), "color_temperature" of the light [K], and "NAME.size"
+        (a factor), "NAME.color" (display-referred, 0 to 1) or "NAME.start" ([m], or [rad] for a hinge) of objects. For
+        colours and points in space, low and high have three numbers each, and are opposite corners of a box. If low =
+        high, the value is the same in all episodes. "NAME.material": names of materials; one is drawn.
 
     Raises:
         ValueError: a name is unknown, or a range is invalid.
@@ -68,7 +69,7 @@ class Variation:
                 raise ValueError(f"vary: {name} = {given!r}: must be (low, high), low first")
 
     def draw(self, random: np.random.Generator) -> dict[str, Drawn]:
-        """Draw values for one episode.
+        """Draw values for one episode, by name.
 
         Factors are distributed uniformly in their logarithm. Temperatures are distributed uniformly in their reciprocal
         (mired), in which equal steps look equally large. Colours and places are uniform between their corners. All
@@ -118,8 +119,8 @@ class Variation:
     def light(self, values: Mapping[str, np.ndarray], wavelengths: np.ndarray) -> np.ndarray | None:
         """Return the factors of the lights, (world, band) float32; None if light does not vary.
 
-        values: values by name, for each world
-        wavelengths: [m]
+        values: drawn values by name, (world,)
+        wavelengths: centres of the bands [m], (band,)
         """
         if not self.of_light:
             return None
@@ -135,7 +136,7 @@ class Variation:
         """Return the factors of `light` at all combinations of the ends of its ranges, (case, band).
 
         They include the largest factor over all bands. In a single band, values inside the ranges may give a larger
-        factor, by a third for ranges from warm to cold light.
+        factor, which is up to a third larger for ranges from warm to cold light.
         """
         names = self.of_light
         ends = [self.ranges[name] for name in names]
@@ -180,10 +181,12 @@ def _check_names(name: str, given: Any) -> None:
 
 
 def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
-    """Return the transmission (band,) of a filter that changes the colour temperature of daylight to `kelvins`.
+    """Return the transmission (band,) of a filter that changes the colour temperature of daylight to `kelvins` [K].
 
-    It is the ratio of two Planck spectra, scaled to preserve the illuminance: that of a black body at `kelvins`, and
-    that of a black body at the temperature `DAYLIGHT`.
+    It is the Planck spectrum at `kelvins`, divided by the Planck spectrum at the temperature `DAYLIGHT`. The ratio is
+    scaled to preserve the illuminance.
+
+    wavelengths: centres of the bands [m], (band,)
     """
     seen = daylight(_VISIBLE) * cie_1931(_VISIBLE)[:, 1]
     scale = seen.sum() / (seen * _ratio(kelvins, _VISIBLE)).sum()
@@ -192,7 +195,7 @@ def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
-    """Return the ratio of the Planck spectra at `kelvins` and at DAYLIGHT, (band,)."""
+    """Return the ratio of the Planck spectra at the temperatures `kelvins` and DAYLIGHT [K], at wavelengths [m]."""
     x = h * c / (k * np.asarray(wavelengths))
     found: np.ndarray = np.expm1(x / DAYLIGHT) / np.expm1(x / kelvins)
     return found

@@ -31,15 +31,18 @@ _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 class WorldModels:
     """Models of `n` worlds.
 
-    given: source of the model
+    given: source of the model, see `sim.scene.source.load`; only needed if sizes differ
     model: the compiled model; worlds have copies of it
+    n: number of worlds
+    variation: ranges of the quantities that differ between worlds; None: nothing differs
     models: models of the worlds; a single one for all, unless `own` is True
     own: True if each world has its own model, because a quantity differs between worlds or a task changes the model
         (`separate`). Each episode then starts from the compiled model.
     varied: names of the geoms whose size, colour or material differs, with the materials that may be drawn
 
     Raises:
-        ValueError: the model has no such object, or one that cannot vary.
+        ValueError: `variation` names an object that the model lacks or that cannot vary, or sizes differ and the source
+            is a compiled model.
     """
 
     def __init__(self, given: Any, model: mujoco.MjModel, n: int, variation: Variation | None) -> None:
@@ -68,7 +71,7 @@ class WorldModels:
         self._settings = [ModelSettings(model) for model in self.models]
 
     def get_state(self, world: int) -> bytes:
-        """Return the current settings of a world's model that physics uses."""
+        """Return the current settings of a world's model, see `ModelSettings`."""
         return self._settings[world].to_bytes()
 
     def set_state(self, world: int, held: bytes) -> None:
@@ -106,7 +109,7 @@ class WorldModels:
         """Set a world's sizes, colours and materials, and reset all other fields of its model to the compiled values.
 
         Raises:
-            ValueError: a material is not one of the geom's.
+            ValueError: a drawn material is not one of the materials that may be drawn for the geom.
         """
         mine = self.models[world]
         if self.own and self.get_state(world) != self._compiled:
@@ -126,7 +129,11 @@ class WorldModels:
             getattr(data, where)[address] = drawn[name]
 
     def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
-        """Return the ids of the materials that may be drawn for a geom, by the names of the materials."""
+        """Return the ids of the materials that may be drawn for a geom, by the names of the materials.
+
+        Raises:
+            ValueError: the geom's colour is also varied or replaces that of its materials, or a material is unknown.
+        """
         assert variation is not None
         if geom in self._colors:
             raise ValueError(f"vary: {name} and {self._colors[geom]}: must be one of them; materials have colours")
@@ -138,8 +145,8 @@ class WorldModels:
         model, self._spec = self.model, _specification(given)
         for geom, name in self._sizes.items():
             drawn = self._materials.get(geom, ("", {}))[1].values()
-            looks = [in_material(model, geom, material).model for material in drawn] or [model]
-            if not all(is_resizable(look, geom) for look in looks):
+            variants = [in_material(model, geom, material).model for material in drawn] or [model]
+            if not all(is_resizable(variant, geom) for variant in variants):
                 raise ValueError(
                     f"vary: {name}: must be a sphere, capsule, cylinder, ellipsoid or box without a texture"
                 )
@@ -174,7 +181,11 @@ def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
 
 
 def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
-    """Return the field of mjData that contains an object's place, and the indices in this field."""
+    """Return the field of mjData that contains an object's place, and the indices in this field.
+
+    Raises:
+        ValueError: the object is not one that can be placed between the ends of this range.
+    """
     assert variation is not None
     spatial = np.ndim(variation.ranges[name][0]) == 1
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, thing)
@@ -197,7 +208,11 @@ def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | 
 
 
 def _specification(given: Any) -> mujoco.MjSpec:
-    """Return a specification that can be compiled again."""
+    """Return a specification that can be compiled again.
+
+    Raises:
+        ValueError: the source is a compiled model.
+    """
     if source.is_compiled(given):
         kind = "an MjModel" if isinstance(given, mujoco.MjModel) else "a compiled file"
         raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled again")

@@ -20,6 +20,7 @@ def rows(where: str, returned: Any, n: int, kind: type) -> np.ndarray:
     """Return the array `returned` if it has one number for each world, (n,).
 
     where: source of the array, for the error message
+    kind: type to which the entries are converted
 
     Raises:
         ValueError: the array has another shape, or its entries are not numbers.
@@ -57,7 +58,7 @@ def mapping(where: str, returned: Any) -> Mapping[str, Any]:
 
 
 def not_finite(where: str, terms: Mapping[str, np.ndarray]) -> dict[int, str]:
-    """Return an error message for each world in which a term is not finite, by world."""
+    """Return the error messages of all worlds in which a term is not finite, by world."""
     found: dict[int, str] = {}
     for name, term in terms.items():
         for world in np.flatnonzero(~np.isfinite(term)).tolist():

@@ -50,10 +50,11 @@ class Agent:
 class BatchTask(TaskSettings):
     """A task whose methods receive all worlds at once.
 
-    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task` and those listed below.
-    Arrays have one row for each world. The argument `worlds` of the methods is the object that `physics` returns. The
-    default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`, `worlds.xpos` ...) over worlds.
-    The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a task follows this description.
+    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task`, except for `others`,
+    and those listed below. Arrays have one row for each world. The argument `worlds` of the methods is the object that
+    `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`,
+    `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a
+    task follows this description.
 
     renders_early: if True, rendering may begin before an action is judged, which is faster. In this case, `rewards`,
         `terminated`, `succeeded` and `proprioception` must not move bodies in a world, unless `judge` returns an
@@ -74,19 +75,21 @@ class BatchTask(TaskSettings):
     compared_light: str | None = None
 
     def reset(self, worlds: Any, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
-        """Start episodes in the chosen worlds, (k,) int.
+        """Start episodes in the chosen worlds.
 
         The default keeps the state after mj_resetData.
 
+        chosen: indices of the worlds, (k,) int
         rngs: random number generator of each chosen world
         """
 
     def act(self, worlds: Any, actions: np.ndarray) -> Mapping[int, str] | None:
-        """Apply actions in [-1, 1], (n, n_actions).
+        """Apply actions in [-1, 1], (n, n_actions), before the physics steps.
 
-        The default maps each value to the full range of one control of the actuators.
+        The default maps each value to the full range of one control of the actuators; a control without limits gets
+        the value itself.
 
-        Return the reasons why worlds cannot continue, by world, or None if all can.
+        Return the reason for each world that cannot continue, by the index of the world, or None if all can.
         """
         mine = controls_of(worlds.model, self.actuators)
         limited = worlds.model.actuator_ctrllimited[mine].astype(bool)
@@ -95,7 +98,10 @@ class BatchTask(TaskSettings):
         return None
 
     def rewards(self, worlds: Any) -> Mapping[str, np.ndarray]:
-        """Return the terms of the reward for the last action, by name, (n,) each. The reward is their sum."""
+        """Return the terms of the reward for the last action, by name, (n,) each. The reward is their sum.
+
+        A world in which a term is not finite fails, and its episode ends.
+        """
         raise NotImplementedError
 
     def terminated(self, worlds: Any) -> np.ndarray:
@@ -165,7 +171,7 @@ class BatchTask(TaskSettings):
     def azimuths(self) -> np.ndarray:
         """Return the azimuths of the first agent's eyes of the first kind [rad], (eye,).
 
-        The reference frame is the one of the body that the eyes are mounted on.
+        They are relative to the forward direction of the object on which the eyes are mounted.
         """
         return np.radians([mount.azimuth_deg for mount in self.agents()[0].kinds[0].mounts])
 
@@ -179,7 +185,11 @@ class BatchTask(TaskSettings):
     # Only tasks with their own physics, agents or random streams override the following methods.
 
     def physics(self, n: int, threads: int, variation: Variation | None) -> Physics:
-        """Return the physics of `n` worlds."""
+        """Return the physics of `n` worlds.
+
+        threads: number of threads that may compute it
+        variation: ranges of the quantities that differ between episodes; None: there are none
+        """
         return ArrayWorlds(self.model, self._compiled(), n, threads, self.substeps, variation)
 
     def agents(self) -> tuple[Agent, ...]:
@@ -193,7 +203,7 @@ class BatchTask(TaskSettings):
     def streams(self, seed: Any, n: int) -> RandomStreams:
         """Return the random streams of the worlds.
 
-        seed: one seed for all worlds, None, or a tuple with a seed for each world
+        seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
         """
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 

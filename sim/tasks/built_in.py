@@ -75,7 +75,8 @@ class AgentTask(BatchTask):
     """A task in one of the built-in worlds, in which an agent slides over the floor between walls.
 
     world: the compiled world
-    mode: "training", "evaluation" or "test", which selects the weights of the reward
+    mode: "training", "evaluation" or "test", which selects the weights of the reward and the ends of episodes, see
+        `sim.tasks.reward`
     eyes: eyes on the agent's equator, or a dictionary of several kinds of eyes by name; None: no eyes
     fidelity: fidelity of the eyes, or "auto"
     """
@@ -142,7 +143,7 @@ class AgentTask(BatchTask):
         return (replace(agent, first_action=np.array(STANDING, np.float32)),)
 
     def act(self, worlds: SlidingAgents, actions: np.ndarray) -> None:
-        """Set the agent's forward speed and change of heading, and move the objects."""
+        """Set the agent's forward speed and change of heading, each in [-1, 1], (n, 2), and move the objects."""
         worlds.steer(actions)
         worlds.move_objects(*self.moved(worlds))
 
@@ -154,7 +155,10 @@ class AgentTask(BatchTask):
         return worlds.state.objects, worlds.state.object_heading
 
     def proprioception(self, worlds: SlidingAgents) -> Mapping[str, np.ndarray]:
-        """Return 1 if the agent touched a wall during the last action, else 0; at the start of an episode, return 0."""
+        """Return the entry "contact", (n, 1): 1 if the agent touched a wall during the last action, else 0.
+
+        At the start of an episode, it is 0.
+        """
         touched = np.zeros(worlds.n, bool) if worlds.motion is None else worlds.motion.contact
         return {"contact": (touched & (worlds.state.steps > 0)).astype(np.float32)[:, None]}
 
@@ -164,7 +168,12 @@ class AgentTask(BatchTask):
         return [{"position": (x, y), "heading": heading} for (x, y), heading in places]
 
     def weighted(self, worlds: SlidingAgents, events: AgentEvents, failed: Mapping[int, str]) -> Outcome:
-        """Return the outcome of an action that caused these events, with the weighted terms of the reward."""
+        """Return the outcome of an action that caused these events, with the weighted terms of the reward.
+
+        The goals and adversaries that were reached are counted, and `put_elsewhere` moves reached objects.
+
+        failed: the worlds that could not continue, each with the reason; their events are ignored
+        """
         if failed:
             well = np.ones(worlds.n, bool)
             well[list(failed)] = False

@@ -25,5 +25,5 @@ class Command:
     offset: float = 0.0
 
     def quantity(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the commanded quantity for these numbers, in `unit`."""
+        """Return the commanded quantity in `unit` for these numbers, which are first limited to [-1, 1]."""
         return self.scale * (np.clip(numbers, -1, 1) + self.offset)

@@ -32,11 +32,11 @@ class Frozen:
         and the `others` of this task are not used
     policy: an object with the method `predict` of stable-baselines3 (a learner, or the return value of
         `evolve.load_policy`), or a function. The function receives the observations of all worlds, as in
-        `make_vec_env`, and returns the actions (world, number). None: the actions are zeros, and the animal's eyes are
+        `make_vec_env`, and returns the actions (world, value). None: the actions are zeros, and the animal's eyes are
         not rendered.
 
     Raises:
-        ValueError: an argument has the wrong type.
+        ValueError: `task` is not a sim.Task, or `policy` is neither a function nor an object with `predict`.
     """
 
     task: Task
@@ -58,7 +58,8 @@ class Frozen:
     def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
         """Return the animal's actions in every world.
 
-        shape: shape of the actions, (world, number)
+        observation: the animal's observations in all worlds, by name, as in `sim.make_vec_env`
+        shape: shape of the actions, (world, value)
 
         Raises:
             RuntimeError: the policy fails, or returns actions of another shape.
@@ -86,7 +87,8 @@ class Encounter:
         eyes. The `name` of a task is the name of its animal.
 
     Raises:
-        ValueError: there are no animals, two animals have the same name, or two tasks have different models.
+        ValueError: there are no animals, two animals have the same name, two tasks have different models or settings
+            of the world, an animal has its own `others`, or an argument is not a sim.Task.
     """
 
     def __init__(self, *animals: Task) -> None:
@@ -136,7 +138,7 @@ def split_agents(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen
     """Return the tasks of the learning animals, and the animals that do not learn.
 
     Raises:
-        ValueError: they cannot share a world.
+        ValueError: the animals cannot share a world.
     """
     if isinstance(task, Encounter):
         return task.animals, ()
@@ -174,7 +176,7 @@ def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
     where: beginning of the error message
 
     Raises:
-        ValueError: they cannot share a world.
+        ValueError: the animals cannot share a world; the message states the reason.
     """
     if not animals:
         raise ValueError(f"{where}: no animals: must be one sim.Task at least")

@@ -108,7 +108,11 @@ def auxiliary_of(names: Iterable[str], where: str) -> tuple[str, ...]:
 
 
 def _by_name(where: str, said: Any, names: Mapping[str, Any] | Sequence[str]) -> Mapping[str, Any]:
-    """Return a setting for each kind of eyes; a single value applies to all `names`."""
+    """Return a setting for each kind of eyes; a single value applies to all `names`.
+
+    Raises:
+        ValueError: the setting has no entries, or is a single value although there are no names.
+    """
     if isinstance(said, Mapping) and said:
         return said
     if names and not isinstance(said, Mapping):

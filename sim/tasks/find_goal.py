@@ -21,8 +21,8 @@ __all__ = ["FindGoal"]
 class FindGoal(AgentTask):
     """Task in which the agent reaches the goal and avoids the adversaries.
 
-    Progress is the decrease of the distance to the goal. An object is reached if the agent comes within REACH of its
-    centre at any substep. In training, the first object that is reached ends the episode, and only this object
+    Progress is the decrease of the distance to the nearest goal. An object is reached if the agent comes within REACH
+    of its centre at any substep. In training, the first object that is reached ends the episode, and only this object
     counts. In evaluation, a reached object respawns and the episode continues. In tracking, the objects move.
     """
 
@@ -49,7 +49,7 @@ class FindGoal(AgentTask):
 
     @cached_property
     def _bounds(self) -> np.ndarray:
-        """Limits of the objects' motion: x_min, y_min, x_max, y_max [m]."""
+        """Limits of the objects' motion: x_min, y_min, x_max, y_max [m], (4,)."""
         spots = self.world.object_spawn
         return np.concatenate([spots.min(axis=0), spots.max(axis=0)])
 

@@ -42,6 +42,9 @@ def _nearest(to_x: np.ndarray, to_y: np.ndarray, x: np.ndarray, y: np.ndarray) -
     """Return the squared distance [m²] from each object's next position to the nearest other object, (n, k).
 
     Present and next positions of the other objects are considered.
+
+    to_x, to_y: next positions [m], (n, k)
+    x, y: present positions [m], (n, k)
     """
     # The worlds are on the last axis because NumPy's inner loop runs over this axis, and there are many worlds.
     place_x, place_y = (np.ascontiguousarray(np.concatenate(at, axis=1).T) for at in ([x, to_x], [y, to_y]))

@@ -21,6 +21,9 @@ class RewardTerms:
     come first, then those of the second agent. Terms are stored in one array (term, row), and, if the rows have
     different terms (`of_rows`), also in a dictionary for each row.
 
+    names: names of the terms
+    terms: values of the terms, (term, row)
+
     Raises:
         ValueError: the number of terms differs from the number of names.
     """
@@ -41,7 +44,7 @@ class RewardTerms:
 
     @property
     def total(self) -> np.ndarray:
-        """Reward of each row."""
+        """Reward of each row, (row,)."""
         if self._rows is not None:
             return np.array([float(sum(row.values())) for row in self._rows])
         return np.asarray(self.terms.sum(axis=0))
@@ -55,13 +58,13 @@ class RewardTerms:
         return list(map(dict, map(zip, repeat(self.names), self.terms.T.tolist())))
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return the values of one term, (row,)."""
+        """Return the values of one term, (row,); ValueError if there is no term of this name."""
         return np.asarray(self.terms[self.names.index(name)])
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one action in all worlds, which a task returns.
+    """The outcome of one action in all worlds, which a task returns. Rows are those of `RewardTerms`.
 
     terms: terms of the reward
     terminated: True if the task ends the episode, (row,) bool
@@ -71,8 +74,8 @@ class Outcome:
         learn, (world,) bool; None: False in all worlds
     changed: worlds in which the task moved bodies after the action
     info: additional entries of each row's `info`; None: no additions
-    proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, number);
-        a world whose numbers are NaN keeps its previous numbers. None: the task's method `all_proprioception` is
+    proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, value);
+        a world whose values are NaN keeps its previous values. None: the task's method `all_proprioception` is
         called.
     """
 

@@ -43,6 +43,7 @@ class _OfWorld:
 class PerWorld(BatchTask):
     """Batch task for all animals of a `sim.Encounter`, or for the animal of a `sim.Task` and the task's `others`.
 
+    task: the task or the encounter
     learners: tasks of the learning animals
     frozen: animals that do not learn
     animals: tasks of all animals, learners first
@@ -161,7 +162,7 @@ class PerWorld(BatchTask):
         return outcomes, over
 
     def _felt(self, data: mujoco.MjData) -> list[np.ndarray]:
-        """Return the proprioception of every animal in a world.
+        """Return the proprioception (k,) of every animal in a world.
 
         Raises:
             ValueError: a method did not return a row of finite numbers, or the row has another length than before.
@@ -194,7 +195,10 @@ def _in_mode(task: Task, mode: str) -> Task:
 
 
 def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
-    """Return an array with one row for each world; the rows of worlds without new values are NaN."""
+    """Return the entry "feels", with one row for each world; rows of worlds without new values (None) are NaN.
+
+    The result is empty if no world has values.
+    """
     size = next((len(row) for row in felt if row is not None), 0)
     if not size:
         return {}

@@ -48,7 +48,8 @@ def free_spot(
 
     Return None if no cell is far enough.
 
-    others: positions of the other objects, (k, 2) [m]
+    agent, others: positions of the agent, (2,), and of the other objects, (k, 2) [m]
+    object_spawn: centres of all cells in which an object may start, (cell, 2) [m]
     """
     free = _apart(object_spawn, agent, CLEARANCE)
     for other in others:

@@ -23,7 +23,7 @@ class RandomStreams(Protocol):
     """Protocol of the random number generators of all worlds.
 
     entropy: seed of all generators; a simulation with this seed repeats every episode
-    noise_keys: keys of the receptor noise for `sim.render.receptor_noise`, for each agent (kind of eyes, world) uint64
+    noise_keys: for each agent, keys of its receptors' noise (`sim.render.receptor_noise`), (kind of eyes, world) uint64
     """
 
     entropy: Any
@@ -47,9 +47,13 @@ class RandomStreams(Protocol):
 class StreamsByPurpose:
     """One generator for each world and purpose. The built-in tasks use this scheme.
 
-    Its seed depends only on the common seed, the index of the world and the purpose.
+    The seed of a generator depends only on the seed of the batch, the index of the world and the purpose. With a tuple
+    of seeds, it depends only on the seed of the world and the purpose.
 
-    motion: random numbers for objects that move at random
+    seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
+    n: number of worlds
+    kinds: number of kinds of eyes of the agent, as the only entry
+    motion: attribute, random numbers for objects that move at random
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
@@ -84,6 +88,7 @@ class StreamsByPurpose:
 class StreamsByWorld:
     """One generator for each world, which draws all random numbers of its episodes. User tasks use this scheme.
 
+    seed, n: see `StreamsByPurpose`
     kinds: number of kinds of eyes of each agent
     """
 

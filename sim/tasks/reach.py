@@ -26,9 +26,9 @@ def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: n
 
     The result is the number of substeps for an object that the agent does not reach.
 
-    path: positions of the agent at the *end* of each substep, (n, substep, 2)
-    objects_before: positions of the objects before the action, (n, k, 3)
-    objects_after: positions of the objects after the action, (n, k, 3); the motion between them is linear
+    path: positions of the agent at the *end* of each substep [m], (n, substep, 2)
+    objects_before: positions of the objects before the action [m], (n, k, 3)
+    objects_after: positions of the objects after the action [m], (n, k, 3); the motion between them is linear
     """
     substeps = path.shape[1]
     # The worlds are on the last axis because NumPy's inner loop runs over this axis, and there are many worlds.

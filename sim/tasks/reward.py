@@ -71,7 +71,10 @@ def check_mode(mode: str) -> None:
 def reward_terms(
     weights: RewardWeights, progress: np.ndarray, goal: np.ndarray, adversary: np.ndarray, contact: np.ndarray
 ) -> np.ndarray:
-    """Return the terms of the reward in the order of TERMS, (term, n), from the progress [m] and the events."""
+    """Return the terms of the reward in the order of TERMS, (term, n), from the progress [m] and the events.
+
+    progress, goal, adversary, contact: amounts by which the weights are multiplied, (n,)
+    """
     terms = np.array([progress, goal, adversary, contact])
     terms *= weights.column
     terms += 0.0  # converts -0.0 to 0.0

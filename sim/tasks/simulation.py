@@ -27,13 +27,16 @@ LEAST_RETURN = "least return"
 
 
 class Simulation:
-    """`n` independent worlds of one task.
+    """Independent worlds of one task.
 
     task: rules of the task
+    n: number of worlds
     seed: seed of all random number generators; None: a random seed
     threads: number of threads that the physics uses
     least_return: in training, an episode is truncated when the sum of its rewards falls to this value; None: never
     episode_steps: number of actions after which an episode is truncated; None: the task's default
+
+    Further attributes:
     physics: physics of the worlds
     agents: agents in each world, learners first
     task_name: name of the task in messages
@@ -44,7 +47,8 @@ class Simulation:
     felt: the last proprioception of each agent, as arrays (n, k) float32 by name
 
     Raises:
-        ValueError: `n` is below 1, `least_return` is not below 0, or it is given although the mode is not training.
+        ValueError: `n` is below 1, or `least_return` is not below 0 or is given although the mode is not training.
+        RuntimeError: a method of the task fails in the first episode, which the constructor starts.
     """
 
     def __init__(
@@ -102,12 +106,12 @@ class Simulation:
         self.physics.state = state  # type: ignore[misc]
 
     def seed(self, seed: Any) -> None:
-        """Seed all random number generators again. The next call must be `reset`."""
+        """Seed all random number generators again, see `BatchTask.streams`. The next call must be `reset`."""
         self.streams = self.physics.chance = self.task.streams(seed, self.n)
         self.begun = False
 
     def reset(self) -> Any:
-        """Start all episodes."""
+        """Start new episodes in all worlds, and return the state; errors are as in `restart`."""
         self.restart(self._everyone)
         return self.state
 
@@ -124,13 +128,11 @@ class Simulation:
         self.begun = True
 
     def step(self, actions: np.ndarray) -> Step:
-        """Take one action in all worlds; `actions`: values in [-1, 1] of all agents, (n, value)."""
+        """Take the actions of all agents, (n, value), in [-1, 1]. For errors, see `move` and `judge`."""
         return self.judge(self.move(actions))
 
     def move(self, actions: np.ndarray) -> dict[int, str]:
-        """Compute the first half of a step: the motion of all bodies.
-
-        Return the worlds that could not continue, each with the reason.
+        """Move all bodies (the first half of a `step`); return the reason for each world that could not continue.
 
         Raises:
             RuntimeError: there has been no reset yet.
@@ -145,7 +147,12 @@ class Simulation:
         return {**broken, **failed}
 
     def judge(self, failed: Mapping[int, str]) -> Step:
-        """Compute the second half of a step: its outcome. The task may move bodies to new positions."""
+        """Compute the second half of a step: its outcome. The task may move bodies to new positions.
+
+        Raises:
+            ValueError: the task returns an array of the wrong shape.
+            RuntimeError: the task changes the model that worlds share.
+        """
         outcome = self.task.judge(self.physics, failed)
         require_outcome(outcome, self.n, self.learners)
         self._feel(outcome.proprioception or self.task.all_proprioception(self.physics, self._everyone), slice(None))

@@ -30,8 +30,8 @@ class Task(TaskSettings):
     If eyes evolve for this task (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the mounts that
     `place` returns. The class must then have no required arguments.
 
-    If a method raises an exception, the episode of its world ends. There is one exception to this rule: an error in
-    `reset`, or in `proprioception` during a reset, ends the simulation of all worlds by a RuntimeError, because no
+    If a method raises an exception or returns an invalid value, the episode of its world ends. In contrast, an error in
+    `reset`, or in `proprioception` during a reset, ends the simulation of all worlds with a RuntimeError, because no
     episode can start.
 
     Methods are called for one world at a time, with its mjData after mj_forward. One task object is used for
@@ -42,15 +42,18 @@ class Task(TaskSettings):
     others: Sequence[Frozen] = ()
 
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
-        """Change the state after mj_resetData at the start of an episode.
+        """Change the state after mj_resetData at the start of an episode; by default, keep it.
 
-        A change of `data.model` applies to this episode.
+        A change of `data.model` applies to this episode only.
+
+        rng: random number generator of the world
         """
 
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
         """Apply an action in [-1, 1], (n_actions,).
 
-        The default maps each value to the full range of one control of the actuators.
+        The default maps each value to the full range of one control of the actuators; a control without limits gets
+        the value itself.
         """
         model, mine = data.model, controls_of(data.model, self.actuators)
         limited = model.actuator_ctrllimited[mine].astype(bool)

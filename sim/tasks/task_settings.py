@@ -34,7 +34,7 @@ class TaskSettings:
     mounts: places of the eyes. If an animal has several kinds of eyes, `eye` and `mounts` are dictionaries, such as
         {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of "eyes".
     fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
-        from a few scenes of the task's episodes. For several kinds of eyes, a common value or a dictionary.
+        from a few scenes of the task's episodes. Several kinds of eyes have a common value or a dictionary.
     substeps: physics steps per action
     episode_steps: number of actions after which an episode is truncated
     spectra: spectra of materials and lights, by name, which replace their colours
@@ -54,8 +54,9 @@ class TaskSettings:
         world then has a copy. Each world also has a copy of the model if the first `reset` changes `data.model`.
         Otherwise all worlds share one model.
     auxiliary: any of "depth", "ids" and "flow", which an observation then contains for each receptor in addition to its
-        signal. They describe the surface seen at the centre of the receptor: its distance, its geom, and its motion
-        since the last observation; see docs/tasks.md. Evolving eyes have no auxiliary entries.
+        signal. They describe the surface seen at the centre of the receptor: its depth along the eye's axis [m], the id
+        of its geom, and its motion on the retina since the last observation [receptors]; see docs/tasks.md. Evolving
+        eyes have no auxiliary entries.
     camera: name of the camera for images of the task; None: a camera that shows the whole model
     actuators: names of the actuators that an action drives; None: all actuators
     name: name of the animal, if there are several; None: the name of the class
@@ -82,7 +83,7 @@ class TaskSettings:
     mode: str = "training"
 
     def __init_subclass__(cls) -> None:
-        """Support subclasses that use the old name of the method `proprioception`, which is `feels`."""
+        """Accept a subclass that defines the method `proprioception` under its old name `feels`, with a warning."""
         super().__init_subclass__()
         if "feels" in vars(cls) and "proprioception" not in vars(cls):
             warn_renamed(f"{cls.__name__}.feels", "proprioception")
@@ -100,6 +101,9 @@ class TaskSettings:
 
         The default spreads the eyes in a fan around the first of `mounts`, see `sim.fan`. A run with this default
         needs a single mount.
+
+        n_eyes: number of eyes
+        placement_range_deg, elevation_deg: angles that evolve [degrees], see `sim.fan`
         """
         assert not isinstance(self.mounts, Mapping)
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)

@@ -39,8 +39,10 @@ ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's colum
 class _Hit:
     """First hits of rays.
 
+    t: distance to the hit [m]; infinite without a hit
+    point, normal: hit point, and normal of the surface
     is_lit: True if a ray hits the front of a surface
-    reflectance: one array per component
+    reflectance: reflectance at the hit, one array per component
     """
 
     t: Array
@@ -78,18 +80,19 @@ class ClosedFormSurroundings:
 class ClosedForm:
     """A tracer of rays through one scene of upright walls, a floor and spheres.
 
+    scene, wavelengths: the scene, and the centres of the eye's bands [m]
     name, why: name of the tracer, and the reason for its choice, for reports
     light: level of light, one of `lighting.LEVELS`
     basis: (component, band): contribution of each component to each band
     world, walls, footprints, lights, components: the parts of the scene
     medium: water or air between surfaces and eyes; None: clear air
     faces: textures of walls and floor, see `face_rows`
-    sphere_textures: maps to the texels, and the texels' places
+    sphere_textures: for each visible sphere, the map from texture coordinates to texels, and the place of its texture
 
     Raises:
-        NoClosedForm: walls that lie on no grid. If light is reflected more than once, also: walls of several heights,
-            walls lower than a body, bodies that may change their height, and a texture on the body that carries the
-            eyes.
+        NoClosedForm: there are many walls, and they lie on no grid. If light is reflected more than once, also: walls
+            have several heights or are lower than a body, a body may change its height, or the body that carries the
+            eyes has a texture.
     """
 
     name = "closed_form"
@@ -262,6 +265,9 @@ def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     """Return a row of ROW numbers for each face, from which the texel at a point is computed.
 
     They are two affine functions of the point, which give the texel's column and row, the texture's place, and 0.
+
+    uv: matrices (2, 4) from points of each face to texture coordinates, (face, 2, 4)
+    place: index of each face's texture in the atlas, (face,)
     """
     rows = np.zeros((len(uv), ROW))
     for i, (affine, texture) in enumerate(zip(uv, place, strict=True)):

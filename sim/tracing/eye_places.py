@@ -103,7 +103,8 @@ class EyePlaces:
         """Return the body that the eyes are fixed to, with the eyes' positions on it.
 
         Raises:
-            NotLevelError: the eyes are on several bodies, or on a body that may tilt or change its height.
+            NotLevelError: the eyes are on several bodies, on a body that may tilt or change its height, or on a camera
+                that follows something.
         """
         bodies = {self._body_of(kind, index) for kind, index in self._things}
         if len(bodies) > 1:
@@ -123,7 +124,7 @@ class EyePlaces:
         return int({"site": model.site_bodyid, "camera": model.cam_bodyid}[kind][index]) if kind != "body" else index
 
     def _in_body(self, number: int, body: int, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
-        """Return an eye's pupil and frame in the body's frame."""
+        """Return an eye's pupil [m], (3,), and its frame, (3, 3), in the body's frame."""
         (kind, index), (offset, turn) = self._things[number], self._locals[number]
         if kind == "body":
             return offset, turn

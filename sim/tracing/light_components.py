@@ -41,7 +41,10 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 
 
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components for which a reflection multiplies each component of the light by the texel's component."""
+    """Return components for which a reflection multiplies each component of the light by the texel's component.
+
+    texels, irradiance: see `components_of`
+    """
     grey = texels.mean(axis=1, keepdims=True)
     if np.abs(texels - grey).max() <= GREY:
         few = components_of(np.tile(grey, texels.shape[1]), irradiance)
@@ -52,5 +55,8 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 
 
 def components_in_bands(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components that are the bands, for light that passes a medium or several reflections."""
+    """Return components that are the bands, for light that passes a medium or several reflections.
+
+    texels, irradiance: see `components_of`
+    """
     return Components(texels, irradiance, np.eye(texels.shape[1]) / np.pi)

@@ -74,6 +74,6 @@ def clear_of(point: Array, normal: Array, clearance: float = 1) -> Array:
 
 
 def diffuse_reflectance(si: Array, bsdf: MitsubaObject, wavelengths: Array) -> Array:
-    """Return the reflectance of a Lambertian surface at these wavelengths."""
+    """Return the reflectance of a Lambertian surface at these wavelengths (a Mitsuba spectrum) [nm]."""
     si.wavelengths = wavelengths
     return bsdf.eval_diffuse_reflectance(si, si.is_valid())

@@ -28,8 +28,8 @@ PITCH, BALL = 2.5, 1.1
 class MeshAtlas:
     """Moving meshes in one scene.
 
-    scene: None without meshes
     cells: centre of each mesh's cell, (mesh, 3)
+    scene: Mitsuba's scene of all meshes; None without meshes
     """
 
     cells: np.ndarray
@@ -67,7 +67,11 @@ class MeshAtlas:
         return dr.select(found.is_valid(), (start + found.t) * reach, dr.inf)
 
     def surface(self, o: Array, d: Array, cell: Array, reach: Array, active: Array) -> tuple[Array, Array]:
-        """Return the normal in the mesh's frame, and the texture coordinates, at the hits of `hit`."""
+        """Return the normal in the mesh's frame, and the texture coordinates, at the hits of `hit`.
+
+        o, d, cell, reach: see `hit`
+        active: True for rays that hit a mesh
+        """
         ray, _ = _within(o, d, cell, reach)
         assert self.scene is not None
         si = self.scene.ray_intersect(ray, mi.RayFlags.All, True, active)

@@ -72,7 +72,10 @@ def model_lights(
 
 
 def _sampled(description: Description, wavelengths: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return a directional light's irradiance and the direction towards it, or another light's intensity and None."""
+    """Return a directional light's irradiance and the direction towards it, or another light's intensity and None.
+
+    The irradiance or intensity is (band,), at these wavelengths [m]; the direction is a unit vector (3,).
+    """
     emitter, found = mi.load_dict(description), []
     directional, towards = description["type"] == _DIRECTIONAL, None
     for spectrum in lighting.spectra(wavelengths):

@@ -43,7 +43,8 @@ class ModelScene:
 
     model: the MuJoCo model
     eye: determines the spectral bands
-    medium: water or air in the eye's bands; None: clear air
+    groups, spectra: see `sim.mirror`
+    medium: water or air; the attribute is the medium in the eye's bands; None: clear air
     variant: Mitsuba's variant
     geoms: ids of all visible geoms
     looks: appearances of these geoms
@@ -112,8 +113,8 @@ class ModelScene:
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
         missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._visible, self._groups)]
         missing += _not_matt(model, self.looks, light)
-        told = [f"eyes do not see: {'; '.join(missing)}"] if missing else []
-        for words in (*told, *filter(None, [self.coincidences.message(model)]), *self._off):
+        unseen = [f"eyes do not see: {'; '.join(missing)}"] if missing else []
+        for words in (*unseen, *filter(None, [self.coincidences.message(model)]), *self._off):
             warnings.warn(words, MirrorWarning, stacklevel=_outside())
 
     @cached_property
@@ -171,8 +172,8 @@ class ModelScene:
     def one_shape_per_geom(self) -> tuple[MitsubaObject, np.ndarray]:
         """Mitsuba scene in which every static geom has its own shapes, and a table from shapes' ids to geoms.
 
-        The table contains -1 for unused ids. It is necessary because a ray on a GPU reports only the id of the shape
-        that it hits.
+        The table contains -1 for unused ids. A table is necessary because a ray on a GPU reports only the id of the
+        shape that it hits.
         """
         with in_variant(self.variant):
             built = {name: shapes.build(part, pose, name, bsdf, None) for name, part, pose, bsdf in self._still_parts()}

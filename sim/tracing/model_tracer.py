@@ -126,7 +126,7 @@ class ModelTracer:
     """A tracer of rays through any model. Surfaces are Lambertian; lamps are sampled once per ray and reflection.
 
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: level of light, "direct" or "bounce"
+    light: level of light, "direct" or "bounce"; ValueError for "all"
     basis: (component, band): contribution of each component to each band; each component is one band
     """
 
@@ -195,7 +195,7 @@ class ModelTracer:
         return [dr.select(hit.seen, spectrum, 0) for spectrum in found]
 
     def _first_hits(self, ray: Array, there: Surroundings, active: Array | None = None) -> _SurfaceHit:
-        """Return the first hits of rays."""
+        """Return the first hits of the rays that are `active` (None: all); the others hit nothing."""
         movers = self._scene.movers
         active = mi.Bool(True) if active is None else active
         ray.wavelengths = self._bands[0]
@@ -223,15 +223,15 @@ class ModelTracer:
         return _SurfaceHit(si, bsdf, colors, glow, which, seen, active, point, normal, hit.t, ray.d)
 
     def distance(self, ray: Array, there: Surroundings) -> Array:
-        """Return the distance to the first hit of each ray [m]."""
+        """Return the distance to the first hit of each ray [m]; infinite without a hit."""
         si = there.still.ray_intersect_preliminary(ray) if self._any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return the number of the surface that each ray hits first, in `ModelScene.one_shape_per_geom`.
+        """Return the index of the surface that each ray hits first, in `ModelScene.one_shape_per_geom`.
 
-        It is a mover's number, or the number of movers plus the Mitsuba id of a static shape (0 for none).
+        It is a mover's index, or the number of movers plus the Mitsuba id of a static shape (0 for none).
         """
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()
@@ -270,7 +270,7 @@ class ModelTracer:
         return found
 
     def _emitted(self, hit: _SurfaceHit, there: Surroundings) -> list[Array]:
-        """Return the radiance of the sky for rays without a hit, and of glowing geoms."""
+        """Return the radiance of the sky for rays without a hit, and of glowing geoms, as spectra of LANES bands."""
         found = [mi.Spectrum(0) for _ in self._bands]
         if self._scene.has_sky:
             nothing = hit.active & ~hit.seen

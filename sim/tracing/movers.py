@@ -37,7 +37,7 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray.
 
-    t, which: distance [m] (infinite without a hit), and number of the mover
+    t, which: distance [m], and index of the mover; without a hit, the largest distance, and the number of movers
     normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
     """
 
@@ -81,8 +81,8 @@ class Movers:
 
     looks, geoms: appearance and geom id of each mover
     atlas: the movers that are meshes
-    lifts: distances by which surfaces are moved outwards [m], by geom
-    ends: number of the first mover of each kind, for the kernel
+    lifts, bsdf: distances by which surfaces are moved outwards [m], by geom; any BSDF, for the atlas
+    ends: index of the first mover of each kind, for the kernel
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class Movers:
         self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
 
     def _of_kind(self, kind: str) -> slice:
-        """Return the numbers of the movers of a kind."""
+        """Return the indices of the movers of a kind."""
         i = [*PRIMITIVES, MESH].index(kind)
         return slice(int(self._ends[i]), int(self._ends[i + 1]))
 
@@ -181,7 +181,7 @@ class Movers:
         return sizes, reach
 
     def nearest(self, ray: Array, farthest: Array, there: MoverRows) -> Hit:
-        """Return the first hit of a ray that is nearer than `farthest`."""
+        """Return the first hit of a ray at a distance less than `farthest` [m], see `Hit`."""
         none = farthest, mi.UInt32(len(self)), mi.Vector3f(0, 0, 1), mi.Point2f(0)
         if not len(self):
             return Hit(*none)
@@ -195,7 +195,7 @@ class Movers:
         return Hit(*found)
 
     def block(self, ray: Array, farthest: Array, there: MoverRows) -> Array:
-        """Return whether any mover blocks a ray at a distance less than `farthest`."""
+        """Return whether any mover blocks a ray at a distance less than `farthest` [m]."""
         if self.apart:
             computed(ray, farthest, there.fours, there.first)
             blocked = self._block(ray, farthest, there)
@@ -228,7 +228,7 @@ class Movers:
         return blocked
 
     def _kinds(self) -> list[tuple[int, Callable[..., Array]]]:
-        """Return the kinds of movers that occur, as their numbers and intersections."""
+        """Return the kinds of movers that occur, as their indices and intersections."""
         hits = [*(_of_primitive(primitive) for primitive in PRIMITIVES.values()), self._mesh_hit]
         return [(i, hit) for i, hit in enumerate(hits) if self._ends[i] < self._ends[i + 1]]
 

@@ -39,6 +39,7 @@ class Paint:
 
     geoms: ids of the painted geoms
     movers: geom id of each mover
+    wavelengths: centres of the bands [m], (band,)
     glow: True if any of the painted geoms glows
     painted: index in `geoms` of each mover's geom, or len(geoms) for geoms without paint, for the kernel
     """
@@ -87,7 +88,11 @@ class Paint:
         return np.where(unset, self._own, here[..., :3])
 
     def factors(self, which: Array, there: PaintRows, seen: Array, *, glow: bool = False) -> list[Array]:
-        """Return the factors of a mover's reflectance, or of its emission, as spectra."""
+        """Return the factors of a mover's reflectance or (if `glow`) emission, as spectra; 1 for geoms without paint.
+
+        which: index of the mover
+        seen: True for rays that hit a surface
+        """
         k = dr.gather(mi.UInt32, there.painted, which, seen)
         painted = seen & (k < len(self))
         start = len(self) * len(self._spectra) if glow else 0

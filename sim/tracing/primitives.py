@@ -18,8 +18,8 @@ from optics.numerics.autodiff import Array
 from sim.scene.primitive_geoms import PLANE
 
 TINY = 1e-20
-# A ray counts as parallel to a surface, and misses it, if its unit direction has a smaller component across the
-# surface.
+# A ray counts as parallel to a surface, and misses it, if the component of its unit direction across the surface is
+# smaller than this value.
 PARALLEL = 1e-9
 
 
@@ -27,7 +27,7 @@ PARALLEL = 1e-9
 class Primitive:
     """Functions for one kind of primitive, which all receive MuJoCo's sizes (`size`).
 
-    hit: (origin, direction, size) -> distance
+    hit: (origin, direction, size) -> distance; infinite for a miss
     normal: (point, size) -> outward normal, not normalised
     """
 
@@ -36,7 +36,7 @@ class Primitive:
 
 
 def _into_ball(o: Array, d: Array) -> Array:
-    """Return the distance at which a ray enters the unit ball."""
+    """Return the distance at which a ray enters the unit ball; infinite for a miss."""
     square = dr.squared_norm(d)
     nearest = -dr.dot(o, d) / square
     p = dr.fma(d, nearest, o)
@@ -54,7 +54,7 @@ def _ellipsoid_normal(p: Array, size: Array) -> Array:
 
 
 def _into_side(o: Array, d: Array, radius: Array) -> Array:
-    """Return the distance at which a ray enters the infinite cylinder around z; infinite for a ray along z."""
+    """Return the distance at which a ray enters the infinite cylinder around z; infinite for a miss or along z."""
     square = dr.maximum(d.x * d.x + d.y * d.y, TINY)
     nearest = -(o.x * d.x + o.y * d.y) / square
     x, y = dr.fma(d.x, nearest, o.x), dr.fma(d.y, nearest, o.y)
@@ -115,7 +115,7 @@ def _box_normal(p: Array, size: Array) -> Array:
 
 
 def _plane_hit(o: Array, d: Array, size: Array) -> Array:
-    """Return the distance to a plane; both of its sides are visible."""
+    """Return the distance to a plane, whose two sides are both visible; infinite for a miss."""
     t = -o.z / dr.select(dr.abs(d.z) < PARALLEL, PARALLEL, d.z)
     x, y = dr.fma(d.x, t, o.x), dr.fma(d.y, t, o.y)
     on_plane = (t > 0) & (dr.abs(d.z) >= PARALLEL) & (dr.abs(x) <= size.x) & (dr.abs(y) <= size.y)

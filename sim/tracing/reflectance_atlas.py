@@ -24,7 +24,7 @@ class Atlas:
     """Reflectances of several textures in one table.
 
     texels: reflectance, (texel, band), of all textures in sequence, row by row
-    places: for each texture, its first texel and its numbers of columns and rows, (texture, 3)
+    places: for each texture, the index of its first texel, and its numbers of columns and rows, (texture, 3)
     to_texels: for each texture, the map (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres are at
         whole numbers
     """
@@ -60,7 +60,10 @@ def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[MitsubaObj
 def _bake_one(
     model: mujoco.MjModel, geom: int, bsdf: MitsubaObject, wavelengths: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the reflectance (row, column, band), and the map from Mitsuba's (u, v) of the geom to texels, (2, 3)."""
+    """Return the reflectance (row, column, band), and the map from Mitsuba's (u, v) of the geom to texels, (2, 3).
+
+    wavelengths: centres of the bands [m], (band,)
+    """
     width, height = 1, 1
     if shapes.is_textured(model, geom):
         height, width = surfaces.image(model, surfaces.texture_id(model, geom)).shape[:2]
@@ -82,7 +85,7 @@ def _constant(table: np.ndarray, axis: int) -> bool:
 
 
 def _reflectance(bsdf: MitsubaObject, uv: np.ndarray, wavelengths: np.ndarray) -> np.ndarray:
-    """Return Mitsuba's reflectance at texture coordinates (2, point), (point, band)."""
+    """Return Mitsuba's reflectance (point, band) at texture coordinates (2, point) and wavelengths [m]."""
     si = dr.zeros(mi.SurfaceInteraction3f, uv.shape[1])
     si.uv = mi.Point2f(*(mi.Float(np.ascontiguousarray(c, np.float32)) for c in uv))
     si.wi = mi.Vector3f(0, 0, 1)

@@ -90,7 +90,7 @@ def centres_in(rows: Array, n: int, world: Array) -> list[Array]:
 
 
 def nearest(spheres: Spheres, centres: list[Array], ray: Array, t: Array) -> tuple[Array, Array]:
-    """Return the distance [m] to the first sphere that a ray hits closer than `t`, and the number of this sphere.
+    """Return the distance [m] to the first sphere that a ray hits closer than `t`, and the index of this sphere.
 
     Without such a hit, they are `t` and len(spheres). If there are fewer centres than spheres, the last spheres are
     ignored.

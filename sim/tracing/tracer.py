@@ -71,6 +71,7 @@ class Tracer(Protocol):
 class Tracers:
     """The tracers of a scene, one for each level of light (`lighting.LEVELS`).
 
+    scene, places: the scene, and the positions of the eyes in it
     name: one of TRACERS; "auto": the closed form if the scene has one, otherwise Mitsuba
     stand: the body that the eyes are fixed to; None: derived from their mounts
 

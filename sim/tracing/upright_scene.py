@@ -70,7 +70,7 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     """Return the closed form of a model.
 
     Raises:
-        NoClosedForm: the model has another form.
+        NoClosedForm: the model has another form; the message names the geom, light or body that is the reason.
     """
     _refuse_what_shines(scene)
     model = scene.model
@@ -124,7 +124,11 @@ def _refuse_what_shines(scene: ModelScene) -> None:
 
 
 def _checked(model: mujoco.MjModel, light: ModelLight) -> DirectionalLight:
-    """Return a light that is directional, fixed, and shines from above; refuse all others."""
+    """Return a model's light as a `DirectionalLight`.
+
+    Raises:
+        NoClosedForm: the light is not directional, moves, casts no shadow, or shines from below.
+    """
     if light.light < 0:
         raise NoClosedForm("the headlight moves with each eye")
     name = repr(model.light(light.light).name or str(light.light))
@@ -147,6 +151,9 @@ def _refuse_what_eyes_would_see(
     """Refuse eyes that would see their own body.
 
     The body must be a sphere, and its eyes must lie on its surface and look straight away from its centre.
+
+    Raises:
+        NoClosedForm: these conditions are not met.
     """
     if not own:
         return

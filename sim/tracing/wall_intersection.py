@@ -24,7 +24,7 @@ NEVER_ZERO = 1e-9  # replaces smaller components of directions; this shifts no h
 class CellTables:
     """Tables of a grid's cells, row by row.
 
-    wall: number of the wall that fills the cell
+    wall: index of the wall that fills the cell
     top: height of this wall's top [m]
     stop: height [m] below which a ray stops in the cell
     """
@@ -45,7 +45,7 @@ class Footprints(Protocol):
     tables: CellTables | None
 
     def hit(self, ray: Array, cells: CellTables | None) -> tuple[Array, Array, Array]:
-        """Return the distance [m] to the nearest wall, the number of the hit face, and its normal.
+        """Return the distance [m] to the nearest wall, the index of the hit face, and its normal.
 
         The distance is infinite if there is no wall, and 0 inside a wall.
 
@@ -55,6 +55,7 @@ class Footprints(Protocol):
     def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
         """Return whether a wall stands between a point outside all walls and a light in this upward direction.
 
+        start, direction: the point (Point3f), and the unit vector towards the light, (3,)
         cells: `tables`, passed as an argument of the kernel
         """
 
@@ -195,14 +196,14 @@ class Cells:
         return (column >= 0) & (column < self._columns) & (row >= 0) & (row < self._rows)
 
     def _place(self, point: Array) -> tuple[Array, Array]:
-        """Return the coordinates of a point in cells."""
+        """Return x and y of a point relative to the grid's lower corner, in sides of a cell."""
         return tuple((point[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
 
 
 def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
     """Return the coarsest grid in which each wall fills whole cells.
 
-    The result is the side of a cell [m], the grid's lower corner (2,), and the number of the wall that fills each cell
+    The result is the side of a cell [m], the grid's lower corner (2,), and the index of the wall that fills each cell
     (row, column), -1 for none.
 
     Raises:
@@ -219,9 +220,11 @@ def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def _finished(t: Array, face: Array, through_x: Array, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
-    """Return the distance, the number of the hit face, and its normal.
+    """Return the distance [m], the index of the hit face, and its normal.
 
-    face: number of the wall's first face. The faces of a wall are in the order -x, +x, -y, +y.
+    face: index of the wall's first face. The faces of a wall are in the order -x, +x, -y, +y.
+    through_x: True if the ray enters through a face that is perpendicular to x
+    dx, dy: direction of the ray
     """
     x, y = dr.select(dx > 0, -1.0, 1.0), dr.select(dy > 0, -1.0, 1.0)
     side = dr.select(
@@ -239,6 +242,9 @@ def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
     """Return the coarsest square grid whose lines contain all faces of the walls.
 
     The result is the side of a cell [m], the lower corner (2,), and the numbers of rows and columns.
+
+    Raises:
+        NoClosedForm: there is no such grid, or it has more than CELLS cells.
     """
     faces = [np.unique(np.round(np.concatenate([walls.lower[:, a], walls.upper[:, a]]), 6)) for a in range(2)]
     origin = np.array([f[0] for f in faces])

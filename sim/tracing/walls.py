@@ -57,9 +57,9 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
     eyes: heights of the pupils [m]
 
     Raises:
-        NoClosedForm: a geom that is neither a box nor a plane, not exactly one plane, or a plane that is tilted or
-            turned. Boxes must be aligned with the axes, stand on the floor, lie within it and end above the eyes. They
-            must not have a cube texture. Eyes must be above the floor.
+        NoClosedForm: a geom is neither a box nor a plane; there is not exactly one plane, or it is tilted or turned; or
+            the eyes are not above it. Other causes are that a box is not aligned with the axes, does not stand on the
+            floor, extends beyond it, ends below the eyes or has a cube texture.
     """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -94,7 +94,11 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
 
 
 def _rectangle(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
-    """Return the three points of a plane at which Mitsuba's (u, v) is (0, 0), (1, 0) and (0, 1), (3, 3) [m]."""
+    """Return the three points of a plane at which Mitsuba's (u, v) is (0, 0), (1, 0) and (0, 1), (3, 3) [m].
+
+    Raises:
+        NoClosedForm: the plane is tilted, or its sides are not parallel to the axes.
+    """
     corners = np.array([[-1, -1], [1, -1], [-1, 1]]) * shapes.plane_sides(model, geom)
     pose = shapes.pose(data, geom)
     points = corners @ pose[:3, :2].T + pose[:3, 3]
@@ -108,7 +112,13 @@ def _floor_uv(corners: np.ndarray) -> np.ndarray:
 
 
 def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Return the lower and upper corner of a box, and the texture coordinates of its sides."""
+    """Return the lower and upper corner of a box [m], (3,), and the texture coordinates on its sides.
+
+    The coordinates are affine functions (2, 4) of the point, for the sides -x, +x, -y, +y.
+
+    Raises:
+        NoClosedForm: the box is not aligned with the axes, or has a cube texture.
+    """
     pose = shapes.pose(data, geom)
     if np.abs(np.abs(pose[:3, :3]).max(axis=0) - 1).max() > ALIGNED:
         raise NoClosedForm(f"box {model.geom(geom).name!r} is not aligned with the axes")

@@ -16,7 +16,7 @@ class WorldRows:
     """Rows of one lane's world.
 
     fours: rows of all worlds, flat
-    first: number of the first row of this world
+    first: index of the first row of this world
     """
 
     fours: Array

@@ -29,7 +29,7 @@ _WALL, _FREE, _START, _TRAINING_START = "#.Ss"
 
 @dataclass(frozen=True)
 class Course:
-    """Walls and starting positions, given as a drawing. Each line is a row of cells, with north at the top.
+    """Walls and starting positions, given as a drawing. Each line is a row of cells of 2 m, with north at the top.
 
     drawing: "#": wall; ".": free cell; "S": free cell in which episodes may start; "s": free cell in which episodes may
         start in training only
@@ -38,7 +38,7 @@ class Course:
     Raises:
         ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
             start; a start lies in the goal or has no suitable path to it; or episode_steps is not a whole number above
-            0. On a suitable path, the distance from the start never decreases by more than MOST_FALL.
+            0. On a suitable path, the distance from the start never decreases by more than MOST_FALL, 1.5 m.
     """
 
     drawing: str

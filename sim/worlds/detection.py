@@ -20,7 +20,7 @@ OBJECT_MARGIN = 2  # number of cells between the walls and the cells in which ob
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
-    """Add the field and the objects.
+    """Add the field and the objects. Nothing is random, so `rng` is not used.
 
     A goal has vertical stripes, which follow meridians. An adversary has horizontal stripes of about the same width,
     which follow parallels.

@@ -39,7 +39,7 @@ def petal(ultraviolet: float) -> Spectrum:
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
-    """Add the field and the objects, which all have vertical stripes."""
+    """Add the field and the objects, which all have vertical stripes; `rng` is not used."""
     spectra = {kind: petal(share) for kind, share in ULTRAVIOLET.items()}
     materials.add_texture(spec, "upright_stripes", materials.stripes((8, 512), 2 * STRIPES, axis=1))
     for kind, spectrum in spectra.items():

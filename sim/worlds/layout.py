@@ -66,6 +66,7 @@ def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) 
 
     The grid is centred on the origin, and row 0 has the smallest y.
 
+    columns, rows: indices of the cells, (n,)
     shape: size of the grid (rows, columns)
     """
     x = (np.asarray(columns) - (shape[1] - 1) / 2) * CELL
@@ -74,7 +75,7 @@ def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) 
 
 
 def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[float, float], material: str) -> None:
-    """Add a wall: a box of `size` (length along x, along y) [m] that stands on the floor.
+    """Add a wall: a box around `center` (x, y) with the sides `size` along x and y [m], which stands on the floor.
 
     The geom's own x axis runs along the wall, because MuJoCo counts the repeats of a texture with
     `texuniform` along this axis.

@@ -39,14 +39,14 @@ class LayoutFamily:
     Courses fulfil the conditions of `sim.Course`: the distance from the start never has to fall by more than 1.5 m.
 
     seed: seed of all layouts and of the stripes on their walls
-    n_training, n_selection, n_test: number of layouts in each set
-    rows, columns: number of cells of a layout along y and x, including the outer wall; odd, because mazes have rooms in
-        every second row and column
+    n_training, n_selection, n_test: number of layouts in each set, 1 to 100
+    rows, columns: number of cells of a layout along y (7 to 31) and x (15 to 99), including the outer wall; odd,
+        because mazes have rooms in every second row and column. A cell is 2 m wide.
     path_width: width of the paths of courses [cells], 1 or 3; corridors of mazes are always one cell wide
     episode_steps: number of actions after which an episode is truncated; None: the task's default
 
     Raises:
-        ValueError: a number is out of range, or the size or the width is even.
+        ValueError: a number is out of range, or `rows`, `columns` or `path_width` is even.
     """
 
     seed: int = 0
@@ -89,7 +89,7 @@ class LayoutFamily:
         return int(getattr(self, f"n_{name}"))
 
     def random(self, name: str, index: int, purpose: int) -> np.random.Generator:
-        """Return the random number generator of one layout, for its walls or for its stripes."""
+        """Return the random number generator of one layout, for its walls (purpose 0) or its stripes (purpose 1)."""
         return np.random.default_rng(
             np.random.SeedSequence(self.seed, spawn_key=(SETS.index(name), index, purpose)),
         )
@@ -121,7 +121,7 @@ class LayoutSet:
 
     @property
     def courses(self) -> tuple[Course, ...]:
-        """The courses.
+        """The courses of this set.
 
         Raises:
             ValueError: two courses of the family are equal, or courses of this size could not be drawn.

@@ -42,8 +42,8 @@ def stripes(shape: tuple[int, int], edges: int | Sequence[float], axis: int) -> 
     n = shape[axis]
     inner = np.arange(1, edges) / edges if isinstance(edges, int) else np.asarray(edges, float)
     bounds = np.concatenate([[0.0], inner, [1.0]])
-    lit = np.concatenate([[0.0], np.cumsum(np.diff(bounds) * (np.arange(len(bounds) - 1) % 2 == 0))])
-    light = n * np.diff(np.interp(np.arange(n + 1) / n, bounds, lit))
+    light_before = np.concatenate([[0.0], np.cumsum(np.diff(bounds) * (np.arange(len(bounds) - 1) % 2 == 0))])
+    light = n * np.diff(np.interp(np.arange(n + 1) / n, bounds, light_before))
     values = BLACK + (WHITE - BLACK) * light
     image = np.broadcast_to(values[:, None] if axis == 0 else values[None, :], shape)
     return np.repeat(np.rint(255 * encode_srgb(image)).astype(np.uint8)[..., None], 3, axis=2)

@@ -49,6 +49,8 @@ def draw_maze(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
 
     A depth-first walk connects all rooms into a tree. Every dead end then gets a second opening, so that an agent in a
     corridor never has to turn back.
+
+    shape: number of cells (rows, columns), both odd
     """
     walls = np.ones(shape, dtype=bool)
     walls[1, 1] = False

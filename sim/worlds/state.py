@@ -63,7 +63,7 @@ class WorldState(ReadOnlyArrays):
         return WorldState(**{name: np.nan_to_num(array, posinf=0.0, neginf=0.0) for name, array in vars(self).items()})
 
     def take(self, worlds: np.ndarray) -> WorldState:
-        """Return a batch with copies of these worlds only."""
+        """Return a batch with copies of the worlds with these indices only."""
         return WorldState(**{name: array[worlds] for name, array in vars(self).items()})
 
     def put(self, worlds: np.ndarray, other: WorldState) -> WorldState:
@@ -82,7 +82,7 @@ def concatenate(states: list[WorldState]) -> WorldState:
 
 
 def wrap_angle(angle: np.ndarray) -> np.ndarray:
-    """Return the equivalent angle in [-π, π)."""
+    """Return the equivalent angles in [-π, π) [rad]."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 

@@ -23,7 +23,7 @@ def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rngs: Sequence[np.
 
     walls: cells that are walls, boolean (row, column)
     rngs: random number generators. The rows of the grid are divided into one equal part for each generator, which draws
-    the stripes of this part
+        the stripes of this part
     """
     materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
     for i, period in enumerate(STRIPE_PERIODS):
@@ -43,7 +43,7 @@ def merge_walls(walls: np.ndarray, longest: int) -> list[tuple[int, int, int, in
     """Return disjoint straight runs of at most `longest` cells that together cover all wall cells.
 
     Each run is (row, column, number of rows, number of columns). The algorithm is greedy: in the first uncovered cell,
-    a run along the row and a run along the column could start, and it uses the longer one.
+    a run along the row and a run along the column could start, and the algorithm uses the longer one.
     """
     left = walls.copy()
     runs = []

@@ -49,6 +49,7 @@ WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
 class World(ReadOnlyArrays):
     """A compiled world.
 
+    task: name of the task, one of `sim.TASKS`
     model: MuJoCo model. It contains static geoms and mocap bodies for the objects. The body "agent" has the slide
         joints agent_x and agent_y and the hinge agent_heading. The actuators agent_x and agent_y command its velocity
         [m/s] along the world's axes. The sensor agent_touch is above 0 in contact with a wall. If the world was built
@@ -104,7 +105,7 @@ def build_world(
     task: one of `sim.TASKS`
     seed: seed of the mazes and of the stripes on walls in mazes and courses; the worlds of other tasks do not depend on
         it
-    mazes: number of different mazes in the task "maze"; an episode starts in any of them
+    mazes: number of different mazes in the task "maze", 1 to 100,000; an episode starts in any of them
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
     layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
         episode starts in any of its layouts
@@ -118,8 +119,8 @@ def build_world(
         clear air
 
     Raises:
-        ValueError: the task or the course is unknown, the seed is negative, the height is out of range, or `spectra`
-            contains a name that does not exist. Other causes are that `mazes`, `course` or `layouts` is given for a
+        ValueError: the task, the course or the medium is unknown, a number is out of range, or `spectra` contains a
+            name that does not exist. Other causes are that `mazes`, `course` or `layouts` is given for a
             task without it, or that `layouts` is combined with `seed`, `mazes` or `course`.
     """
     if not isinstance(task, str) or task not in TASKS:
@@ -174,6 +175,9 @@ def _check_layouts(task: str, layouts: Any, alone: bool) -> None:
     """Check the type of `layouts`, and that the task has layouts.
 
     alone: True if no other argument, such as `mazes`, defines the layouts; this is required
+
+    Raises:
+        ValueError: a check fails, or `alone` is False.
     """
     of_kind("build_world: layouts", layouts, LayoutSet, "sim.LayoutFamily(seed=0).training")
     if task not in TASKS_WITH_LAYOUTS:
@@ -207,7 +211,7 @@ def _empty_world() -> mujoco.MjSpec:
 
 
 def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> None:
-    """Add the agent, with slide joints along the world's axes and a hinge for the heading.
+    """Add the agent at `start` (x, y) [m], with slide joints along the world's axes and a hinge for the heading.
 
     The hinge has no actuator; the simulation sets the heading. The contact is frictionless. Its damping and stiffness
     are chosen for discrete substeps of length dt. The damping 1/dt stops the approach in the substep in which the

@@ -28,7 +28,7 @@ EYES = sim.Eyes(n_eyes=2, resolution=(15, 15), placement_range_deg=45.0, noise_s
 
 
 def behind(a: float, focus: float | None = None) -> sim.Eyes:
-    """Return eyes with a pinhole of relative aperture a, or with a lens in it.
+    """Return eyes with a pinhole of relative aperture a, or with a lens in this pinhole.
 
     focus: focal length of the lens relative to the correct one; None: no lens
     """

@@ -35,7 +35,7 @@ PLACES = ("cpu", "cuda")
 class Case:
     """A case to measure.
 
-    make: prepares a call. Both devices must agree on its result.
+    make: function that prepares the measured call and returns it. Both devices must agree on the call's result.
     """
 
     name: str

@@ -37,8 +37,8 @@ SHOWN = 3  # printed failures per promise
 class Promise:
     """A guarantee with its trial.
 
-    trial: returns the failure of one trial, or None.
-    share: fraction of all trials that test it.
+    trial: function that runs one trial, and returns the description of its failure, or None.
+    share: fraction of all trials that test this guarantee.
     """
 
     text: str

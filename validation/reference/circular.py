@@ -39,9 +39,10 @@ def airy_encircled_energy(r: np.ndarray, wavelength: float, radius: float, focal
 
 
 def circular_mtf(f: np.ndarray, wavelength: float, radius: float, focal_length: float) -> np.ndarray:
-    """Return the MTF of Airy's pattern at spatial frequencies f [1/m]: the overlap of two disks,
+    """Return the MTF of Airy's pattern at spatial frequencies f [1/m], which is the overlap of two disks.
 
-    2/π (arccos s - s √(1 - s²)), s = f λ f# = f λ focal_length / (2R), 0 beyond s = 1 (Goodman §6.4.2, eq. 6-32).
+    It is 2/π (arccos s - s √(1 - s²)) with s = f λ f# = f λ focal_length / (2R), and 0 beyond s = 1 (Goodman §6.4.2,
+    eq. 6-32).
     """
     s = np.clip(np.abs(f) * wavelength * focal_length / (2 * radius), 0, 1)
     return 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
@@ -59,10 +60,11 @@ def circular_aperture_on_axis(radius: float, distance: float, wavelength: float)
 
 
 def converging_wave_at_focus(radius: float, distance: float, wavelength: float) -> complex:
-    """Return the exact field at the focus of exp(-ik(L(ρ) - z)), L = √(ρ² + z²), behind a circular aperture:
+    """Return the exact field at the focus of exp(-ik(L(ρ) - z)), L = √(ρ² + z²), behind a circular aperture.
 
-    1 - z/L - ikz ln(L/z), where L belongs to the edge. It is the first Rayleigh-Sommerfeld integral ∫ z/(2πL²) (1/L -
-    ik) 2πρ dρ (Goodman §3.5), with ρ dρ = L dL. For R << z, its squared modulus is that of Airy's peak, |kR²/2z|².
+    It is 1 - z/L - ikz ln(L/z), where L belongs to the edge. This is the first Rayleigh-Sommerfeld integral
+    ∫ z/(2πL²) (1/L - ik) 2πρ dρ (Goodman §3.5), with ρ dρ = L dL. For R << z, the squared modulus of the field is that
+    of Airy's peak, |kR²/2z|².
     """
     tangent2 = (radius / distance) ** 2
     secant = np.sqrt(1 + tangent2)
@@ -71,10 +73,10 @@ def converging_wave_at_focus(radius: float, distance: float, wavelength: float) 
 
 
 def circular_aperture_fraunhofer(r: np.ndarray, wavelength: float, radius: float, distance: float) -> np.ndarray:
-    """Return the intensity far behind a circular aperture in a unit plane wave (R²/(λz) << 1) at any angle:
+    """Return the intensity far behind a circular aperture in a unit plane wave (R²/(λz) << 1), at any angle.
 
-    |πR²/(λD) (z/D) 2 J1(v)/v|², v = kR r/D, D = √(r² + z²) (first Rayleigh-Sommerfeld integral with
-    the phase k(D - r·ρ/D); Goodman §4.4.2 is its paraxial limit).
+    It is |πR²/(λD) (z/D) 2 J1(v)/v|² with v = kR r/D and D = √(r² + z²). This is the first Rayleigh-Sommerfeld integral
+    with the phase k(D - r·ρ/D). Goodman §4.4.2 is the paraxial limit.
     """
     slant = np.hypot(r, distance)
     v = 2 * np.pi * radius * np.asarray(r) / (wavelength * slant)

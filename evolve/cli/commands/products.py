@@ -23,7 +23,12 @@ __all__ = ["REPORT", "Products", "export", "finished_products", "open_page", "re
 
 @dataclass(frozen=True)
 class Products:
-    """Paths of the files with the results of a finished run. `replay` is None unless a replay was requested."""
+    """Paths of the files with the results of a finished run.
+
+    report: HTML page
+    frames: EXR files
+    replay: page that plays the episode; None unless it was requested
+    """
 
     report: Path
     frames: list[Path]
@@ -52,6 +57,12 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
     shown: True to show a progress bar
     replay: True to also write a page that plays the episode
+
+    Raises:
+        RunError: the policy of the best animal is missing or damaged.
+        ConfigError: the user task was not named when the run was opened, or fails.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        OSError: a file cannot be read or written.
     """
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
@@ -61,7 +72,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
         from evolve.report.write import write
 
         best, played = recorder.record(run, pictures=True), None
-        # The former report is deleted only now, so that it is kept if no episode can be played.
+        # The old report is deleted only now, so that it is kept if no episode can be played.
         (run.path / REPORT).unlink(missing_ok=True)
         if replay:
             wait.step("writing the replay")
@@ -73,15 +84,15 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
 
 def replay(arguments: Namespace) -> int:
-    """Simulate an episode of an agent, print a table of it, and write a page that plays the episode."""
+    """Play an episode of an agent, print a table of the result, and write a page that shows the episode."""
     run = _open(arguments)
     with _waiting(arguments, "an episode is played and written"):
         from evolve.report.replay import BESIDE, episode_facts, episode_table, write_replay
 
         also = [form for form in BESIDE if getattr(arguments, form)]
         mode = "test" if arguments.test else "evaluation"
-        asked = (arguments.candidate, arguments.seed, arguments.every)
-        episode, paths = write_replay(run, *asked, also, arguments.out, mode)
+        selected = (arguments.candidate, arguments.seed, arguments.every)
+        episode, paths = write_replay(run, *selected, also, arguments.out, mode)
     if arguments.json:
         say(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))
     else:
@@ -92,7 +103,7 @@ def replay(arguments: Namespace) -> int:
 
 
 def report(arguments: Namespace) -> int:
-    """Write the report."""
+    """Write the HTML report of a run, and print its path."""
     run = _open(arguments)
     with _waiting(arguments, "the report is written") as wait:
         from evolve.report.write import write
@@ -104,13 +115,13 @@ def report(arguments: Namespace) -> int:
 
 
 def export(arguments: Namespace) -> int:
-    """Write the spectral radiance in front of an agent's eyes during an episode, as one EXR file per exported frame."""
+    """Write the radiance in front of an agent's eyes and the eyes' signals as EXR files, and print their number."""
     run = _open(arguments)
     with _waiting(arguments, "EXR files are written") as wait:
         from evolve.report.exr_export import export_run
 
-        asked = (arguments.candidate, arguments.seed, arguments.every, arguments.out)
-        files = export_run(run, *asked, wait.within)
+        selected = (arguments.candidate, arguments.seed, arguments.every, arguments.out)
+        files = export_run(run, *selected, wait.within)
     if arguments.json:
         say(json.dumps({"exr": [str(file) for file in files]}, indent=1))
     else:
@@ -125,13 +136,18 @@ def open_page(page: Path, arguments: Namespace) -> None:
 
 
 def _waiting(arguments: Namespace, text: str) -> Waiting:
-    """Return a progress bar for one step, which takes at most half a minute."""
+    """Return a progress bar for a single step, which `text` describes."""
     wait = Waiting(1, shown=not (arguments.json or arguments.quiet))
     return wait.of_one_step(text)
 
 
 def _open(arguments: Namespace) -> Run:
-    """Open the run, and check that eyes can be computed on this machine."""
+    """Open the run, and check that eyes can be computed on this machine.
+
+    Raises:
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        RunError: the directory contains no run, or its record is damaged; see `Run.open` for its other errors.
+    """
     run = Run.open(arguments.directory, arguments.task, arguments.before_damage)
     device.make_ready()
     return run

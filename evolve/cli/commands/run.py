@@ -33,7 +33,7 @@ __all__ = ["resume", "start"]
 
 
 def start(arguments: Namespace) -> int:
-    """Start a run and continue it to its end; with --dry-run, print its plan only."""
+    """Start a run and continue it to its end. With --dry-run, only print its plan."""
     if arguments.dry_run:
         _refuse_without_run(arguments)
     scheduler = _scheduler(arguments)
@@ -42,9 +42,8 @@ def start(arguments: Namespace) -> int:
     prepared = prepare_run(_request(arguments), tried=not arguments.dry_run)
     if arguments.dry_run:
         return _show(RunPlan.from_config(prepared.config, prepared.directory(arguments.out)), arguments.json)
-    notes = (
-        [] if arguments.json or arguments.quiet else lint(prepared.config)
-    )  # this may build the task's world, which takes time, so it precedes the run directory
+    # `lint` may build the task's world, which takes time, so it is called before the run directory is created.
+    notes = [] if arguments.json or arguments.quiet else lint(prepared.config)
     with prepared.create(Run, arguments.out) as run:
         if not arguments.json:
             for note in notes:
@@ -68,7 +67,11 @@ def resume(arguments: Namespace) -> int:
 
 
 def _refuse_without_run(arguments: Namespace) -> None:
-    """Refuse options that have no effect with `--dry-run`, because no run starts."""
+    """Refuse options that have no effect with `--dry-run`, because no run starts.
+
+    Raises:
+        ConfigError: such an option was given.
+    """
     for name in ("open", "tensorboard", "quiet", "scheduler"):
         if getattr(arguments, name):
             raise ConfigError(f"--{name}: must be left out with --dry-run, which prints the plan for this machine only")
@@ -145,7 +148,7 @@ def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> in
 def _already_finished(run: Run, arguments: Namespace) -> int:
     """Write the report and EXR files of a finished run if they are missing, or if EXR files are damaged.
 
-    They are missing if the run was killed after its last evaluation.
+    These files are missing if the run was killed after its last evaluation.
     """
     page, frames = run.path / REPORT, sorted((run.path / EXR).glob("*.exr"))
     if not page.is_file() or not frames or harmed(run.path / EXR):
@@ -172,7 +175,12 @@ def _workers(
 
 
 def _scheduler(arguments: Namespace) -> Scheduler | None:
-    """Return Dask's scheduler after checking that it is reachable; None if the workers are local processes."""
+    """Return the Dask scheduler after a check that it answers; None if the workers are local processes.
+
+    Raises:
+        ConfigError: options contradict each other, the address is malformed, or certificates are missing or invalid.
+        ExecutorError: the scheduler does not answer, or Dask is not installed.
+    """
     files = arguments.tls_ca_file, arguments.tls_cert, arguments.tls_key
     wanted = arguments.scheduler is not None
     if (arguments.executor == "dask") != wanted or (any(files) and not wanted):
@@ -187,7 +195,7 @@ def _scheduler(arguments: Namespace) -> Scheduler | None:
 
 
 def _finish(run: Run, arguments: Namespace) -> int:
-    """Write the report and the EXR files, and print their paths; return 1 if no candidate could be evaluated."""
+    """Write the report and the EXR files, and print their paths. Return 1 if every candidate failed, else 0."""
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
         print(f"evolve: every candidate failed; the last failure: {failures[-1].failure}", file=sys.stderr)

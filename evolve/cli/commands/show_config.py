@@ -34,7 +34,11 @@ def config(arguments: Namespace) -> int:
 
 
 def _refuse_for_schema(arguments: Namespace) -> None:
-    """Refuse options that determine values of settings: the schema describes the settings of all runs."""
+    """Refuse options that determine values of settings, because the schema describes the settings of all runs.
+
+    Raises:
+        ConfigError: such an option was given.
+    """
     values = {"TASK": arguments.task, "--config": arguments.config, "--set": arguments.set, "--scale": arguments.scale}
     values["--preset"] = arguments.preset != arguments.parser.get_default("preset")
     for name, given in values.items():

@@ -53,7 +53,10 @@ def _read(arguments: Namespace) -> dict[str, Any]:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print one line for each run in a directory, the latest last; for an unreadable run, the line gives the reason."""
+    """Print one line for each run in a directory, with the latest run last.
+
+    For a run that cannot be read, the line states the reason.
+    """
     # os.path.exists returns False for an unreadable folder, which cannot be a run of this user. pathlib would raise.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
@@ -101,7 +104,13 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
 
 
 def standing(run: Run) -> dict[str, Any]:
-    """Return the state of a run as JSON values."""
+    """Return the state of a run, its best candidate and its generations as JSON values.
+
+    The state is "running" if a process holds the lock of the run, else "finished" or "interrupted".
+
+    Raises:
+        OSError: the lock or config.toml cannot be read.
+    """
     worker = holder(run.path)
     state = "running" if worker else "finished" if finished(run) else "interrupted"
     best = run.best
@@ -137,7 +146,7 @@ def _generations(run: Run) -> list[dict[str, Any]]:
 
 
 def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
-    """Return the state of a generation as JSON values; task fitness and costs describe its best member."""
+    """Return the state of a generation as JSON values. Task fitness and costs are those of its best candidate."""
     done = [candidate for candidate in members if candidate.failure is None]
     best = max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
     return {
@@ -159,16 +168,16 @@ def standing_lines(now: dict[str, Any]) -> list[str]:
         f"{count['evaluated']} of {count['planned']} candidates evaluated{failed}, {now['steps']:,} steps trained",
     ]
     if unchecked := now["lines_without_checksum"]:
-        lines.append(f"checksums: the first {unchecked} lines of the record have none (written by a former version)")
+        lines.append(f"checksums: the first {unchecked} lines of the record have none (an older version wrote them)")
     if now["last_failure"]:
         lines.append(f"last failure: {now['last_failure']}")
     lines += episode_failure_lines(now["mishaps"])
     if best is not None:
         lines.append(f"best: candidate {best['id']}, fitness {fitness_text(best['fitness'], best['costs'])}")
-    told = [(number, g) for number, g in enumerate(now["generations"]) if g["best"] is not None]
-    if len(told) > SHOWN:
-        lines.append(f"generations 0 to {told[-SHOWN][0] - 1}: best {max(g['best'] for _, g in told[:-SHOWN]):.4g}")
-    for number, generation in told[-SHOWN:]:
+    known = [(number, g) for number, g in enumerate(now["generations"]) if g["best"] is not None]
+    if len(known) > SHOWN:
+        lines.append(f"generations 0 to {known[-SHOWN][0] - 1}: best {max(g['best'] for _, g in known[:-SHOWN]):.4g}")
+    for number, generation in known[-SHOWN:]:
         shown = fitness_text(generation["best"], generation["costs"])
         lines.append(f"generation {number}: best {shown}, median {generation['median']:.4g}")
     if now["state"] == "interrupted":

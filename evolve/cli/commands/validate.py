@@ -25,7 +25,7 @@ class _Proof:
     """A validation script.
 
     module: name of the script's module
-    old: former name with a code, such as "B0_planner"; "" if there is none
+    old: old name with a code, such as "B0_planner"; "" if there is none
     """
 
     module: str
@@ -50,7 +50,14 @@ def doctor(arguments: Namespace) -> int:
 
 
 def validate(arguments: Namespace) -> int:
-    """Run all scripts of `validation`, or those named, which check results and draw figures; return 1 if any fails."""
+    """Run validation scripts, which check results and draw figures. Return 1 if one fails, and 2 without a checkout.
+
+    Without names of scripts, all scripts run.
+
+    Raises:
+        ConfigError: a name is unknown.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
+    """
     listed = CHECKOUT / "validation" / "proofs.toml"
     if not listed.is_file():
         print("evolve: error: validate needs a checkout of rhabdom: its scripts are not installed", file=sys.stderr)
@@ -67,7 +74,7 @@ def validate(arguments: Namespace) -> int:
 
 
 def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
-    """Return the script with this name or former code. If a code is given, print the current name.
+    """Return the script with this name, old name or code. If it is not the current name, print the current name.
 
     Raises:
         ConfigError: the name is unknown.
@@ -87,7 +94,7 @@ def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
 
 
 def _run(proofs: list[_Proof]) -> int:
-    """Run the scripts one after another; return 1 if any fails."""
+    """Run the scripts one after another. Return 1 if one fails, else 0."""
     from evolve.runs.progress import clock
 
     if len(proofs) > 1:

@@ -1,4 +1,4 @@
-"""Area sampling: means over rectangles of the visual field in closed form, which would otherwise need many rays.
+"""Area sampling: mean light in rectangles of the visual field, in closed form instead of from many rays.
 
 area_tracer         AreaTracer: the light in an area
 branches            branches of the kernel, for computations that few areas need

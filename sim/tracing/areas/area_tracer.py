@@ -91,16 +91,16 @@ class AreaTracer:
     def radiance(
         self,
         area: Area,
-        met: tuple[Array, Array],
+        faces: tuple[Array, Array],
         now: FrameState,
         depth: DepthLayers = ONE_PSF,
     ) -> list[Array]:
         """Return the mean radiance in each area, one array per component, for each depth layer.
 
-        met: faces at the area's left and right border, see `first_faces` and `border_faces`
+        faces: indices of the walls' faces at the area's left and right border, see `border_faces`
         """
         nothing = [0.0] * (depth.count * len(self.basis))
-        pieces = self._columns.pieces(area, met, now.inputs.face_ends)
+        pieces = self._columns.pieces(area, faces, now.inputs.face_ends)
         seen = [
             only_where(piece.wall_share > 0, partial(self._wall, area, piece, now, depth), nothing) for piece in pieces
         ]
@@ -123,11 +123,11 @@ class AreaTracer:
         return [own + veil for own, veil in zip(found, self._medium.veil, strict=False)] + found[len(self.basis) :]
 
     def first_faces(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
-        """Return the number of the wall's face that a ray in a horizontal direction (Vector2f) hits."""
+        """Return the index of the wall's face that a ray in a horizontal direction (Vector2f) hits."""
         return self._columns.first_faces(origin, level, inputs.cells)
 
     def border_faces(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
-        """Return the numbers of the faces at an area's left and right border."""
+        """Return the indices of the faces at an area's left and right border."""
         left, right = (self.first_faces(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
 
@@ -213,10 +213,10 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return fractions of the area in which a sphere hides left wall, right wall and floor, and the sphere's light.
+        """Return fractions of the area in which a sphere hides each wall (left, right) and the floor, then its light.
 
-        The light is multiplied by the fraction of the area that the sphere fills, per component. Parts of the sphere
-        that nearer spheres hide are omitted.
+        The light of the sphere is multiplied by the fraction of the area that the sphere fills, per component. Parts of
+        the sphere that nearer spheres hide are omitted.
         """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
@@ -284,7 +284,7 @@ def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) 
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
-    """Return eight numbers per face, from which the kernel finds the texture at a point, flat.
+    """Return eight numbers per face, flat, from which the kernel finds the texture at a point.
 
     They are the texel's column as an affine function of (x, y, z), the texture's first texel and its number of columns.
     """

@@ -36,7 +36,7 @@ class BodyLight:
 
     @classmethod
     def on_patch(cls, illumination: Illumination, body: int, patch: Patch, now: FrameState) -> BodyLight:
-        """Return the light on the visible part of the body with the number `body`, which `patch` represents."""
+        """Return the light on the visible part of the body with the index `body`, which `patch` represents."""
         lit = illumination.visibility(patch, now, body)
         if not now.body_light:
             return cls(illumination, lit, [], [])
@@ -58,7 +58,7 @@ class BodyLight:
 class LitSphere:
     """A sphere in an area.
 
-    number: number of the sphere among the bodies
+    number: index of the sphere among the bodies
     view: visible part of the sphere
     light: light on the sphere
     now: inputs of the current frame

@@ -14,7 +14,7 @@ class Borders:
     """Left and right borders of areas.
 
     x: positions of the borders on the tangent plane at distance 1, (border,)
-    sides: numbers of each area's left and right border, (area, 2)
+    sides: indices of each area's left and right border, (area, 2)
     """
 
     x: np.ndarray
@@ -22,7 +22,7 @@ class Borders:
 
     @classmethod
     def from_middles(cls, middles: np.ndarray, width: float) -> Borders:
-        """Return the borders of areas of equal width around the positions `middles`."""
+        """Return the borders of areas of equal width around the positions `middles`, (area,)."""
         edges = np.stack([middles - width / 2, middles + width / 2], axis=-1)
         _, first, sides = np.unique(np.rint(edges * (PARTS / width)), return_index=True, return_inverse=True)
         return cls(edges.ravel()[first], sides.reshape(edges.shape))

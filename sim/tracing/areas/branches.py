@@ -14,6 +14,10 @@ def only_where(needed: Array, values: Callable[[], list[Array]], otherwise: list
     """Return the values in lanes that need them, and the alternatives in all others.
 
     Packets of lanes skip the computation if none of their lanes needs the values.
+
+    needed: mask of the lanes that need the values
+    values: function that computes the values
+    otherwise: alternatives, one for each value
     """
     found: list[Array] = dr.if_stmt((), needed, values, lambda: [mi.Float(value) for value in otherwise])
     return found

@@ -38,7 +38,7 @@ class CellGrid:
 
     @property
     def numbers(self) -> np.ndarray:
-        """Numbers of the free cells, row by row; 0 for cells with a wall."""
+        """Indices of the free cells, counted row by row, (row, column); 0 for cells with a wall."""
         return np.where(self.free, np.cumsum(self.free).reshape(self.free.shape) - 1, 0)
 
     @property

@@ -31,7 +31,7 @@ RIM = 4  # number of sides of the floor; its rim counts as a wall in directions 
 class Face:
     """A face of a wall.
 
-    index: number of the face
+    index: index of the face
     left, right: ends of the face, as seen from the front (Point2f)
     """
 
@@ -70,7 +70,7 @@ class Piece:
         return area.origin.xy + area.level(a) / self.inverse_distance_at(a)
 
     def patch(self, area: Area, floor: float, top: float) -> Patch:
-        """Return the visible patch of the wall."""
+        """Return the visible patch of the wall; floor, top: heights of the floor and of the wall's top [m]."""
         near = self.inverse_distance_at(self.middle)
         bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
         low = dr.maximum((floor - area.origin.z) * near, bottom)
@@ -103,18 +103,23 @@ class Columns:
         self._rim = SIDES * len(walls)
         self.face_ends = floats(_face_ends(walls))
 
-    def pieces(self, area: Area, met: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
+    def pieces(self, area: Area, faces: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
         """Return the left and the right piece. If one wall fills all columns, the right piece is empty.
 
-        met: faces at the area's left and right border, see `first_faces`
+        faces: indices of the faces at the area's left and right border, see `first_faces`
         """
         half = mi.Float(0.5)
-        left, right = (self._face(index, face_ends) for index in met)
+        left, right = (self._face(index, face_ends) for index in faces)
         edge = dr.select(left.index == right.index, half, self._edge(area, left, right))
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
     def first_faces(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
-        """Return the number of the face that a ray in a horizontal direction (Vector2f) hits."""
+        """Return the index of the face that a ray in the horizontal direction `level` (Vector2f) hits first.
+
+        A ray that hits no wall hits a side of the floor's rim.
+
+        cells: see `Footprints`
+        """
         ray = mi.Ray3f(origin, mi.Vector3f(level.x, level.y, 0))
         t, face, _ = self._footprints.hit(ray, cells)
         return dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
@@ -125,7 +130,7 @@ class Columns:
         return Face(face, mi.Point2f(ends.x, ends.y), mi.Point2f(ends.z, ends.w))
 
     def _side_of_floor(self, ray: Array) -> Array:
-        """Return the number of the side through which a ray leaves the floor: -x, +x, -y, +y."""
+        """Return the index of the side through which a ray leaves the floor: -x, +x, -y, +y."""
         t = [
             (dr.select(d > 0, upper, lower) - o) / dr.select(dr.abs(d) < LEAST_NEARNESS, LEAST_NEARNESS, d)
             for o, d, lower, upper in zip(ray.o, ray.d, self._lower, self._upper, strict=False)
@@ -169,7 +174,7 @@ class Columns:
 
 
 def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
-    """Return the inverse distance of a face's line at a = 0, and its slope along a."""
+    """Return the inverse distance of a face's line at a = 0, and its slope along a [1/m]."""
     side = face.right - face.left
     scale = dr.rcp(_cross(face.left - area.origin.xy, side))
     return _cross(area.ahead, side) * scale, _cross(area.right, side) * scale

@@ -21,7 +21,7 @@ MIDDLE = 2 / 3  # distance from a body's centre to the middle of its visible sid
 # Number of places on a body along x and along y. The outer ones are at the middles of the body's sides. Interpolation
 # between places has an error of 0.05.
 SIDES = 3
-WHOLE = SIDES * SIDES  # number of the place that represents the whole body
+WHOLE = SIDES * SIDES  # index of the place that represents the whole body
 PLACES = WHOLE + 1
 
 Reflected = Callable[[Array, Array, Array], list[Array]]
@@ -58,7 +58,7 @@ class IlluminatedBodies:
         place: row of a world's table
         bodies: centres of the world's bodies
         walls_around: see `WallShadows`
-        reflected: function that returns harmonics for a body's number, the number of a group of four, and the body's
+        reflected: function that returns harmonics for a body's index, the index of a group of four, and the body's
             centre
         """
         k, side = place // PLACES, place % PLACES
@@ -91,7 +91,10 @@ class IlluminatedBodies:
         return self._row((world * len(self._radii) + k) * PLACES + WHOLE, table)
 
     def on_side(self, k: Array, towards: Array, world: Array, table: list[Array]) -> list[Array]:
-        """Return the fraction of each light that reaches the k-th body on its side in a direction (unit vector)."""
+        """Return the fraction of each light that reaches the side of the k-th body in the direction `towards`.
+
+        towards: unit vector from the body's centre
+        """
         # In whole numbers, because with many worlds, float32 is not accurate enough.
         first = (world * len(self._radii) + k) * PLACES
         found = [mi.Float(0) for _ in self._directions]

@@ -25,7 +25,7 @@ from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.wall_intersection import CellTables
 
 REACH = 8  # [radii] more distant bodies are ignored, because they fill less than 1/64 of the view from a patch
-ITSELF_NONE = 2**16  # number for a patch that does not lie on a body
+ITSELF_NONE = 2**16  # index for a patch that does not lie on a body
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,11 @@ class AreaTables:
 
 @dataclass(frozen=True)
 class FrameState:
-    """Inputs that change between calls.
+    """Inputs of area sampling for one frame.
 
     bodies: centres of the moving spheres; the agent is the last one
     inputs: tables that are the same in all worlds
-    world: number of the world of each area
+    world: index of the world of each area
     body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is neglected
     """
 
@@ -67,8 +67,10 @@ class FrameState:
 class Illumination:
     """Direct and reflected light on patches, without the light that walls and bodies block.
 
-    around: table of the walls around each cell, see `WallShadows`
-    bodies: the light on bodies
+    rays: tracer of rays through the world
+    radii: radii of the bodies [m], (body,)
+    around: attribute, table of the walls around each cell, see `WallShadows`
+    bodies: attribute, the light on bodies
 
     Raises:
         NoClosedForm: WallShadows has no closed form for the shadows.
@@ -90,7 +92,7 @@ class Illumination:
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
         """Return the fraction of a patch that each light reaches.
 
-        itself: number of the body on which the patch lies
+        itself: index of the body on which the patch lies
         """
 
         def past(k: Array, lit: list[Array]) -> list[Array]:
@@ -116,6 +118,9 @@ class Illumination:
         """Return the reflected light on a patch, per component, corrected for bodies.
 
         Light that bodies hide is subtracted, and light that they reflect is added.
+
+        arriving: reflected light on the patch without bodies, per component
+        itself: index of the body on which the patch lies
         """
 
         def past(k: Array, arriving: list[Array]) -> list[Array]:
@@ -142,11 +147,12 @@ class Illumination:
     def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: FrameState) -> list[Array]:
         """Return the light that a body sends to a patch, minus the light that the body hides from the patch.
 
-        Both use the form factor of a sphere.
+        Both use the form factor of a sphere. Light that the patch lacks because of the body's shadows on the floor is
+        also subtracted, see `_shadow`.
 
         If the patch's horizon crosses the sphere, Snyder's (1996) form factor applies. The hidden light is the light
         that arrives on the body's far side, as seen from the patch. Its radiance follows from the irradiance of that
-        side. At most the light that arrives at the patch is subtracted.
+        side. The hidden light is at most the light that arrives at the patch (`arriving`, per component).
         """
         way, radius = select(k, now.bodies) - patch.point, select(k, self._radii)
         distance = dr.maximum(dr.norm(way), radius)
@@ -202,6 +208,9 @@ class Illumination:
 
 
 def _mean_colour(rays: ClosedForm, place: np.ndarray) -> np.ndarray:
-    """Return the mean reflectance of the texture at this place, (component,), in the components of reflected light."""
+    """Return the mean reflectance of a texture, (component,), in the components of reflected light.
+
+    place: place of the texture in the atlas, see `Atlas.places`
+    """
     first, columns = map(int, place[:2])
     return rays.components.reflectance[first : first + columns].mean(axis=0)

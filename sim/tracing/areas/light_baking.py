@@ -32,6 +32,8 @@ LANES = 2**21  # rays traced at once
 class Baking:
     """Computation of the tables of one world.
 
+    tracer: tracer of rays through the world
+    nodes: points of floor and walls at which the light is computed
     kinds: radius and height of the centre [m] of each kind of body
     """
 
@@ -76,7 +78,7 @@ class Baking:
         return {name: np.ascontiguousarray(table) for name, table in found.items()}
 
     def _between(self, found: dict[str, np.ndarray]) -> Irradiance:
-        """Return a function for the irradiance at any point, interpolated in these tables."""
+        """Return a function that interpolates these tables to the irradiance at any point."""
         light, count = NodeLight(self._nodes, len(self._tracer.basis)), range(len(self._tracer.basis))
         floor, walls = ([floats(found[f"bounced_{name}_{k}"]) for k in count] for name in ("floor", "walls"))
         tables = NodeTables(floats(self._nodes.cells), floor, walls)
@@ -125,7 +127,10 @@ class Baking:
         return light.reshape(-1, light.shape[-1])
 
     def _on_body(self, radius: float, height: float) -> np.ndarray:
-        """Return harmonics (place, FOURS * 4, component) of the light on a body's surface, ordered by cell, y and x."""
+        """Return harmonics (place, FOURS * 4, component) of the light on a body's surface, ordered by cell, y and x.
+
+        radius, height: radius of the body, and height of its centre [m]
+        """
         margin = self._nodes.body_margin(radius)
         offsets = np.linspace(margin, self._nodes.grid.side - margin, self._nodes.places)
         y, x = (a.ravel() for a in np.meshgrid(offsets, offsets, indexing="ij"))
@@ -145,8 +150,9 @@ class Baking:
     ) -> np.ndarray:
         """Return the irradiance at points (n, 3) due to light from walls and floor, (n, component).
 
+        normals: normals of the surface at the points, (n, 3)
         rays: number of rays from each point
-        shade: radius of a body that casts a shadow, and its centre for each point
+        shade: radius of a body that casts a shadow [m], and its centre for each point, (n, 3); None: no shadow
         """
         samples = mi.Point2f(*(floats(np.tile(c, max(LANES // rays, 1))) for c in low_discrepancy(rays).T))
         dr.eval(samples)
@@ -167,7 +173,7 @@ class Baking:
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
-    """Return the positions of nodes along a length, at least MARGIN away from its ends."""
+    """Return the positions of evenly spaced nodes along a length [m], at least MARGIN away from its ends, (nodes,)."""
     return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
 
 

@@ -31,12 +31,12 @@ SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # sides of a cell, on whic
 
 @dataclass(frozen=True)
 class LightNodes:
-    """Nodes of a world.
+    """Nodes of a world: points of floor and walls, and positions of bodies, at which reflected light is tabulated.
 
     grid: free cells
     floor, top: heights of the floor and of the walls' tops [m]
     across, up: numbers of nodes along a cell and up a wall
-    places: number of bodies' places along a cell
+    places: number of positions of a body's centre along a cell
     """
 
     grid: CellGrid
@@ -71,7 +71,7 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Numbers of all cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
+        """Indices of all cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
         return self.grid.numbers.astype(np.float32).ravel()
 
 

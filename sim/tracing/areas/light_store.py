@@ -63,7 +63,7 @@ def _digest(ingredients: list[np.ndarray]) -> str:
 
 
 def _checksum(tables: dict[str, np.ndarray], world: str) -> np.ndarray:
-    """Return the checksum of a world's tables, as bytes."""
+    """Return the SHA-256 checksum of a world's tables, (32,) uint8."""
     digest = hashlib.sha256(world.encode())
     for name in sorted(tables):
         digest.update(f"{name} {tables[name].size} ".encode())
@@ -109,7 +109,10 @@ def _table(archive: zipfile.ZipFile, name: str, dtype: np.dtype, size: int) -> n
 
 
 def _write(path: Path, tables: dict[str, np.ndarray], world: str) -> None:
-    """Write the file completely or not at all, even if other processes write it at the same time."""
+    """Write the tables to a file, completely or not at all, even if other processes write it at the same time.
+
+    Of the files in the cache, only the newest KEPT remain.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     for old in sorted(path.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime)[: -(KEPT - 1)]:
         old.unlink(missing_ok=True)

@@ -37,8 +37,7 @@ class LightTable(NodeLight):
 
     tracer: tracer of rays through the same world; the tables have its components of light
     radii, heights: radii of the bodies, and heights of their centres [m]
-
-    tables: the tables in the form in which the kernel receives them
+    tables: attribute, the tables in the form in which the kernel receives them
 
     Raises:
         NoClosedForm: there are no walls, or too many cells for the tables.
@@ -59,8 +58,8 @@ class LightTable(NodeLight):
 
         All FOURS groups together are the coefficients for `sum_of`.
 
-        body: number of the body
-        four: number of the group of four harmonics
+        body: index of the body
+        four: index of the group of four harmonics
         centre: centre of the body
         """
         cell, x, y = self._nodes.grid.locate(centre, tables.cells)

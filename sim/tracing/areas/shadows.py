@@ -22,7 +22,10 @@ NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
 
 
 def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, radius: Array) -> list[Array]:
-    """Return the fraction of a patch on which a sphere casts no shadow, for each light."""
+    """Return the fraction of a patch on which a sphere casts no shadow, for each light.
+
+    directions: unit vectors towards the lights
+    """
     way = centre - patch.point
     slope = max(math.hypot(*d[:2]) / d[2] for d in directions)
     patch_reach = (dr.norm(patch.along) + dr.norm(patch.across)) / 2
@@ -40,6 +43,9 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: A
 
     On small patches, the rim of the shadow is treated as one straight line, or as two. On large patches, the shadow is
     treated as a disk within the patch.
+
+    direction: unit vector towards the light
+    way: vector from the middle of the patch to the centre of the sphere
     """
     towards = mi.Vector3f(*direction)
     ahead = dr.dot(way, towards)

@@ -32,7 +32,7 @@ NEARLY_OPEN = 1e-4  # chosen: outlines whose length exceeds about 100 times thei
 class SphereTexture:
     """A texture that changes along one axis.
 
-    texture: its place in the tables
+    texture: place of the texture in the tables
     to_column: map column = to_column @ (u, v, 1)
     frame: rotation from the sphere's axes to the world's, (3, 3)
     """
@@ -102,7 +102,7 @@ class SphereView:
         return self._between(mi.Float(0), mi.Float(1))
 
     def strip(self, number: Array) -> Strip:
-        """Return the strip with this number, counted from 0."""
+        """Return the strip with this index."""
         per = dr.rcp(mi.Float(self.sides))
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
@@ -120,7 +120,7 @@ class SphereView:
         return Strip(length * width, seen, *sides, self._patch(seen, *sides), dr.select(self._upright, *upright))
 
     def slice(self, strip: Strip, number: Array) -> Slice:
-        """Return the slice of a strip with this number, counted from 0."""
+        """Return the slice with this index of a strip."""
         per = dr.rcp(mi.Float(self.sides))
         seen = strip.seen + strip.along * ((mi.Float(number) + 0.5) * per - 0.5)
         sides = strip.along * per, strip.across
@@ -241,7 +241,7 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 
     The sphere's outline is approximated by a straight line in the slice.
 
-    way: vector to the sphere's centre
+    way: vector from the eye to the sphere's centre
     """
     seen, sides = slice_.seen, (slice_.along, slice_.across)
     length, moment = dr.norm(seen), dr.cross(way, seen)
@@ -280,7 +280,12 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
-    """Return the patch around the point at which a ray in the direction `seen` hits the sphere."""
+    """Return the patch around the point at which a ray in the direction `seen` hits the sphere.
+
+    way, tangent: see `_chord`
+    along, across: sides of the patch on the area's plane
+    origin, centre: the pupil, and the centre of the sphere
+    """
     length = dr.squared_norm(seen)
     ahead = dr.dot(way, seen)
     t = (ahead - dr.sqrt(dr.maximum(ahead * ahead - length * tangent, 0))) / length

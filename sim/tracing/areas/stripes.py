@@ -31,7 +31,7 @@ HALF_ULP = 2.0**-24  # largest relative error of a number that is rounded to flo
 class Texture:
     """The place of a texture in the kernel's tables.
 
-    first: number of the first texel
+    first: index of the first texel
     columns: number of columns
     least_side: shorter sides of parallelograms are treated as this long [texels], see `Stripes.texture`
     """
@@ -58,9 +58,8 @@ class Stripes:
     """Averages of textures along one axis.
 
     reflectance: (texel, component)
-    places: first texel and number of columns of each texture, (texture, 2)
-
-    tables: the tables in the form in which the kernel receives them
+    places: index of the first texel, and number of columns of each texture, (texture, 2)
+    tables: attribute, the tables in the form in which the kernel receives them
     """
 
     def __init__(self, reflectance: np.ndarray, places: np.ndarray) -> None:
@@ -148,7 +147,7 @@ class Stripes:
 def _least_side(largest: float) -> float:
     """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most ROUNDING.
 
-    It is at most one texel, because textures are linear between texels. A mean is a sum of four values of the second
+    It is at least one texel, because textures are linear between texels. A mean is a sum of four values of the second
     integral, divided by the product of the sides. Each value is rounded twice: in the table, and after the polynomial
     within a texel is added.
 
@@ -158,5 +157,5 @@ def _least_side(largest: float) -> float:
 
 
 def _integral_up_to(steps: np.ndarray) -> np.ndarray:
-    """Return the sum of all steps before each step."""
+    """Return the sum of all steps before each step, along the first axis."""
     return np.cumsum(steps, axis=0) - steps

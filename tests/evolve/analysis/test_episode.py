@@ -111,7 +111,7 @@ def test_a_file_that_is_no_episode_is_refused(episode, tmp_path):
     np.savez(tmp_path / "pickled.npz", rest=np.array([{}], dtype=object))
     for content in (b"", whole[: len(whole) // 2], pickle.dumps({}), (tmp_path / "pickled.npz").read_bytes()):
         path.write_bytes(content)
-        with pytest.raises(ValueError, match=r"episode\.npz holds no episode"):
+        with pytest.raises(ValueError, match=r"episode\.npz contains no episode"):
             load_episode(path)
 
 
@@ -151,7 +151,7 @@ def test_policies_of_another_animal_or_damaged_are_named(run):
         with pytest.raises(RunError, match=f"{policy.name} is another animal's: its eyes have the shape "):
             record(run)
         for damage, named in (
-            (math.nan, "it holds numbers that are not finite"),
+            (math.nan, "it contains numbers that are not finite"),
             (3e38, "is damaged: policy's actions"),
         ):
             policy.write_bytes(whole)
@@ -242,7 +242,7 @@ def test_files_of_worlds_out_of_range_are_refused(episode, tmp_path):
     """The error names the setting, before any world is built."""
     columns, rest = of_first_form(dataclasses.replace(episode, task="maze", world=WorldConfig(mazes=10**9)))
     np.savez(tmp_path / "large.npz", rest=np.array(json.dumps(rest)), **columns)
-    with pytest.raises(ValueError, match=r"large\.npz holds no episode: world\.mazes = 1000000000: must be"):
+    with pytest.raises(ValueError, match=r"large\.npz contains no episode: world\.mazes = 1000000000: must be"):
         load_episode(tmp_path / "large.npz")
 
 
@@ -251,10 +251,10 @@ def test_archives_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch):
     bomb = tmp_path / "bomb.npz"
     np.savez_compressed(bomb, returns=np.zeros(2**22))
     monkeypatch.setattr(episode_file, "MOST_BYTES", 2**20)
-    with pytest.raises(ValueError, match=r"bomb.npz holds no episode: it would unpack to 33,554,\d+ bytes"):
+    with pytest.raises(ValueError, match=r"bomb.npz contains no episode: it would unpack to 33,554,\d+ bytes"):
         load_episode(bomb)
     os.mkfifo(tmp_path / "pipe.npz")
-    with pytest.raises(ValueError, match=r"pipe.npz holds no episode"):
+    with pytest.raises(ValueError, match=r"pipe.npz contains no episode"):
         load_episode(tmp_path / "pipe.npz")
 
 

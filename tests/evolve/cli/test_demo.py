@@ -77,7 +77,7 @@ def test_demo_writes_over_nothing_of_others(call, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     code, out, err = call("demo", "--out", tmp_path)
     assert (code, out) == (2, "")
-    assert err == f"evolve: error: {tmp_path} holds other files: choose another directory with --out\n"
+    assert err == f"evolve: error: {tmp_path} contains other files: choose another directory with --out\n"
     (tmp_path / "config.toml").write_text("mine")
     assert call("demo", "--out", tmp_path)[0] == 2
     assert (tmp_path / "config.toml").read_text() == "mine"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import evolve.cli.pace
-from evolve.cli.pace import ROLLOUTS, _short_life
+from evolve.cli.pace import ROLLOUTS, _timed_training
 from evolve.config.assemble import assemble
 from evolve.config.run_config import LearningConfig
 from evolve.learning.task_trial import UnusedSettingWarning
@@ -50,7 +50,7 @@ def test_the_measured_rollouts_are_the_shortest_of_whole_batches(seed, monkeypat
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", evaluate)
     batch, n_envs, n_steps = draw.choice([64, 1024]), draw.choice([16, 48, 128]), 8 * draw.randint(1, 40)
     learning = LearningConfig(n_envs=n_envs, n_steps=n_steps, batch_size=batch, total_steps=10**6)
-    _short_life(replace(small_config(), learning=learning), PHENOTYPE, 0, tmp_path / "policy")
+    _timed_training(replace(small_config(), learning=learning), PHENOTYPE, 0, tmp_path / "policy")
     rollout = seen[0].n_envs * seen[0].n_steps
     assert (seen[0].n_envs, seen[0].batch_size, seen[0].total_steps) == (n_envs, batch, ROLLOUTS * rollout)
     shorter = [n for n in range(2, n_steps) if n_envs * n % batch == 0]

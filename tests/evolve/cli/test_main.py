@@ -40,7 +40,7 @@ BAD = {
     "absent config": (("run", "detection", "--config", "/absent.toml"), "/absent.toml: cannot be read"),
     "unwritable place": (("run", "detection", "--out", "/proc/run"), "/proc/run cannot be written"),
     "resume of nothing": (("resume", "/absent"), "/absent is not a run: there is no such directory"),
-    "status of nothing": (("status", "/tmp"), "/tmp is not a run: it holds no config.toml"),
+    "status of nothing": (("status", "/tmp"), "/tmp is not a run: it contains no config.toml"),
     "report of nothing": (("report", "/absent"), "/absent is not a run"),
     "export of nothing": (("export", "/absent"), "/absent is not a run"),
     "negative episode": (("replay", "/absent", "--seed", "-1"), "argument --seed: '-1': must be a whole number, 0 or"),

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 import evolve.cli.pace
-from evolve.cli.pace import ROLLOUTS, Pace, _short_life, _slowest, measure_pace
+from evolve.cli.pace import ROLLOUTS, Pace, _slowest, _timed_training, measure_pace
 from evolve.config.run_config import ConfigError, LearningConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -34,12 +34,12 @@ def test_a_life_that_fails_says_why(monkeypatch, tmp_path):
     """The message gives the reason instead of a missing temporary file."""
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", lambda *_, **__: Evaluation.failed("weights are NaN"))
     with pytest.raises(ValueError, match=r"^weights are NaN$"):
-        _short_life(small_config(), PHENOTYPE, 0, tmp_path / "policy")
+        _timed_training(small_config(), PHENOTYPE, 0, tmp_path / "policy")
 
 
 @pytest.mark.slow
 def test_a_process_that_dies_is_told_in_one_line(monkeypatch):
-    monkeypatch.setattr(evolve.cli.pace, "_short_life", dies)
+    monkeypatch.setattr(evolve.cli.pace, "_timed_training", dies)
     monkeypatch.setattr(evolve.cli.pace, "prepare_device", None)
     with pytest.raises(ExecutorError, match=r"^a process that measured this machine's pace died.*or free some memory$"):
         measure_pace(small_config(), {"start": PHENOTYPE}, 1)
@@ -101,7 +101,7 @@ def test_what_a_pass_takes_is_told_from_the_rest(monkeypatch, n_epochs, least_ep
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", clock.evaluate)
     learning = LearningConfig(n_epochs=n_epochs, least_epochs=least_epochs, total_steps=20 * 4096)
     config = replace(small_config(), learning=learning)
-    pace = _short_life(config, PHENOTYPE, 0, tmp_path / "policy")
+    pace = _timed_training(config, PHENOTYPE, 0, tmp_path / "policy")
     assert (pace.start_s, pace.play_s, pace.policy_bytes) == (pytest.approx(7), pytest.approx(3), 7)
     assert 1 / pace.steps_per_s == pytest.approx(0.001 + 0.0002 * n_epochs)
     slowing = replace(learning, decay_after=5 * 4096)
@@ -124,5 +124,5 @@ def test_a_pass_takes_no_more_than_the_whole(monkeypatch, tmp_path):
     monkeypatch.setattr(evolve.cli.pace, "time", clock)
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", clock.evaluate)
     config = replace(small_config(), learning=LearningConfig())
-    pace = _short_life(config, PHENOTYPE, 0, tmp_path / "policy")
+    pace = _timed_training(config, PHENOTYPE, 0, tmp_path / "policy")
     assert 0 < pace.training_s(config.learning, 0, 1_000_000) < 1_000_000 / pace.steps_per_s

@@ -48,7 +48,7 @@ def _quietly(call, asked, usual):
 
 @pytest.mark.parametrize("value", [np.arange(3), object(), 1j, None, [1, 2]])
 def test_values_of_settings(value, tmp_path):
-    with pytest.raises(evolve.ConfigError, match=r"search.generations = |settings hold "):
+    with pytest.raises(evolve.ConfigError, match=r"search.generations = |settings contain "):
         evolve.run("detection", "quick", {"search.generations": value}, out=tmp_path / "run")
 
 

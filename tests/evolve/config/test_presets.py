@@ -182,7 +182,7 @@ def test_dry_run_predicts_hours(preset, scale, monkeypatch, capsys, tmp_path):
 def test_scales_that_do_not_exist_are_refused():
     with pytest.raises(ConfigError, match="unknown scale 'big' of preset lens; known: laptop, paper"):
         assemble(preset="lens", scale="big")
-    with pytest.raises(ConfigError, match="scale 'laptop': preset quick comes in one scale only"):
+    with pytest.raises(ConfigError, match="scale 'laptop': preset quick has only one scale"):
         assemble("detection", "quick", scale="laptop")
 
 

@@ -61,7 +61,7 @@ def test_only_the_maze_has_mazes_and_only_navigation_a_course():
 def test_photons_are_counted_in_some_light():
     assert assemble("detection", assignments=["eye.illuminance=10", "eye.integration_time=0.1"]).eye.illuminance == 10
     with pytest.raises(
-        ConfigError, match=r"eye\.illuminance = 0\.001.*: too few photons; must be at least 0\.0002 lx s"
+        ConfigError, match=r"eye\.illuminance = 0\.001.*: too few photons; their product must be at least 0\.0002 lx s"
     ):
         assemble("detection", assignments=["eye.illuminance=1e-3"])
     with pytest.raises(ConfigError, match=r"eye\.integration_time = 0\.1: has no effect without shot noise"):

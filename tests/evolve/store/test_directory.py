@@ -89,7 +89,7 @@ def test_a_folder_that_may_not_be_read_is_no_obstacle(tmp_path, monkeypatch):
 def test_what_is_no_run_is_named(tmp_path):
     with pytest.raises(RunError, match="there is no such directory"):
         Run.open(tmp_path / "absent")
-    with pytest.raises(RunError, match=r"it holds no config\.toml"):
+    with pytest.raises(RunError, match=r"it contains no config\.toml"):
         Run.open(tmp_path)
 
 

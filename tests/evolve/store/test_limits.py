@@ -97,7 +97,7 @@ def test_the_length_of_a_genome():
         ({"failure": "it fell", "costs": 1, "task_fitness": 2}, "costs: must be 0 or absent if the candidate failed"),
         ({"task_fitness": 1.0}, r"task_fitness: must be fitness \+ costs if there are costs, else absent"),
         ({"costs": 0.5}, r"task_fitness: must be fitness \+ costs"),
-        ({"other": 1}, "wrong fields: must hold exactly id, generation, index"),
+        ({"other": 1}, "wrong fields: must be exactly id, generation, index"),
     ],
 )
 def test_contradictions(changes, reason):

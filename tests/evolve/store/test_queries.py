@@ -177,7 +177,7 @@ def test_checksums_of_too_much_data_or_of_unreadable_files_are_not_compared(tmp_
     monkeypatch.setattr(checksums, "MOST_BYTES", 300)
     assert harmed(tmp_path) is None
     monkeypatch.setattr(checksums, "MOST_BYTES", 299)
-    assert harmed(tmp_path) == f"{tmp_path}: EXR files have 300 bytes: checksums of at most 299 are compared"
+    assert harmed(tmp_path) == f"{tmp_path}: EXR files have 300 bytes: checksums are compared only up to 299 bytes"
     paths[0].unlink()
     assert harmed(tmp_path) is None, "deleted files can be exported again"
     paths[0].mkdir()
@@ -239,7 +239,7 @@ def test_the_shipped_run_is_copied_once_and_only_where_nothing_else_is(tmp_path)
     assert copy_shipped_run(tmp_path / "empty").best == first.best
     (tmp_path / "thesis.tex").touch()
     for place in (path, tmp_path):
-        with pytest.raises(RunError, match=f"^{place} holds other files: choose another directory with --out$"):
+        with pytest.raises(RunError, match=f"^{place} contains other files: choose another directory with --out$"):
             copy_shipped_run(place)
 
 

@@ -91,13 +91,13 @@ DAMAGE = {
     "no JSON": ("{]\n", "Expecting"),
     "not UTF-8": (b"\xff\xfe\n", "utf-8"),
     "zeros": (b"\0" * 64 + b"\n", "Expecting"),
-    "no record": ("[1]\n", "must hold exactly"),
-    "missing": (damaged(lambda r: r.pop("genome")), "must hold exactly"),
+    "no record": ("[1]\n", "must be exactly"),
+    "missing": (damaged(lambda r: r.pop("genome")), "must be exactly"),
     "wrong type": (damaged(lambda r: r.update(genome=None)), "genome = None: must be a list"),
     "wrong phenotype": (damaged(lambda r: r["phenotype"].pop("n_eyes")), "n_eyes"),
     "wrong genome": (damaged(lambda r: r["genome"].pop()), f"{DIMENSION} genes are open"),
     "wrong place": (damaged(lambda r: r.update(index=3)), "can't be number 3 of generation 0"),
-    "twice": (candidate(0).to_line(), "candidate 0 is there twice"),
+    "twice": (candidate(0).to_line(), "candidate 0 occurs twice"),
 }
 
 

@@ -119,7 +119,7 @@ def test_what_a_caller_does_to_its_observations_changes_nothing_else(memory):
 @pytest.mark.parametrize(
     ("change", "worlds", "words"),
     [
-        (lambda state: {}, None, "must be what get_state returns, with the entries physics, chance"),
+        (lambda state: {}, None, "must be the return value of get_state, with the entries physics, chance"),
         (lambda state: {**state, "steps": np.zeros(3, int)}, None, r"steps has shape \(3,\): must be \(4,\)"),
         (lambda state: state, [4], "must be numbers of worlds, from 0 to 3"),
         (lambda state: state, [0.5], "must be numbers of worlds"),
