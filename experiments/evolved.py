@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +17,18 @@ from experiments.means import last_mean
 from experiments.page import Page, exit_code, markdown_table, parser
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["Quantities", "RunMetadata", "Store", "conduct_table", "main", "null_model", "null_table", "stored"]
+__all__ = [
+    "Quantities",
+    "RunMetadata",
+    "Store",
+    "collect",
+    "conduct_table",
+    "main",
+    "null_model",
+    "null_table",
+    "stored",
+    "write_answer",
+]
 
 Quantities = Mapping[str, Callable[[Row], float]]  # quantities that are compared with the null model
 NOT_JUDGED = "Not judged yet."
@@ -185,29 +196,47 @@ def _beside(stem: Path, what: str) -> Path:
 
 
 def _collect(chosen: Namespace, stem: Path, quantities: Quantities) -> None:
-    answer = stem.with_suffix(".txt")
     if chosen.runs:
-        runs = _named(chosen.runs)
-        before = _text(stem.with_suffix(".csv"))
-        rows = [row for group, run in runs for row in rows_of(run, group)]
-        metadata = [RunMetadata.from_run(run, group) for group, run in runs]
-        furthest = {one.group: max(o.generations for o in metadata if o.group == one.group) for one in metadata}
-        configs = {group: run.config for group, run in runs if quantities and furthest[group] > 0}
-        found = []
-        for group, config in configs.items():
+        collect(_named(chosen.runs), stem, quantities)
+    if chosen.answer:
+        write_answer(stem, chosen.answer)
+
+
+def collect(
+    runs: Sequence[tuple[str, Run]], stem: Path, quantities: Quantities, random: Collection[str] | None = None
+) -> None:
+    """Store the rows of runs, the conditions of the runs, and the null model of quantities.
+
+    A stored answer is deleted if the rows change, because it refers to the former numbers.
+
+    runs: each run with the name of its group; runs of a group have the same settings of genome, search and costs
+    stem: path of the files without an ending
+    random: groups for which the null model is computed; None: all
+    """
+    before = _text(stem.with_suffix(".csv"))
+    rows = [row for group, run in runs for row in rows_of(run, group)]
+    metadata = [RunMetadata.from_run(run, group) for group, run in runs]
+    furthest = {one.group: max(o.generations for o in metadata if o.group == one.group) for one in metadata}
+    configs = {group: run.config for group, run in runs if quantities and furthest[group] > 0}
+    found = []
+    for group, config in configs.items():
+        if random is None or group in random:
             spread = fitness_spread([run for of, run in runs if of == group], furthest[group])
             found += drifted(config, group, quantities, furthest[group], spread)
-        made = Origin.from_runs([run.path for _, run in runs], sum(one.worker_hours for one in metadata))
-        # All computations are complete here, so that an interruption is unlikely to leave inconsistent files.
-        if quantities:
-            write_rows(found, _beside(stem, "drift"))
-        write_rows(metadata, _beside(stem, "runs"))
-        made.write(stem.with_suffix(".json"))
-        write_rows(rows, stem.with_suffix(".csv"))
-        if _text(stem.with_suffix(".csv")) != before:
-            answer.unlink(missing_ok=True)  # the answer refers to the former numbers
-    if chosen.answer:
-        write_whole(answer, f"{chosen.answer}\n".encode())
+    made = Origin.from_runs([run.path for _, run in runs], sum(one.worker_hours for one in metadata))
+    # All computations are complete here, so that an interruption is unlikely to leave inconsistent files.
+    drift = _beside(stem, "drift")
+    write_rows(found, drift) if found else drift.unlink(missing_ok=True)
+    write_rows(metadata, _beside(stem, "runs"))
+    made.write(stem.with_suffix(".json"))
+    write_rows(rows, stem.with_suffix(".csv"))
+    if _text(stem.with_suffix(".csv")) != before:
+        stem.with_suffix(".txt").unlink(missing_ok=True)
+
+
+def write_answer(stem: Path, answer: str) -> None:
+    """Store the answer on the page, in Markdown."""
+    write_whole(stem.with_suffix(".txt"), f"{answer}\n".encode())
 
 
 def _named(texts: Sequence[str]) -> list[tuple[str, Run]]:

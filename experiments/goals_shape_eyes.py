@@ -11,11 +11,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from evolve.search.null_model import SEVERAL
 from experiments import evolved
 from experiments.candidates import Row, full_return
+from experiments.contrast import contrast
 from experiments.designed import Trained
 from experiments.drift import SEEDS, shade
 from experiments.evolved import Store, conduct_table, null_model, null_table
@@ -24,7 +22,7 @@ from experiments.means import LAST, last_mean, last_values, of_generation
 from experiments.page import Figure, Page, markdown_table, new_figure, save
 from experiments.store import read_rows
 
-__all__ = ["contrast", "page"]
+__all__ = ["page"]
 
 NAME = "goals_shape_eyes"
 COLORS = {"navigation": "#D55E00", "detection": "#0072B2"}
@@ -78,46 +76,12 @@ def page(store: Store) -> Page:
             "means": table(store),
             "seeds": seeds_table(store),
             "p_of_runs": null_table(store, QUANTITIES),
-            "contrast": contrast(store, *CONTRASTED),
+            "contrast": str(contrast(store, TOGETHER, QUANTITIES[TOGETHER], *CONTRASTED) or "-"),
             "runs": conduct_table(store),
         },
         figures=[Figure(NAME, lambda path: draw(store, path))],
         origin=store.origin,
     )
-
-
-def contrast(store: Store, less: str, more: str) -> str:
-    """Return the difference of ln(width / eyes) between two groups, and its distribution under the null model, as text.
-
-    Each draw from the null model has the same number of searches per group as there were runs, and p has the lower
-    limit of a single run. The text is "-" if the null model was not computed, or if runs of a group ended in different
-    generations.
-    """
-    found = {group: list(last_values(store.group(group), QUANTITIES[TOGETHER])) for group in (less, more)}
-    null = {group: null_model(store, group, TOGETHER, store.group(group)) for group in (less, more)}
-    together = all(len(ends) == 1 for ends in (_ends(store, group) for group in found))
-    if not all(found.values()) or not all(null.values()) or not together:
-        return "-"
-    value = {group: float(np.mean([seed.mean() for seed in found[group]])) for group in found}
-    chance = np.random.default_rng(0)
-    drawn = {
-        group: chance.choice(np.array(one.ends.split(), float), (SEVERAL, len(found[group]))).mean(axis=1)
-        for group, one in null.items()
-        if one is not None
-    }
-    apart, by_luck = value[more] - value[less], drawn[more] - drawn[less]
-    low, high = np.quantile(by_luck, [0.025, 0.975])
-    p = (1 + int((np.abs(by_luck - by_luck.mean()) >= abs(apart - by_luck.mean())).sum())) / (1 + by_luck.size)
-    p = max(p, 2 / (1 + min(len(one.ends.split()) for one in null.values() if one is not None)))
-    return f"{apart:.2f} (null model: {np.median(by_luck):.2f} [{low:.2f}, {high:.2f}]; p = {p:.2g})"
-
-
-def _ends(store: Store, group: str) -> set[int]:
-    """Return the generations in which a group's runs ended."""
-    last: dict[int, int] = {}
-    for row in store.group(group):
-        last[row.seed] = max(row.generation, last.get(row.seed, 0))
-    return set(last.values())
 
 
 def _legend(store: Store) -> str:

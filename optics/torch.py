@@ -198,7 +198,9 @@ def eye_signals(
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
-        AccuracyError: see `optics.psf`.
+        AccuracyError: see `optics.Eye.see`.
+        BackendError: see `psf`.
+        RuntimeError: second derivatives are requested.
     """
     of_kind("eye", eye, Eye, "optics.Eye(optics.Pupil(30e-6))")
     seen = radiance, samples_per_receptor, rng

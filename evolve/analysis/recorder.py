@@ -128,6 +128,7 @@ class Recorder:
             UnfitPolicy: the policy was trained with different eyes.
             TrainingDiverged: the policy's actions are not finite.
             ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+            RuntimeError: a method of the user task fails at the start of the episode.
             BackendError: Dr.Jit finds no usable LLVM library or GPU.
         """
         animal, config = self.phenotype, self.config

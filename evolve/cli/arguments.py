@@ -70,8 +70,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the parsed arguments.
 
     Raises:
-        SystemExit: help or the version was requested (code 0), or an argument is invalid (code 2, after printing one
-            line).
+        SystemExit: there are no arguments, or help or the version is requested (code 0); or an argument is invalid
+            (code 2, after one line is printed).
     """
     parser = build_parser()
     if not arguments:

@@ -57,7 +57,7 @@ class Search:
     that it has proposed.
 
     Raises:
-        ConfigError: the optimizer is unknown, or cannot be used here.
+        ConfigError: the optimizer is unknown, or cannot be built for this genome and population.
     """
 
     def __init__(self, config: RunConfig) -> None:

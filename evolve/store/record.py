@@ -1,6 +1,7 @@
 """The record of a run, candidates.jsonl: one line per evaluated candidate and rung, in the order of completion.
 
-When a record is read, the values and the checksum of every line are checked. Writing only appends lines.
+When a record is read, the values and the checksum of every line are checked. Candidates are appended. Only the
+repair of a run removes lines: an unfinished last line, or a damaged line and all lines after it.
 """
 
 from __future__ import annotations

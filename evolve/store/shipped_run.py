@@ -18,7 +18,7 @@ FOLDER = "demo"  # run directory within evolve/
 
 
 def copy_shipped_run(directory: Path) -> Run:
-    """Copy the files of the shipped run that a directory lacks, and return the run in this directory.
+    """Add the missing files of the shipped run to a directory, and return the run in this directory.
 
     Raises:
         RunError: the directory contains a file of the run with another content, or only other files.

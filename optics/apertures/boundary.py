@@ -128,7 +128,7 @@ def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Cont
     middle, left: midpoints of the pieces, and unit normals that point to their left, (n, 2) each.
 
     Both sides of a piece are tested at points that are closer to this piece than to any other edge. The test therefore
-    works for arbitrarily narrow gaps.
+    works for gaps as narrow as COINCIDENT.
     """
     aside = np.minimum(ASIDE, pieces.clearance(middle, COINCIDENT) / 2)[:, None]
     here, there = (contains(*(middle + sign * aside * left).T) for sign in (1, -1))

@@ -58,7 +58,9 @@ class Disk:
 
 @dataclass(frozen=True)
 class Oblong:
-    """A rectangle about a centre (x, y), rotated by an angle. `width` and `height` are full lengths in units of R.
+    """A rectangle about a centre (x, y). `width` and `height` are full lengths in units of R.
+
+    rotation_deg: counterclockwise rotation about the rectangle's own centre, from x towards y.
 
     Raises:
         ValueError: a side is not positive or is above 20, a coordinate of the centre is beyond ±10, or the angle is not

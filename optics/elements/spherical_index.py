@@ -113,7 +113,9 @@ def _solved(rising: Callable[[np.ndarray], np.ndarray], value: np.ndarray) -> np
 
 @lru_cache(maxsize=16)
 def generalized_luneburg(focal_ratio: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the relative index, as a function of r/R, that focuses parallel light at the distance focal_ratio · R.
+    """Return the relative index n as a function of r/R for a sphere that focuses parallel light.
+
+    The focus lies at the distance focal_ratio · R behind the centre of the sphere:
 
         n(ρ) = exp ω(ρ),   ω(ρ) = 1/π ∫ arcsin(x/s) / √(x² - ρ²) dx  from ρ to 1,   r/R = ρ exp(-ω),   s = focal_ratio
 

@@ -36,7 +36,8 @@ def map_samples(samples: Any, name: str = "height", what: str = "heights [m]") -
     name, what: see `square_samples`.
 
     Raises:
-        ValueError: the array is not two-dimensional, is empty, or contains a number that is not finite.
+        ValueError: the array is not two-dimensional, is empty, is of half precision, or contains anything other than
+            finite real numbers.
     """
     heights = np.array(plain_reals(name, samples))
     if heights.ndim != 2 or heights.size == 0:

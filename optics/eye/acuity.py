@@ -117,8 +117,8 @@ def ideal_contrast_sensitivity(
         raise ValueError(
             f"contrast has shape {transferred.shape} and area {sizes.shape}: must be {u.shape}, as frequencies"
         )
-    for name, values, least in (("cycles_per_degree", u, 0.0), ("contrast", transferred, 0.0), ("area", sizes, 0.0)):
-        in_range(name, float(values.min(initial=1.0)), least, math.inf)
+    for name, values in (("cycles_per_degree", u), ("contrast", transferred), ("area", sizes)):
+        in_range(name, float(values.min(initial=0.0)), 0.0, math.inf)
     in_range("contrast", float(transferred.max(initial=0.0)), 0.0, 1.0)
     positive("photons", photons, "1")
     return np.asarray(transferred * np.sqrt(photons * sizes / 2) / positive("d_prime", d_prime, "1"))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.grid import Grid
+from optics.numerics.grid import sample_positions
 
 __all__ = ["Tiles", "cell_integrals", "samples_per_cycle"]
 
@@ -66,13 +66,13 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
     cell. The spline's coefficients c solve C c = s, where C contains the B-splines at the samples. The integrals are Q
     c, so the matrix is Q C⁻¹.
     """
-    grid = Grid((1, samples), pitch)
+    x = sample_positions(samples, pitch)
     degree = min(DEGREE, (samples - 2) // 2 * 2 + 1)
-    knots = _knots(grid.x, degree)
+    knots = _knots(x, degree)
     # With an odd number of samples, cells and samples are symmetric. One half of the rows then determines the other.
     own = (tiles.count + 1) // 2 if samples % 2 else tiles.count
     edges = (np.arange(own + 1 + tiles.from_cell) - (tiles.count + tiles.from_cell) / 2) * tiles.size
-    inside = np.clip(edges, grid.x[0], grid.x[-1])
+    inside = np.clip(edges, x[0], x[-1])
     primitive = _primitive(knots, degree, inside, 1)
     if tiles.from_cell:
         # Beyond the samples there is no light. The first integral is constant there, and the second one is linear.

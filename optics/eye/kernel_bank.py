@@ -161,7 +161,9 @@ def _rest(tolerance: float, spent: float | None) -> float | None:
 def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
     """Return the numbers (rows, columns) of nodes over the field, with similar spacing in both directions.
 
-    The nodes of higher counts include the nodes of lower counts.
+    Along the longer side, the nodes of each of FIELD_COUNTS include those of all smaller counts.
+
+    across: number of nodes along the longer side of the retina.
     """
     height, width = resolution
     finest = max(across - 1, 0)

@@ -83,9 +83,7 @@ class Spot:
         return _cells_within((math.ceil(self.half / self.pitch) + 0.5) * self.pitch, cell)
 
 
-def visual_kernel(
-    pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0), from_cell: bool = False
-) -> Array:
+def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
     """Return the PSF, integrated over the retina's cells: Dr.Jit (band, ky, kx), both odd.
 
     The cells lie around the geometric image. Their rows ascend with y and their columns with x. The image on the retina
@@ -126,7 +124,7 @@ def visual_kernel(
     return dr.maximum(types.Tensor(flat, (len(kernels), rows.count, columns.count)), 0)
 
 
-def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0)) -> PSFResult:
+def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float]) -> PSFResult:
     """Return the PSF of a point at distance z, on a window that loses less than the tolerance at every wavelength.
 
     See `visual_kernel` for the arguments.

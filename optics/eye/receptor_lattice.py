@@ -75,8 +75,9 @@ class ReceptorLattice(ReadOnlyArrays):
         found = []
         for axis, side in zip((1, 0), half, strict=True):
             ahead = np.concatenate([at, np.ones_like(at[..., :1])], axis=-1)
-            ends = [ahead + sign * side[..., None] * np.eye(3)[axis] for sign in (-1, 1)]
-            sine, cosine = np.linalg.norm(np.cross(*ends), axis=-1), np.sum(ends[0] * ends[1], axis=-1)
+            aside = side[..., None] * np.eye(3)[axis]
+            one, other = ahead - aside, ahead + aside
+            sine, cosine = np.linalg.norm(np.cross(one, other), axis=-1), np.sum(one * other, axis=-1)
             found.append(np.degrees(np.arctan2(sine, cosine)))
         return np.stack(found)
 

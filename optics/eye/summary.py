@@ -267,7 +267,10 @@ def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
 
 
 def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
-    """Return the full width [m] at half maximum for a waveguide of this diameter [m], from a spline of its kernel."""
+    """Return the acceptance width [m] of a receptor with a waveguide, see `_acceptance`, from a spline of its kernel.
+
+    diameter: diameter [m] of the waveguide.
+    """
     from scipy.interpolate import CubicSpline
 
     cells = min(max(4, math.ceil(CELLS_ACROSS * eye.receptor_pitch / diameter)), MOST_CELLS)

@@ -37,9 +37,10 @@ def on_window(field: Field, beam: Beam, problem: Problem) -> Field:
 def on_line(profile: Field, line: RadialProfile | DistinctRadii, beam: Beam, problem: Problem) -> Field:
     """Return a rotationally symmetric field over the window, interpolated from its values at radii.
 
-    profile: field at the radii `line`.
+    The spherical phase is removed before the interpolation and restored afterwards. Without this phase, the field is as
+    smooth as the intensity.
 
-    Without its spherical phase the field is as smooth as the intensity.
+    profile: field at the radii `line.positions`, including its spherical phase.
     """
     types, window = precision(problem.dtype), problem.window
     r = types.Float64(padded_for_packets(line.positions))

@@ -1,6 +1,6 @@
-"""Time per operation. Methods predict their time from these values, and the planner chooses by predicted time.
+"""Time and memory per operation, from which methods predict their costs. The planner chooses by predicted time.
 
-The values are for calls with compiled kernels on two cores. They are precise enough to choose between methods. `python
+The times are for calls with compiled kernels on two cores. They are precise enough to choose between methods. `python
 -m validation.benchmarks.fit_costs` times the operations and prints the results next to these values.
 """
 

@@ -202,7 +202,7 @@ class _Sum:
         at, steady = (h, waves, u), [dr.detach(one) for one in (h, waves, u)]
         with dr.suspend_grad():
             h0, waves0, u0 = steady
-            re, im = _sums((h0 * sx, h0 * sy, 1.0), (x, y, waves0, u0, 0 * u0))
+            re, im = _sums((h0 * sx, h0 * sy), (x, y, *_turned(u0, dr.zeros(types.Float64), waves0)))
             total = dr.sum(w * (re * re + im * im)) * h0 * h0
         if not any(map(dr.grad_enabled, at)):
             return total
@@ -222,10 +222,10 @@ class _Sum:
 
         (h, waves, u), (x, y, sx, sy) = at, places
         # These sums over frequencies have the same phases as the sum over nodes, including the sign.
-        re, im = _sums((h * x, h * y, 0.0), (sx, sy, 0 * sx, *back))
-        re, im = _turned(re, im, waves)
-        along_x = _turned(*_sums((h * x, h * y, 0.0), (sx, sy, 0 * sx, sx * back[0], sx * back[1])), waves)
-        along_y = _turned(*_sums((h * x, h * y, 0.0), (sx, sy, 0 * sx, sy * back[0], sy * back[1])), waves)
+        to = h * x, h * y
+        re, im = _turned(*_sums(to, (sx, sy, *back)), waves)
+        along_x = _turned(*_sums(to, (sx, sy, sx * back[0], sx * back[1])), waves)
+        along_y = _turned(*_sums(to, (sx, sy, sy * back[0], sy * back[1])), waves)
         factor = 4 * math.pi * h * h * u
         by_h = dr.sum(factor * (x * along_x[1] + y * along_y[1])) + 2 * total / h
         return by_h, -factor * im, 2 * h * h * re
@@ -239,20 +239,20 @@ def _turned(re: Array, im: Array, turns: Array) -> tuple[Array, Array]:
     return re * cos - im * sin, re * sin + im * cos
 
 
-def _sums(to: tuple[Array, Array, float], of: Sequence[Array]) -> tuple[Array, Array]:
-    """Return the real and imaginary part of Σ (a + ib) exp(2πi (c W - fx x - fy y)) at every (fx, fy).
+def _sums(to: tuple[Array, Array], of: Sequence[Array]) -> tuple[Array, Array]:
+    """Return the real and imaginary part of Σ (a + ib) exp(-2πi (fx x + fy y)) at every (fx, fy).
 
-    to: fx, fy (point,), and the factor c
-    of: x, y, W, a, b (term,)
+    to: fx, fy (point,)
+    of: x, y, a, b (term,)
     """
     import drjit as dr
 
-    types, count = precision("float64"), dr.width(of[3])
+    types, count = precision("float64"), dr.width(of[0])
     dr.eval(*to, *of)
 
     def add(j: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:
-        x, y, along, a, b = (dr.gather(types.Float64, part, j) for part in of)
-        turns = to[2] * along - x * to[0] - y * to[1]
+        x, y, a, b = (dr.gather(types.Float64, part, j) for part in of)
+        turns = -x * to[0] - y * to[1]
         sin, cos = dr.sincos(types.Float64(2 * math.pi) * (turns - dr.round(turns)))
         return j + 1, re + a * cos - b * sin, im + a * sin + b * cos
 

@@ -53,7 +53,7 @@ class LightBatch:
                 f"sensor_distance has {counts['sensor_distance']} entries and source_distance "
                 f"{counts['source_distance']}: must be of equal length, because they are used pairwise"
             )
-        count = max(counts.values(), default=1)
+        count = next(iter(counts.values()), 1)
         sensors, sources = (tuple(row) if name in counts else (row,) * count for name, row in rows.items())
         angle = pair("source_angle", source_angle, "angles (x, y) [rad]")
         for source in sources:

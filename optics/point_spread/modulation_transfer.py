@@ -99,7 +99,8 @@ class MTF(ReadOnlyArrays):
     def otf(self, fx: Any, fy: Any) -> np.ndarray:
         """Return the optical transfer function at any frequencies [1/m], (wavelength, frequency), without derivatives.
 
-        Its modulus is the contrast, and its argument the phase (see `phase`).
+        Its modulus is the contrast, and its argument the phase (see `phase`). At frequency 0, where contrasts are 1,
+        the modulus is the fraction of the arriving light that falls within the window of the PSF.
 
         fx, fy: components of each frequency along x and y, of equal or broadcastable shapes. They are flattened.
 

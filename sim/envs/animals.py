@@ -97,7 +97,13 @@ class Animals:
         return frames
 
     def start_episodes(self, worlds: np.ndarray) -> Pending:
-        """Start new episodes in these worlds, and launch their rendering."""
+        """Start new episodes; return their first frames, which are still being rendered, for each agent in `seeing`.
+
+        worlds: indices of the worlds
+
+        Raises:
+            RuntimeError: a method of the task fails, or the task changes the model of all worlds.
+        """
         self.simulation.restart(worlds)
         for senses in self.seeing:
             senses.action = senses.action.copy()

@@ -92,11 +92,14 @@ def see_photograph(
 
     Each colour is converted to one of the many reflectances that have this colour
     (`optics.spectra.spectrum.srgb_basis`). Daylight illuminates these reflectances. The reflected light passes the
-    optics of the animal's eye (`optics.animals`) and excites its receptors. A white
-    surface gives a signal of 1. Receptors that are finer than the photograph are replaced by one for each pixel, at
-    most 40,000 in all.
+    optics of the animal's eye (`optics.animals`) and excites its receptors. If `uv` is 1, a white surface gives a
+    signal of 1; a smaller `uv` reduces the signals of receptors that are sensitive to ultraviolet.
 
-    photograph: sRGB values in [0, 1], (y, x, 3), of a camera that maps straight lines to straight lines.
+    In eyes with a single lens, receptors that are finer than the photograph are replaced by one for each pixel. If
+    more than 40,000 would remain, about 40,000 coarser receptors replace them. Ommatidia are never replaced.
+
+    photograph: sRGB values in [0, 1], (y, x, 3), at least 8 x 8 pixels, of a camera that maps straight lines to
+        straight lines.
     animal: one of "blowfly", "dragonfly", "fruit_fly", "honeybee", "megalopta", "eagle", "goldfish", "human",
         "jumping_spider" and "mouse".
     width_deg: angular width of the photograph [degrees], in [0.1, 120].

@@ -47,7 +47,12 @@ class QuickImage:
     fovy_deg: float
 
     def inverse_distance(self, pixels: np.ndarray) -> np.ndarray:
-        """Return 1 / depth along the camera's axis at the middles of pixels, counted row by row [1/m]; 0: no hit."""
+        """Return the inverse distance [1/m] at the middle of each pixel, (pixel,); 0 where the ray hits nothing.
+
+        Distances are measured along the camera's axis.
+
+        pixels: indices of pixels, which are counted row by row
+        """
         across, above = plane_coordinates(self.fovy_deg, self.picture.shape[:2])
         y, x = np.divmod(pixels, self.picture.shape[1])
         ray = self.ray.take(pixels)

@@ -83,10 +83,7 @@ class EyeRenderer:
         self._mosaic = self.eye.mosaic
         self._mixing = self.eye.aperture_throughput * self.eye.spectral_bands.weights
         self._receptor_sums = self.sensor.receptor_sums(self._mixing, self.tracer.basis)
-        suns = [light.level for light in scene.scene.lights.found if light.kind == "directional"]
-        self._white = sum(suns, np.zeros(len(self.eye.spectral_bands.wavelengths))) / np.pi
-        if scene.scene.medium is not None:
-            self._white = np.maximum(self._white, scene.scene.medium.veil)
+        self._white = scene.white
         self.brightest = self.brightest_in(np.ones(len(self._white)))
         self._set_width(n_envs)
 

@@ -144,7 +144,7 @@ class ModelStages:
         """See `Stages`."""
         ladder, most = SHARED if _shares_rays(self.eye) else PERFECT, allowed.error
         trials = tried(lambda rays: self._cached_signals(rays, light.level), ladder, _truth(self.eye), most)
-        rays = next((n for n, error in trials.errors.items() if error <= most), max(trials.errors))
+        rays = max(trials.errors)  # the first number whose error is allowed, or the largest that is tried
         enough = trials.errors[rays] <= most
         why = (
             f"fewest for {most:.1e} over receptors without a uniform field "

@@ -93,6 +93,16 @@ class PreparedScene:
         """Mitsuba's variant."""
         return self.scene.variant
 
+    @property
+    def white(self) -> np.ndarray:
+        """Radiance (band,) of a white surface that faces all directional lights, or of veiling light.
+
+        The larger of the two counts in each band.
+        """
+        levels = [light.level for light in self.scene.lights.found if light.kind == "directional"]
+        surface: np.ndarray = sum(levels, np.zeros(self.eye.bands)) / np.pi
+        return surface if self.scene.medium is None else np.maximum(surface, self.scene.medium.veil)
+
     def warn_once(self, light: str) -> None:
         """Warn once of features of the model that are not rendered with this kind of light."""
         if not self._has_warned:

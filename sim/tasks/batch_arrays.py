@@ -47,7 +47,7 @@ def columns(where: str, returned: Any, n: int) -> np.ndarray:
 
 
 def mapping(where: str, returned: Any) -> Mapping[str, Any]:
-    """Return the object `returned` if it is a mapping from names to arrays.
+    """Return the object `returned` if it is a mapping. Its keys and values are not checked.
 
     Raises:
         ValueError: it is not a mapping.

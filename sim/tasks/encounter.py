@@ -138,7 +138,7 @@ def split_agents(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen
     """Return the tasks of the learning animals, and the animals that do not learn.
 
     Raises:
-        ValueError: the animals cannot share a world.
+        ValueError: the animals cannot share a world, or an entry of the task's `others` is not a sim.Frozen.
     """
     if isinstance(task, Encounter):
         return task.animals, ()

@@ -1,10 +1,15 @@
 """Searches for eyes in mazes and in detection: equal genomes and learners, and runs that are continued."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from evolve.config.assemble import assemble
 from evolve.search.optimizers import Space, build_optimizer
+from evolve.search.successive_halving import trained_steps
 from experiments import eye_searches
+from experiments.eye_factors_design import LEARNER
 from experiments.eye_searches import PRICES, Search, command, main, searches
 
 
@@ -14,6 +19,20 @@ def test_only_the_world_differs_between_the_tasks_of_a_group():
         for section in ("seed", "eye", "genome", "search", "learning", "wiring", "costs"):
             assert getattr(maze, section) == getattr(detection, section), (kind, seed, section)
         assert maze.world.family_seed == seed
+
+
+def test_training_runs_are_the_beginning_of_those_in_the_experiment_on_factors_of_eyes():
+    full = assemble("maze", assignments=LEARNER).learning
+    short = Search("maze", "free", 0).config.learning
+    assert replace(short, total_steps=full.total_steps, eval_interval=full.eval_interval) == full
+    assert trained_steps(short, 0, short.total_steps) == 106_496
+
+
+def test_all_searches_without_prices_come_first_and_both_tasks_of_a_seed_together():
+    kinds = [one.kind for one in searches()]
+    assert kinds == ["free"] * 6 + ["priced"] * 6 + ["random"] * 2
+    assert [one.task for one in searches()] == ["maze", "detection"] * 7
+    assert all(one.seed == other.seed for one, other in zip(searches()[::2], searches()[1::2], strict=True))
 
 
 def test_groups_differ_in_prices_or_in_the_optimizer():

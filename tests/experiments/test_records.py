@@ -113,7 +113,7 @@ def stored_rows(page):
 
 
 @pytest.mark.fast_cases(1)
-@pytest.mark.parametrize("page", ["brains_for_eyes", "eyes_for_tasks"])
+@pytest.mark.parametrize("page", ["brains_for_eyes", "eyes_for_tasks", "training_length"])
 def test_pages_of_designed_trainings_say_what_their_stores_say(page):
     data, experiment = stored_rows(page), importlib.import_module(f"experiments.{page}")
     answer = data.with_suffix(".txt").read_text(encoding="utf-8").strip()

@@ -63,9 +63,12 @@ class LightNodes:
         return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
 
     def body_margin(self, radius: float) -> float:
-        """Return the distance of the places of a body with this radius [m] from a cell's borders [m].
+        """Return the smallest distance [m] between a body's places in a cell and the borders of the cell.
 
-        Walls may stand at the borders, and the centre of a body is at least its radius away from them.
+        It is the radius, because walls may stand at the borders, and a body's centre cannot be closer to a wall. The
+        upper limit for large bodies is MOST_MARGIN times the side of the cell.
+
+        radius: radius of the body [m]
         """
         return min(radius, MOST_MARGIN * self.grid.side)
 

@@ -91,3 +91,38 @@ def test_the_sensitivity_grows_with_the_root_of_light_and_falls_with_the_contras
 def test_invalid_arguments_raise(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_acuity_in_closed_form():
+    assert sampling_acuity(0.25) == pytest.approx(4 / math.sqrt(3))
+    assert sampling_acuity(0.25, "square") == 2.0
+    assert eye_parameter(30e-6, 0.5) == pytest.approx(30e-6 * math.radians(0.5))
+    assert eye_parameter(30e-6, 180.0) == pytest.approx(30e-6 * math.pi)
+    degrees = math.degrees(2e-6 / 1e-2)  # between neighbours at a distance of 2 µm
+    assert anatomical_acuity(1 / 4e-12, 1e-2, "square") == pytest.approx(1 / (2 * degrees))
+    hexagons = 2 / math.sqrt(3) / 4e-12
+    assert anatomical_acuity(hexagons, 1e-2) == pytest.approx(1 / (math.sqrt(3) * degrees))
+    with pytest.raises(ValueError, match=r"interommatidial_deg = 180.1"):
+        eye_parameter(30e-6, 180.1)
+    for call in (least_eye_parameter, lambda at, lattice: anatomical_acuity(at, 1.0, lattice)):
+        with pytest.raises(ValueError, match="lattice = 'triangle'"):
+            call(5e-7, "triangle")
+
+
+def test_sensitivity_in_closed_form():
+    u, transfer = np.array([0.0, 2.0]), np.array([1.0, 0.0])
+    for area in (8.0, np.array([8.0, 0.0])):
+        found = ideal_contrast_sensitivity(u, transfer, 9.0, area, 3.0)
+        np.testing.assert_allclose(found, [2.0, 0.0])
+    assert ideal_contrast_sensitivity(0.0, 0.5, 9.0, 8.0) == pytest.approx(3 / 0.954)
+    assert ideal_contrast_sensitivity([], [], 9.0, 8.0).shape == (0,)
+    for given, name in (
+        (([-0.1, 2.0], [1.0, 0.0], 9.0, 8.0), "cycles_per_degree = -0.1"),
+        (([0.0, 2.0], [1.0, -0.1], 9.0, 8.0), "contrast = -0.1"),
+        (([0.0, 2.0], [1.01, 0.0], 9.0, 8.0), "contrast = 1.01"),
+        (([0.0, 2.0], [1.0, 0.0], 9.0, -0.1), "area = -0.1"),
+        (([0.0, 2.0], [1.0, 0.0], 9.0, [1.0, 2.0, 3.0]), r"contrast has shape \(2,\) and area \(3,\): must be \(2,\)"),
+        (([0.0, 2.0], [1.0, 0.0], 9.0, 8.0, 0.0), "d_prime = 0"),
+    ):
+        with pytest.raises(ValueError, match=f"^{name}"):
+            ideal_contrast_sensitivity(*given)

@@ -64,7 +64,10 @@ def test_samples_that_larger_cells_need_are_too_few_for_smaller_ones(cycles, few
 
 
 @pytest.mark.parametrize("from_cell", [False, True])
-@pytest.mark.parametrize(("samples", "cells"), [(3, 1), (5, 3), (9, 3), (64, 15), (201, 15)])
+@pytest.mark.parametrize(
+    ("samples", "cells"),
+    [(3, 1), (4, 2), (5, 3), (6, 3), (8, 1), (9, 3), (11, 4), (56, 3), (57, 3), (58, 2), (64, 15), (201, 15)],
+)
 def test_it_is_the_spline_s_own_integral(samples, cells, from_cell):
     """The reference is SciPy's integral of splines of which a single sample is 1 and the others are 0. For light from a
     whole cell, the spline is integrated twice.
@@ -87,6 +90,9 @@ def test_fewer_samples_for_looser_tolerances():
     wanted = [samples_per_cycle(tolerance) for tolerance in (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)]
     assert wanted == sorted(wanted, reverse=True)
     assert wanted[-1] > 2  # Nyquist
+    assert samples_per_cycle(1e-4) == 3.1
+    assert samples_per_cycle(1e-4 / 2**8) == pytest.approx(6.2)  # the error falls with the eighth power
+    assert samples_per_cycle(1e-4 * 10**0.5) == pytest.approx(3.1 - 0.425 / 2)
 
 
 def test_fewer_samples_for_larger_cells_where_tolerances_are_loose():

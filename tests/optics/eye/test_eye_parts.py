@@ -174,6 +174,9 @@ def test_degrees_of_polarisation(degree):
         polarization.taken_by(tile, (3, 4), radiance, (good, 0.0))
     with pytest.raises(ValueError, match="polarization's degree"):
         polarization.taken_by(tile, (3, 4), radiance, (degree, 0.0))
+    for name, wrong in (("degree", ([0.5, np.nan], 0.0)), ("angle", (0.5, [np.inf, 0.0]))):
+        with pytest.raises(ValueError, match=f"polarization's {name} holds NaN or infinity"):
+            polarization.taken_by(tile, (3, 4), radiance, wrong)
     with pytest.raises(ValueError, match=r"polarization's angle has shape \(3,\)"):
         polarization.taken_by(tile, (3, 4), radiance, (0.5, [1, 2, 3]))
     for wrong in (0.5, (1, 2, 3)):
@@ -197,7 +200,11 @@ def test_steep_rays_change_polarised_signals(monkeypatch):
 
 @pytest.mark.parametrize(("floor", "limit"), [(0.25, 6.0), (0.0, 8.0), (-1.0, 8.0), (1.5, 0.0), (0.9, 0.8)])
 def test_contrast_falls_to_the_noise(monkeypatch, floor, limit):
-    monkeypatch.setattr(summary, "mtf", lambda white: SimpleNamespace(profile=lambda f: [1 - f / 8]))
+    def profile(f):
+        assert f.shape == (513,)
+        return [1 - f / 8]
+
+    monkeypatch.setattr(summary, "mtf", lambda white: SimpleNamespace(profile=profile))
     assert summary._noise_limit(None, 8.0, floor) == pytest.approx(limit)
     monkeypatch.setattr(summary, "mtf", lambda white: SimpleNamespace(profile=lambda f: [0 * f + 1]))
     assert summary._noise_limit(None, 8.0, 0.5) == 8.0

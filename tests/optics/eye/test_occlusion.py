@@ -214,7 +214,8 @@ def test_layers_follow_from_differences_of_inverse_distances(far):
 
 
 @pytest.mark.parametrize(
-    ("hidden", "continued", "passing"), [(0.3, 0.0, 0.7), (0.3, 0.5, 0.4), (0.5, 0.5, 0), (0.6, 0.5, 0)]
+    ("hidden", "continued", "passing"),
+    [(0.3, 0.0, 0.7), (0.3, 0.5, 0.4), (0.5, 0.5, 0), (0.6, 0.5, 0), (1e-7, 1.0, 0.9)],
 )
 def test_light_passes_the_part_of_the_pupil_that_is_not_covered(monkeypatch, hidden, continued, passing):
     """Cells that hide nothing are dark, so that the rest of the pupil counts as the whole."""

@@ -148,6 +148,9 @@ def test_perfect_lens():
     assert found.diffraction_cpd == math.inf
     assert (found.strehl_ratio, found.image_quality) == (1.0, pytest.approx(0.95))
     assert found.binding == "sampling"
+    assert found.noise_cpd == math.inf
+    loud = Eye(noise_sigma=1.0).describe()
+    assert (loud.noise_cpd, loud.image_quality) == (0.0, 0.0)
 
 
 def test_the_table_names_every_limit():

@@ -67,7 +67,8 @@ def test_three_windows_are_tried():
 
 @pytest.mark.parametrize(
     ("shape", "able", "share"),
-    [((2, 11, 21), False, 1.0), ((2, 11, 21), True, 1.0), ((2, 11, 1001), True, 2**0.75 * 1001 / 2049)],
+    [((2, 11, 21), False, 1.0), ((2, 11, 21), True, 1.0)]
+    + [(shape, True, 2**0.75 * 1001 / 2049) for shape in ((2, 11, 1001), (2, 1001, 11))],
 )
 def test_a_refused_window_comes_with_a_tolerance_that_would_do(shape, able, share):
     """It allows for the light that the widest possible window loses, and for all other errors."""
@@ -268,3 +269,32 @@ def test_the_error_of_image_quality_includes_the_step():
     coarse = np.trapezoid(contrasts[::2], dx=1 / 128)
     assert value[0] == pytest.approx(np.trapezoid(contrasts, dx=1 / 256))
     assert error[0] == pytest.approx(coarse - value[0])
+
+
+def test_causes_of_errors_are_relative_to_the_light_that_arrives(monkeypatch):
+    """The window holds 0.4 and 1.1 of the light; 0.5 and 1 arrive, with the uncertainties 0.01 and 0.02."""
+    light, unsure = TYPES.Float([0.5, 1.0]), np.array([0.01, 0.02])
+    asked = []
+    seen = SimpleNamespace(window_sums=np.array([0.4, 1.1]), sum_error=np.array([0.02, 0.03]))
+    given = contrast.PSFResult.__new__(contrast.PSFResult)
+    object.__setattr__(given, "wavelengths", np.array([5e-7]))
+    monkeypatch.setattr(contrast.PSFResult, "highest_cutoff", 2e5)
+    monkeypatch.setattr(
+        contrast.PSFResult, "with_pitch", lambda self, pitch, what: asked.append((pitch, what)) or "fine"
+    )
+    monkeypatch.setattr(contrast, "arriving_light", lambda result, arriving: (light, unsure))
+    monkeypatch.setattr(
+        contrast, "_wide", lambda result, known, doubt, tolerance: asked.append((result, tolerance)) or seen
+    )
+    monkeypatch.setattr(contrast, "_transformed", lambda seen, light, causes: causes)
+    found = contrast.mtf(given, tolerance=0.3)
+    assert asked == [(0.5 / 2e5, "the MTF"), ("fine", 0.3)]
+    np.testing.assert_allclose(found.lost, [(0.1 + 0.01) / 0.5, 0.02])
+    np.testing.assert_allclose(found.light, [0.02, 0.02])
+    np.testing.assert_allclose(found.rest, [0.04, 0.03])
+    contrast.mtf(given, tolerance=float(found.total.max()))
+    with pytest.raises(
+        AccuracyError, match=r"tolerance = 0\.259: .* errors of up to 0\.26 \(PSF 0\.03, .* 0\.1, .* 0\.02\)"
+    ):
+        contrast.mtf(given, tolerance=0.259)
+    contrast.mtf(given, tolerance=1.0)

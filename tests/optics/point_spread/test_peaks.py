@@ -220,3 +220,67 @@ def test_which_peak_is_searched(monkeypatch):
     asked.clear()
     with pytest.raises(AccuracyError, match="no peak was found within 2 windows of 9 samples"):
         peak(inner, **start)
+
+
+def test_a_flag_is_true_or_false():
+    with pytest.raises(ValueError, match=r"^with_error = 2"):
+        optics.strehl_ratio(None, with_error=2)
+
+
+def test_the_peak_without_aberration_is_that_of_a_spherical_wave():
+    """Its field is |1 - z/L - ikz ln(L/z)| for a circle. Behind a Gaussian mask, the integral over rings is the
+    oracle. The wavelengths are those in water.
+    """
+    waves, z, radius = np.array([4e-7, 7e-7]), 3e-3, 1e-3
+    pupil = optics.Pupil(radius, medium_n=1.33)
+    k = 2 * np.pi * np.array([pupil.index_behind(at) for at in waves]) / waves
+    far = math.hypot(z, radius)
+    field = np.abs(1 - z / far - 1j * k * z * math.log(far / z)) ** 2
+    found = strehl._unaberrated(result(pupil=pupil, sensor_distance=z), waves)
+    np.testing.assert_allclose(found.numpy(), field / (np.pi * radius**2), rtol=1e-9)
+    masked = optics.Pupil(radius, medium_n=1.33, mask=optics.GaussianMask(0.4e-3))
+    node, weight = np.polynomial.legendre.leggauss(60)
+    r, weight = radius * (node + 1) / 2, weight * radius / 2
+    slant = np.hypot(r, z)
+    size = weight * 2 * np.pi * r * np.exp(-((r / 0.4e-3) ** 2)) * z / (2 * np.pi * slant**2)
+    field = (size / slant).sum() ** 2 + (k * size.sum()) ** 2
+    found = strehl._unaberrated(result(pupil=masked, sensor_distance=z), waves)
+    np.testing.assert_allclose(found.numpy(), field / (np.pi * radius**2), rtol=1e-9)
+    ring = optics.Pupil(radius, medium_n=1.33, aperture=optics.Annulus(0.5))
+    near = math.hypot(z, radius / 2)
+    field = np.abs(z / near - z / far - 1j * k * z * math.log(far / near)) ** 2
+    found = strehl._unaberrated(result(pupil=ring, sensor_distance=z), waves)
+    np.testing.assert_allclose(found.numpy(), field / (0.75 * np.pi * radius**2), rtol=1e-9)
+
+
+@pytest.mark.parametrize("place", [(0, 2), (3, 2), (2, 0), (2, 4), (1, 1), (2, 3)])
+def test_samples_at_the_rim(place):
+    image = np.zeros((4, 5))
+    image[place] = 1.0
+    assert strehl._at_rim(image) == (place[0] in (0, 3) or place[1] in (0, 4))
+
+
+def test_ratios_of_several_wavelengths(monkeypatch):
+    """Errors are relative to the peaks. A mean over wavelengths is divided by the mean of the ideal peaks."""
+    peaks = {wave: Peak(TYPES.Float(2.0 * k), 0.1 * k, (0.0, 0.0)) for k, wave in enumerate(result().wavelengths, 1)}
+    refused = []
+    monkeypatch.setattr(strehl, "_peak", lambda one: peaks[one.wavelengths[0]])
+    monkeypatch.setattr(strehl, "_refuse_brighter_outside", lambda one, most: refused.append(most))
+    monkeypatch.setattr(strehl, "_measured_error", lambda one, peak: peak.error / 10)
+    monkeypatch.setattr(strehl, "_unaberrated", lambda seen, waves: TYPES.Float(waves * 1e7))
+    many = result()
+    value, error = strehl.strehl_ratio(many, with_error=True)
+    np.testing.assert_allclose(value, [2 / 4, 4 / 5, 6 / 7])
+    np.testing.assert_allclose(error, [0.01 * 2 / 4, 0.02 * 4 / 5, 0.03 * 6 / 7])
+    assert refused == pytest.approx([2 * 1.1, 4 * 1.2, 6 * 1.3])
+    np.testing.assert_allclose(strehl.strehl_ratio(many), value)
+    shares = np.array([0.5, 0.25, 0.25])
+    mean = replace(
+        many,
+        tensor=many.tensor[:1],
+        wavelengths=np.array([shares @ many.wavelengths]),
+        plans=many.plans[:1],
+        shares=shares,
+    )
+    peaks[mean.wavelengths[0]] = Peak(TYPES.Float(3.0), 0.1, (0.0, 0.0))
+    np.testing.assert_allclose(strehl.strehl_ratio(mean), [3 / (0.5 * 4 + 0.25 * 5 + 0.25 * 7)])

@@ -102,6 +102,17 @@ def test_errors_of_measures_include_the_spectrum(weighed, monkeypatch):
             measure(with_error=2)
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_strehl_ratios_with_derivatives_are_joined(weighed, monkeypatch, count):
+    """Ratios are tensors with one entry for each type."""
+    tensor = precision("float64").Tensor
+    one = replace(weighed, weights=weighed.weights[:count], spectral_error=weighed.spectral_error[:count])
+    monkeypatch.setattr(white, "strehl_ratio", lambda row, with_error: (tensor(row[:1]), row[1:2] / 100))
+    ratio = one.strehl_ratio()
+    assert isinstance(ratio, tensor)
+    np.testing.assert_array_equal(ratio.numpy(), weighed.weights[:count, 0])
+
+
 def test_errors_of_contrasts_include_the_spectrum(weighed, monkeypatch):
     """The spectral error is a quarter of the largest change of any contrast."""
     contrasts = np.random.default_rng(1).random((4, 3, 3))

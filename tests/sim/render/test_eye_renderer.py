@@ -111,7 +111,7 @@ def test_few_worlds_are_rendered_apart(worlds, n_envs, lit):
     """A frame of all worlds may then be pending. The separate renderer always has FEW worlds."""
     renderer = EyeRenderer.__new__(EyeRenderer)
     renderer.n_envs = n_envs
-    frames = settled(10 * np.arange(n_envs))
+    frames = settled(1 + np.arange(n_envs))
     renderer.launch = lambda poses, light: frames
     renderer.scene = SimpleNamespace(placed=lambda poses: SimpleNamespace(take=lambda few: few))
     light = np.arange(n_envs) if lit else None
@@ -119,10 +119,10 @@ def test_few_worlds_are_rendered_apart(worlds, n_envs, lit):
     def few(poses, given):
         assert len(poses) == FEW
         assert given is None if light is None else (given == poses).all()
-        return settled(-poses)
+        return settled(-1 - poses)
 
     vars(renderer)["_few"] = SimpleNamespace(launch=few)
     chosen = np.arange(worlds)[::-1]
     found = renderer.launch_some("poses", chosen, light).wait()
     apart = worlds <= FEW < n_envs
-    np.testing.assert_array_equal(found, -chosen if apart else 10 * chosen)
+    np.testing.assert_array_equal(found, -1 - chosen if apart else 1 + chosen)

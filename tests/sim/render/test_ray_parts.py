@@ -117,13 +117,13 @@ class Traced:
 @pytest.mark.parametrize("components", [1, 3, 5])
 @pytest.mark.parametrize("count", [1, 2])
 def test_light_is_weighted_and_divided_among_layers(components, count):
-    """Samples have weights for each component, and the second layer receives a quarter of the light."""
+    """Samples have weights for each component. At a depth of 1 m, the second layer receives half of the light."""
     light, weights = RNG.random((components, 12)).astype(np.float32), RNG.random((3, components))
     depth = SimpleNamespace(count=count, shares=lambda near: [0.75, near / 2])
     with variant(default_variant()):
         tracer = Traced(light)
         eyes = SimpleNamespace(
-            directions=lambda ways, origins: None, ray=lambda *_: SimpleNamespace(cosine=mi.Float(1.0))
+            directions=lambda ways, origins: None, ray=lambda *_: SimpleNamespace(cosine=mi.Float(0.5))
         )
         kernel = RayKernel(tracer, eyes, 2, 2, ONE_PSF if count == 1 else depth)
         bounces = RNG.random((3, 2))
@@ -136,7 +136,7 @@ def test_light_is_weighted_and_divided_among_layers(components, count):
     second = np.random.default_rng(3).random((3, 2))
     np.testing.assert_allclose(samples, np.tile(np.concatenate([bounces, second], axis=1), (4, 1)), rtol=1e-6)
     weighted = light * np.tile(weights.T, 4)
-    expected = np.concatenate([weighted * share for share in ((1.0,) if count == 1 else (0.75, 0.25))])
+    expected = np.concatenate([weighted * share for share in ((1.0,) if count == 1 else (0.75, 0.5))])
     np.testing.assert_allclose(layers, expected, rtol=1e-5)
     np.testing.assert_allclose(each, expected.ravel(), rtol=1e-5)
     np.testing.assert_allclose(sums, expected.reshape(-1, 3).sum(axis=1), rtol=1e-5)
