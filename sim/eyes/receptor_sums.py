@@ -23,18 +23,51 @@ ONE_THREAD = 2**18
 
 
 @dataclass(frozen=True)
+class Stretch:
+    """The rays that a row of receptors uses.
+
+    first: index of the first ray
+    weights: weights of the rays, (ray, channel * width) float32
+    views: number of views in a product
+    """
+
+    first: int
+    weights: np.ndarray
+    views: int
+
+    @classmethod
+    def from_weights(cls, weights: Sequence[scipy.sparse.csr_array]) -> Stretch:
+        """Return the rays of one row of receptors from a sparse matrix (receptor, ray) per channel."""
+        used = np.concatenate([w.indices for w in weights])
+        first, last = (int(used.min()), int(used.max()) + 1) if len(used) else (0, 1)
+        dense = np.concatenate([w[:, first:last].toarray() for w in weights])
+        return cls(first, np.ascontiguousarray(dense.T, np.float32), _views_at_once(dense.size))
+
+    def product(self, radiance: np.ndarray, views: int) -> np.ndarray:
+        """Return the signals of the first `views` views, and of views that fill up the last product.
+
+        The result has the shape (view, channel * width).
+
+        radiance: radiance along all rays, (view, ray); the number of views is a multiple of `self.views`
+        """
+        count, last = -(-views // self.views), self.first + len(self.weights)
+        blocks = radiance.reshape(-1, self.views, radiance.shape[1])[:count, :, self.first : last]
+        signals: np.ndarray = (blocks @ self.weights).reshape(count * self.views, -1)
+        return signals
+
+
+@dataclass(frozen=True)
 class RowProduct:
     """Matrix products, one per row of receptors, that sum the radiance along rays to signals.
 
     signal[view, channel, i, j] is the sum over all rays of radiance[view, ray] W[channel, receptor (i, j), ray].
 
-    stretches: for each row of receptors, the index of the first ray that it uses, and the weights of its rays (ray,
-        channel * width) float32
+    stretches: the rays of each row of receptors
     channels: number of channels
     width: number of receptors in a row
     """
 
-    stretches: tuple[tuple[int, np.ndarray], ...]
+    stretches: tuple[Stretch, ...]
     channels: int
     width: int
 
@@ -42,36 +75,29 @@ class RowProduct:
     def from_weights(cls, weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int]) -> RowProduct:
         """Build the products from one sparse matrix (receptor, ray) per channel."""
         height, width = resolution
-        stretches = []
-        for row in range(height):
-            mine = [w[row * width : (row + 1) * width] for w in weights]
-            used = np.concatenate([w.indices for w in mine])
-            first, last = (int(used.min()), int(used.max()) + 1) if len(used) else (0, 1)
-            dense = np.concatenate([w[:, first:last].toarray() for w in mine])
-            stretches.append((first, np.ascontiguousarray(dense.T, np.float32)))
-        return cls(tuple(stretches), len(weights), width)
+        rows = ([w[row * width : (row + 1) * width] for w in weights] for row in range(height))
+        return cls(tuple(map(Stretch.from_weights, rows)), len(weights), width)
 
     def __call__(self, radiance: np.ndarray) -> np.ndarray:
         """Map radiance (view, ray) to signals (view, channel, height, width), float32."""
         views, rays = radiance.shape
-        n_blocks = -(-views // BLOCK)
-        if views % BLOCK:
-            radiance = np.concatenate([radiance, np.zeros((n_blocks * BLOCK - views, rays), np.float32)])
-        out = np.empty((n_blocks * BLOCK, self.channels, len(self.stretches), self.width), np.float32)
-        for row, (first, weights) in enumerate(self.stretches):
-            blocks = radiance.reshape(-1, _views_at_once(weights), rays)
-            product = blocks[:, :, first : first + len(weights)] @ weights
-            out[:, :, row] = product.reshape(-1, self.channels, self.width)
-        return out[:views]
+        missing = -views % max(stretch.views for stretch in self.stretches)
+        if missing:
+            radiance = np.concatenate([radiance, np.zeros((missing, rays), np.float32)])
+        out = np.empty((views, self.channels, len(self.stretches), self.width), np.float32)
+        for row, stretch in enumerate(self.stretches):
+            signals = stretch.product(radiance, views)[:views]
+            out[:, :, row] = signals.reshape(views, self.channels, self.width)
+        return out
 
 
-def _views_at_once(weights: np.ndarray) -> int:
-    """Return the largest number of views in a product that one thread computes.
+def _views_at_once(weights: int) -> int:
+    """Return the largest number of views in a product with this number of weights that one thread computes.
 
     The result is BLOCK if one thread cannot compute even BLOCK / 8 views. Such products are large enough for several
     threads.
     """
-    return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights.size <= ONE_THREAD), BLOCK)
+    return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights <= ONE_THREAD), BLOCK)
 
 
 # Function that maps spectral components of light, (component, view, ...), to signals, (view, channel, ...):

@@ -53,7 +53,9 @@ class FreeMotion:
         """
         # The terms are summed explicitly, since the rounding of a matrix product depends on the number of worlds.
         paths, speeds = self.response
-        path = paths[:, 0] * velocity[:, None] + paths[:, 1] * command[:, None]
+        # Copies for all substeps make NumPy's inner loop longer than over x and y.
+        start, commanded = (np.repeat(of[:, None], len(paths), axis=1) for of in (velocity, command))
+        path = paths[:, 0] * start + paths[:, 1] * commanded
         speed = speeds[-1, 0] * velocity + speeds[-1, 1] * command
         return path, speed
 
@@ -68,8 +70,9 @@ class FreeMotion:
         position: positions at the beginning (n, 2) [m]
         path: positions after each substep, relative to `position` (n, substep, 2) [m]
         """
-        low = position + np.minimum.reduce(path, axis=1, initial=0.0)
-        high = position + np.maximum.reduce(path, axis=1, initial=0.0)
+        steps = path.swapaxes(0, 1).copy()  # NumPy's inner loop is then over the agents and not over x and y
+        low = position + np.minimum.reduce(steps, axis=0, initial=0.0)
+        high = position + np.maximum.reduce(steps, axis=0, initial=0.0)
         x_from, y_from, x_to, y_to = self._within
         # The axes are compared one at a time, so that NumPy's inner loop is over the boxes.
         in_reach: np.ndarray = low[:, :1] < x_to

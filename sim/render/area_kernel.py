@@ -15,7 +15,7 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.sensor import Facets, Sensor
-from sim.render.eye_rays import Directions, EyeRays, Lane
+from sim.render.eye_rays import Counts, Directions, EyeRays, Lane
 from sim.render.ray_kernel import Frame, KernelInputs, RayKernel
 from sim.scene.device_arrays import counted, floats, whole_numbers
 from sim.tracing.areas.area_tracer import AreaTracer
@@ -29,13 +29,13 @@ class BorderInputs:
     """Horizontal directions to the borders between columns of areas.
 
     lanes: index of each lane; there is one lane for each border of each eye in each world
-    sizes: number of borders of an eye, and number of eyes in a world
+    counts: number of borders of an eye, and number of eyes of a world
     along: directions to the borders
     sides: indices of each area's left and right border
     """
 
     lanes: Array
-    sizes: Array
+    counts: Counts
     along: Directions
     sides: Array
 
@@ -79,7 +79,8 @@ class AreaKernel(RayKernel):
         whole, places = super().inputs(ways), self._areas.places
         return AreaInputs(
             whole.lanes,
-            whole.sizes,
+            whole.counts,
+            whole.total,
             whole.along,
             self._areas.inputs,
             None,
@@ -93,7 +94,7 @@ class AreaKernel(RayKernel):
         n = len(self._borders.x)
         return BorderInputs(
             counted(self.n_envs * self.n_eyes * n),
-            whole_numbers([n, self.n_eyes]),
+            Counts.from_numbers(n, self.n_eyes),
             self.eyes.directions(self._borders.directions),
             whole_numbers(self._borders.sides),
         )
@@ -101,8 +102,8 @@ class AreaKernel(RayKernel):
     def layers(self, scenes: Any, frame: Frame, inputs: AreaInputs) -> list[Array]:  # type: ignore[override]
         """Return the components of the mean light in each lane's area, for each depth layer."""
         lit = self._lit(frame, inputs)
-        lane = self.lane(inputs)
-        seen = self.eyes.ray(frame.eyes, inputs.along, lane, dr.gather(mi.UInt32, inputs.sizes, 0))
+        lane = Lane.from_index(inputs.lanes, inputs.counts)
+        seen = self.eyes.ray(frame.eyes, inputs.along, lane, inputs.counts.samples.number)
         width, height = (dr.gather(mi.Float, inputs.extent, i) for i in range(2))
         area = Area.from_extent(seen.ray, seen.axis.xy, (width, height))
         borders = inputs.borders
@@ -131,18 +132,14 @@ class AreaKernel(RayKernel):
     ) -> tuple[Array, Array]:
         """Return the faces at the left and right border of a lane's area."""
         faces = self._faces(frame, inputs, borders)
-        n, eyes = (dr.gather(mi.UInt32, borders.sizes, i) for i in range(2))
-        first, sides = (lane.world * eyes + lane.eye) * n, dr.gather(mi.Vector2u, borders.sides, lane.sample)
+        first = lane.row * borders.counts.samples.number
+        sides = dr.gather(mi.Vector2u, borders.sides, lane.sample)
         return dr.gather(mi.UInt32, faces, first + sides.x), dr.gather(mi.UInt32, faces, first + sides.y)
 
     def _faces(self, frame: Frame, inputs: AreaInputs, borders: BorderInputs) -> Array:
         """Return the face that is hit at each border of each eye, flat (world, eye, border)."""
-        # Lanes that only fill up a packet read 0, and a division by 0 would end the process.
-        n, eyes = (dr.maximum(dr.gather(mi.UInt32, borders.sizes, i), 1) for i in range(2))
-        row = borders.lanes // n
-        world = row // eyes
-        lane = Lane(world, row - world * eyes, borders.lanes - row * n, row)
-        ray = self.eyes.ray(frame.eyes, borders.along, lane, n).ray
+        lane = Lane.from_index(borders.lanes, borders.counts)
+        ray = self.eyes.ray(frame.eyes, borders.along, lane, borders.counts.samples.number).ray
         faces = self._areas.first_faces(ray.o, ray.d.xy, inputs.tables)
         dr.eval(faces)
         return faces

@@ -13,12 +13,25 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.scene.device_arrays import SharedBuffer, floats, in_fours, three
+from sim.scene.device_arrays import Divisor, SharedBuffer, floats, in_fours, three
 from sim.scene.poses import Poses
 from sim.tracing.eye_places import EyePlaces, LevelStand
 from sim.tracing.eye_ray import EyeRay
 
 EYE_ROWS = 4  # rows of four floats: the pupil, right, up and ahead
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Numbers of samples of an eye, and of eyes of a world."""
+
+    samples: Divisor
+    eyes: Divisor
+
+    @classmethod
+    def from_numbers(cls, samples: int, eyes: int) -> Counts:
+        """Return these numbers on the device."""
+        return cls(Divisor.from_number(samples), Divisor.from_number(eyes))
 
 
 @dataclass(frozen=True)
@@ -33,6 +46,13 @@ class Lane:
     eye: Array
     sample: Array
     row: Array
+
+    @classmethod
+    def from_index(cls, index: Array, counts: Counts) -> Lane:
+        """Return the lane with this index, flat (world, eye, sample)."""
+        row = counts.samples.quotient(index)
+        world = counts.eyes.quotient(row)
+        return cls(world, row - world * counts.eyes.number, index - row * counts.samples.number, row)
 
 
 @dataclass(frozen=True)

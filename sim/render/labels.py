@@ -11,7 +11,7 @@ from optics.numerics.autodiff import Array
 from sim.eyes.compound_eye import CompoundEye
 from sim.eyes.depth_layers import ONE_PSF
 from sim.eyes.tangent_plane import directions_of, from_receptors
-from sim.render.eye_rays import FreeEyes
+from sim.render.eye_rays import FreeEyes, Lane
 from sim.render.optic_flow import flow_between, receptor_centres
 from sim.render.pending_frame import FrameSlot
 from sim.render.prepared_scene import Placed, PreparedScene
@@ -46,11 +46,11 @@ class Labels:
             self._scenes = tracer.scene
 
         def distances(scenes: Scenes, frame: Frame, inputs: KernelInputs) -> Array:
-            seen, there = kernel.seen(scenes, frame, inputs, kernel.lane(inputs))
+            seen, there = kernel.seen(scenes, frame, inputs, Lane.from_index(inputs.lanes, inputs.counts))
             return tracer.distance(seen.ray, there) * seen.cosine
 
         def hits(scenes: Scenes, frame: Frame, inputs: KernelInputs) -> Array:
-            seen, there = kernel.seen(scenes, frame, inputs, kernel.lane(inputs))
+            seen, there = kernel.seen(scenes, frame, inputs, Lane.from_index(inputs.lanes, inputs.counts))
             return tracer.which(seen.ray, there)
 
         self._distances, self._hits = FrozenKernel(distances), FrozenKernel(hits)

@@ -16,8 +16,8 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.sensor import Facets
-from sim.render.eye_rays import Directions, EyeRays, Lane
-from sim.scene.device_arrays import counted, floats, whole_numbers
+from sim.render.eye_rays import Counts, Directions, EyeRays, Lane
+from sim.scene.device_arrays import counted, floats, one_number
 from sim.scene.frozen_kernels import GarbageKept
 from sim.scene.poses import Poses
 from sim.scene.variant import on_gpu, variant
@@ -33,7 +33,8 @@ class KernelInputs:
     """Inputs of a kernel that are the same in every call.
 
     lanes: index of each lane
-    sizes: number of samples of an eye, number of eyes of a world, and number of lanes
+    counts: number of samples of an eye, and number of eyes of a world
+    total: number of lanes
     along: directions of the samples
     tables: the tracer's inputs
     bounces: four numbers per sample, from which the directions of bounced light are computed; None: direct light only
@@ -41,7 +42,8 @@ class KernelInputs:
     """
 
     lanes: Array
-    sizes: Array
+    counts: Counts
+    total: Array
     along: Directions
     tables: Any
     bounces: Array | None = None
@@ -109,12 +111,12 @@ class RayKernel:
         if bounces is not None and self.tracer.light == lighting.BOUNCE:
             second = np.random.default_rng(SECOND).random(bounces.shape)
             more = floats(np.concatenate([bounces, second], axis=1))
-        sizes = whole_numbers([len(ways), self.n_eyes, lanes])
+        counts = Counts.from_numbers(len(ways), self.n_eyes)
         origins, weights = (None, None) if facets is None else (facets.origins, facets.weights)
         if weights is not None:
             weights = floats(np.pad(weights, ((0, 0), (0, -weights.shape[1] % 4))))
         along = self.eyes.directions(ways, origins)
-        return KernelInputs(counted(lanes), sizes, along, self.tracer.inputs, more, weights)
+        return KernelInputs(counted(lanes), counts, one_number(lanes), along, self.tracer.inputs, more, weights)
 
     def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
         """Return sums over groups of `reduced` adjacent lanes, flat (layer, component, world, eye, sum).
@@ -126,15 +128,14 @@ class RayKernel:
             out = layers[0]
         else:
             out = dr.zeros(mi.Float, lanes * len(layers))
-            each = dr.gather(mi.UInt32, inputs.sizes, 2)
             for k, value in enumerate(layers):
-                dr.scatter(out, value, inputs.lanes + k * each, mode=dr.ReduceMode.Permute)
+                dr.scatter(out, value, inputs.lanes + k * inputs.total, mode=dr.ReduceMode.Permute)
         # A single reduction of one array: separate reductions would trace the rays once per component.
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
     def layers(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> list[Array]:
         """Return the components of the light along each lane's ray, for each depth layer."""
-        lane = self.lane(inputs)
+        lane = Lane.from_index(inputs.lanes, inputs.counts)
         seen, there = self.seen(scenes, frame, inputs, lane)
         bounces = inputs.bounces is not None
         samples = dr.gather(mi.Vector4f, inputs.bounces, lane.sample) if bounces else mi.Vector4f(0)
@@ -150,17 +151,8 @@ class RayKernel:
 
     def seen(self, scenes: Any, frame: Frame, inputs: KernelInputs, lane: Lane) -> tuple[EyeRay, Any]:
         """Return the ray of a lane, and the geometry of the lane's world in the tracer's form."""
-        seen = self.eyes.ray(frame.eyes, inputs.along, lane, dr.gather(mi.UInt32, inputs.sizes, 0))
+        seen = self.eyes.ray(frame.eyes, inputs.along, lane, inputs.counts.samples.number)
         return seen, self.tracer.around(scenes, frame.things, inputs.tables, lane.world)
-
-    @staticmethod
-    def lane(inputs: KernelInputs) -> Lane:
-        """Return the sample, eye and world of each lane."""
-        # Lanes that only fill up a packet read 0, and a division by 0 would end the process.
-        samples, eyes = (dr.maximum(dr.gather(mi.UInt32, inputs.sizes, i), 1) for i in range(2))
-        row = inputs.lanes // samples
-        world = row // eyes
-        return Lane(world, row - world * eyes, inputs.lanes - row * samples, row)
 
 
 def launched(

@@ -181,9 +181,8 @@ class ClosedForm:
         point = ray(dr.select(seen | on_sphere, t, 0))
         offset, columns, rows, x, y = self._face_texel(face, point, tables)
         if centres:
-            round_, uv = spheres.normal_and_uv(self._bodies, centres, which, point)
-            normal = dr.select(on_sphere, round_, normal)
-            point = dr.select(on_sphere, spheres.surface_point(self._bodies, centres, which, round_), point)
+            surface, round_, uv = spheres.surface_at(self._bodies, centres, which, point)
+            normal, point = dr.select(on_sphere, round_, normal), dr.select(on_sphere, surface, point)
             found = zip(self._sphere_texel(which, uv), (offset, columns, rows, x, y), strict=True)
             offset, columns, rows, x, y = (dr.select(on_sphere, mine, other) for mine, other in found)
         lit = (seen | on_sphere) & (t > 0) & (dr.dot(normal, ray.d) < 0)

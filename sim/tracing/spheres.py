@@ -117,29 +117,29 @@ def blocks(radii: list[float], centres: list[Array], ray: Array) -> Array:
     return blocked
 
 
-def normal_and_uv(spheres: Spheres, centres: list[Array], which: Array, point: Array) -> tuple[Array, Array]:
-    """Return the outward normal in the world's frame and the texture coordinates at a point on sphere `which`."""
-    centre, local = mi.Point3f(0), mi.Vector3f(0)
-    for k, other in enumerate(centres):
+def surface_at(spheres: Spheres, centres: list[Array], which: Array, hit: Array) -> tuple[Array, Array, Array]:
+    """Return the point on the surface of sphere `which` at a hit point, the outward normal and the texture coordinates.
+
+    The point replaces the hit point, which rounding may place inside a distant sphere, where the sphere would shade
+    itself. Without a hit, the results have no meaning.
+    """
+    centre, radius = centres[0], mi.Float(float(spheres.radii[0]))
+    for k, other in enumerate(centres[1:], 1):
         centre = dr.select(which == k, other, centre)
-    normal = dr.normalize(point - centre)
-    for k in range(len(centres)):
-        to_local = mi.Matrix3f(spheres.frames[k].T.tolist())
-        local = dr.select(which == k, to_local @ normal, local)
+        radius = dr.select(which == k, float(spheres.radii[k]), radius)
+    normal = dr.normalize(hit - centre)
+    local = _to_local(spheres, 0) @ normal
+    for k in range(1, len(centres)):
+        if (spheres.frames[k] != spheres.frames[0]).any():
+            local = dr.select(which == k, _to_local(spheres, k) @ normal, local)
     u = dr.atan2(local.y, local.x) * dr.inv_two_pi
     v = dr.safe_acos(local.z) * dr.inv_pi
-    return mi.Normal3f(normal), mi.Point2f(dr.select(u < 0, u + 1, u), v)
+    return centre + normal * radius, mi.Normal3f(normal), mi.Point2f(dr.select(u < 0, u + 1, u), v)
 
 
-def surface_point(spheres: Spheres, centres: list[Array], which: Array, normal: Array) -> Array:
-    """Return the point of sphere `which` at which the surface has this normal.
-
-    It replaces the hit point, which rounding may place inside a distant sphere, where the sphere would shade itself.
-    """
-    point = mi.Point3f(0)
-    for k, centre in enumerate(centres):
-        point = dr.select(which == k, centre + normal * float(spheres.radii[k]), point)
-    return mi.Point3f(point)
+def _to_local(spheres: Spheres, k: int) -> Array:
+    """Return the rotation from the world's frame to that of sphere k."""
+    return mi.Matrix3f(spheres.frames[k].T.tolist())
 
 
 def _quadratic(ray: Array, centre: Array, radius: float) -> tuple[Array, Array]:

@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
+import scipy.sparse
 
 import optics
 from sim.eyes.receptive_fields import NoRaysError, ReceptiveFields, cells_per_receptor, low_discrepancy
+from sim.eyes.receptor_sums import RowProduct
 from sim.eyes.sampling import BoxSampling, FieldSampling, build_sensor, eye_sampling
 from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor
 
@@ -139,6 +141,24 @@ def test_signals_are_the_weighted_sums(components):
     np.testing.assert_allclose(
         sensor.receptor_radiance(bands), np.einsum("brp,bvp->bvr", dense(sensor), bands), rtol=2e-5
     )
+
+
+@pytest.mark.parametrize("density", [0.05, 1.0])
+def test_signals_of_a_view_do_not_depend_on_the_other_views(density):
+    """Rows need products of different sizes. A few views take one product per row, and no views that fill up others."""
+    rng = np.random.default_rng(3)
+    weights = rng.random((3, 45, 900), dtype=np.float32) * (rng.random((3, 45, 900)) < density)
+    weights[:, 20:25, 100:] = 0  # a row with few rays
+    product = RowProduct.from_weights([scipy.sparse.csr_array(w) for w in weights], (9, 5))
+    light = rng.random((70, 900), dtype=np.float32)
+    signals = product(light)
+    np.testing.assert_allclose(signals[:, 1], (light @ weights[1].T).reshape(70, 9, 5), rtol=1e-5)
+    for views in (1, 2, 5, 16, 31, 33, 64):
+        np.testing.assert_array_equal(product(light[:views]), signals[:views])
+    narrow, wide = product.stretches[4], product.stretches[0]
+    assert (narrow.views, wide.views) == (32, 16)
+    assert len(wide.product(light[:32], 2)) == 16
+    assert len(wide.product(light[:32], 17)) == 32
 
 
 def test_what_is_left_out_is_less_than_a_tenth_of_the_noise():

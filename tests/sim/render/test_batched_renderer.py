@@ -157,11 +157,11 @@ def with_uv(change):
     """Return a mutant in which a function changes the texture coordinates (u, v) of spheres."""
 
     def sabotage(original):
-        def normal_and_uv(*arguments):
-            normal, uv = original(*arguments)
-            return normal, mi.Point2f(*change(uv.x, uv.y))
+        def surface_at(*arguments):
+            point, normal, uv = original(*arguments)
+            return point, normal, mi.Point2f(*change(uv.x, uv.y))
 
-        return normal_and_uv
+        return surface_at
 
     return sabotage
 
@@ -200,8 +200,8 @@ def mirrored(u, v):
 IN_CLOSED_FORM = [
     (model_scene, "model_lights", with_lights(lambda light: {"direction": light.direction * [-1, 1, 1]})),
     (model_scene, "model_lights", with_lights(misweighted)),
-    (spheres, "normal_and_uv", with_uv(upside_down)),
-    (spheres, "normal_and_uv", with_uv(mirrored)),
+    (spheres, "surface_at", with_uv(upside_down)),
+    (spheres, "surface_at", with_uv(mirrored)),
     (spheres, "blocks", no_mover_shadows),
 ]
 BY_MITSUBA = [

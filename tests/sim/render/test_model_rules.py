@@ -278,7 +278,7 @@ def test_receptors_whose_first_rays_differ_by_the_noticed_amount_are_kept():
     beyond[1:-1, 1:-1] = False
     rays = edge_rays.EdgeRays.__new__(edge_rays.EdgeRays)
     rays._signals, rays._beyond, rays._noticed, rays._rays = [[0.0]], beyond, 0.25, 8
-    rays._fine, rays._along = "fine", edge_rays.KernelInputs(None, None, None, None)
+    rays._fine, rays._along = "fine", edge_rays.KernelInputs(None, None, None, None, None)
     found, asked = np.zeros((2, beyond.size)), []
     found[0, :3], found[1, :3] = (1.0, 2.0, 3.0), (0.25, 0.2501, 0.0)
 

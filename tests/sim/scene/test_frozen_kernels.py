@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from optics.numerics.precision import PACKET, aligned
-from sim.scene.device_arrays import SharedBuffer, floats
+from sim.scene.device_arrays import Divisor, SharedBuffer, floats, whole_numbers
 from sim.scene.frozen_kernels import FrozenKernel
 from sim.scene.variant import variant
 
@@ -116,3 +116,16 @@ def test_a_shared_buffer_says_what_was_written_last(backend, monkeypatch):
         for number in (1.0, 2.0):
             buffer.values[:] = number
             np.testing.assert_array_equal(buffer.array.numpy(), number)
+
+
+def test_quotients_of_whole_numbers_are_exact():
+    """Numbers next to multiples of the divisor, and the largest ones, divided by small, random and large divisors."""
+    rng, largest = np.random.default_rng(1), 2**32 - 1
+    divisors = [*range(1, 70), *(2**k + d for k in range(7, 32) for d in (-1, 0, 1)), *rng.integers(70, largest, 100)]
+    with variant():
+        for divisor in map(int, [*divisors, largest]):
+            multiples = rng.integers(0, largest // divisor + 1, 30) * divisor
+            near = np.add.outer([-1, 0, 1], multiples).ravel()
+            values = np.concatenate([near[(near >= 0) & (near <= largest)], [0, 1, largest - 1, largest]])
+            found = Divisor.from_number(divisor).quotient(whole_numbers(values)).numpy()
+            np.testing.assert_array_equal(found, values // divisor)

@@ -275,10 +275,11 @@ def test_distant_spheres_do_not_shade_themselves(monkeypatch):
 
     assert darker() <= 3
 
-    def rounded(bodies, centres, which, normal):
+    def rounded(bodies, centres, which, hit):
         """Return hit points as they are rounded: a tenth of a millimetre below the surface."""
-        return surface_point(bodies, centres, which, normal) - normal * 1e-4
+        point, normal, uv = surface_at(bodies, centres, which, hit)
+        return point - normal * 1e-4, normal, uv
 
-    surface_point = spheres.surface_point
-    monkeypatch.setattr(closed_form_tracer.spheres, "surface_point", rounded)
+    surface_at = spheres.surface_at
+    monkeypatch.setattr(closed_form_tracer.spheres, "surface_at", rounded)
     assert darker() > 20
