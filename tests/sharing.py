@@ -13,7 +13,7 @@ import pytest
 # Names of groups, and the common start of their tests' names.
 SHARING = {
     "a run, an episode and its page": ("tests/evolve/report/",),
-    "a run and an episode": ("tests/evolve/analysis/test_episode.py", "tests/evolve/cli/test_products.py"),
+    "a run and an episode": ("tests/evolve/episodes/test_episode.py", "tests/evolve/cli/test_products.py"),
     "the sources, parsed": (
         *("tests/test_architecture.py", "tests/test_conventions.py", "tests/rhabdom/test_dependencies.py"),
         *("tests/test_docs.py::test_paths", "tests/test_docs.py::test_names"),

@@ -7,9 +7,4 @@ acuity          finest gratings that an animal resolves
 genealogy       a candidate's line of descent
 episode_failures  failures that ended episodes, mostly failures of methods of a user task
 vision          image quality and contrast of an animal's eyes, in comparison with a perfect lens
-recorder        recording of an episode that an animal plays
-held_out        episodes in the test set of layouts
-episode         Episode: one recorded episode
-episode_scene   EpisodeScene: positions of bodies and eyes during an episode
-episode_file    storage of episodes in files
 """

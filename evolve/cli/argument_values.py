@@ -7,7 +7,7 @@ import argparse
 __all__ = ["every", "one_line", "searches", "seed"]
 
 MOST_SEARCHES = 100_000  # as in evolve.report.gene_drift, whose import takes seconds
-MOST_EVERY = 1_000_000  # as in evolve.analysis.recorder
+MOST_EVERY = 1_000_000  # as in evolve.episodes.recorder
 LONGEST_MESSAGE = 1800  # maximum number of characters of an error message
 LONGEST = 4000  # maximum number of digits of an argument; Python converts at most 4,300
 

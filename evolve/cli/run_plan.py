@@ -28,7 +28,7 @@ __all__ = ["RunPlan", "steps_each"]
 # [bytes] Allowance for the report. For comparison, `evolve report` writes 0.6 MB for a run with eight candidates.
 REPORT_BYTES = 5_000_000
 # Number of actions, actions per EXR file, and pixels along the longer side, for the exported episode. They are copied
-# from evolve.analysis.recorder, whose import would load torch. A test checks that they are equal.
+# from evolve.episodes.recorder, whose import would load torch. A test checks that they are equal.
 EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60
 
 

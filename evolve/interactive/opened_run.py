@@ -104,7 +104,7 @@ class OpenedRun(Run):
             ValueError: the eyes that the task places differ from those of the candidate.
             OSError: the policy's file cannot be read.
         """
-        from evolve.analysis.recorder import trained_policy
+        from evolve.episodes.recorder import trained_policy
         from evolve.learning.animal_task import with_phenotype
         from sim.tasks.encounter import Frozen
 
@@ -125,7 +125,7 @@ class OpenedRun(Run):
             BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: the policy's file cannot be read.
         """
-        from evolve.analysis.held_out import held_out_episodes
+        from evolve.episodes.held_out import held_out_episodes
 
         return held_out_episodes(self, candidate_id, seed, episodes)
 

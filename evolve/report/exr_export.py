@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 import sim
-from evolve.analysis.episode import Episode
-from evolve.analysis.recorder import EVERY, record
+from evolve.episodes.episode import Episode
+from evolve.episodes.recorder import EVERY, record
 from evolve.report.doing import Doing, in_silence
 from evolve.store.checksums import list_checksums
 from evolve.store.directory import EXR, Run

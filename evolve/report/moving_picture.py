@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw
 
-from evolve.analysis.episode import Episode
 from evolve.config.run_config import ConfigError
+from evolve.episodes.episode import Episode
 from evolve.report.picture import display
 from evolve.report.theme import ACCENT, GREEN, INK, MUTED, PANEL, PAPER, VERMILLION
 from evolve.store.atomic_files import unfinished, write_whole

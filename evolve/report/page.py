@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
-from evolve.analysis.episode import Episode
 from evolve.analysis.fitness_parts import any_costs, fitness_text
-from evolve.analysis.held_out import held_out_episodes
 from evolve.analysis.statistics import champions, gene_values, trajectory
 from evolve.analysis.vision import SCENES, Vision, vision
 from evolve.config.settings import FAMILY
+from evolve.episodes.episode import Episode
+from evolve.episodes.held_out import held_out_episodes
 from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
 from evolve.report.doing import Doing, in_silence

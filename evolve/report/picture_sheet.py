@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from evolve.analysis.episode import Pictures
+from evolve.episodes.episode import Pictures
 from evolve.report.markup import Html, html, style
 from evolve.report.picture import SHEET_WIDTH
 

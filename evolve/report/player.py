@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from evolve.analysis.episode import Episode
+from evolve.episodes.episode import Episode
 from evolve.report.markup import Html, document, exact, html, joined, json_script, key, rounded, style
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.report.picture_sheet import figure_of_pictures, film_of_pictures

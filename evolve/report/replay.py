@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from evolve.analysis.episode import Episode
-from evolve.analysis.recorder import EVERY, record
 from evolve.config.checks import ConfigError, quoted
+from evolve.episodes.episode import Episode
+from evolve.episodes.recorder import EVERY, record
 from evolve.report.moving_picture import require_ffmpeg, write_gif, write_mp4
 from evolve.report.player import write_player
 from evolve.report.rerun_recording import write_recording

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import sim
-from evolve.analysis.episode_scene import EpisodeScene
+from evolve.episodes.episode_scene import EpisodeScene
 from evolve.report.rerun_stream import RerunStream, camera_frames
 from sim.scene.solids import Solid
 from sim.worlds.ground_plan import GroundPlan

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from evolve.analysis.episode import Episode
+from evolve.episodes.episode import Episode
 from evolve.report.rerun_bodies import EYES
 
 __all__ = ["layout"]

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evolve.analysis.episode import Episode
+from evolve.episodes.episode import Episode
 from evolve.report.picture import display
 from evolve.report.rerun_bodies import EYES, draw_bodies, draw_goal_region
 from evolve.report.rerun_layout import layout

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import optics
-from evolve.analysis.episode import Episode
 from evolve.analysis.statistics import psnr
+from evolve.episodes.episode import Episode
 from evolve.report.hints import hint
 from evolve.report.markup import Html, html, joined, rounded, style
 from evolve.report.picture import data_uri, display

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from evolve.report.doing import Doing, in_silence
 
 if TYPE_CHECKING:
-    from evolve.analysis.episode import Episode
+    from evolve.episodes.episode import Episode
     from evolve.store.directory import Run
 
 __all__ = ["FILE", "write"]
@@ -32,7 +32,7 @@ def write(run: Run, episode: Episode | None = None, out: Path | None = None, doi
         StrangeFileError: `out` is not a regular file, for example a directory.
         OSError: a file cannot be read or written.
     """
-    from evolve.analysis.recorder import record
+    from evolve.episodes.recorder import record
     from evolve.report.page import render
     from evolve.store.atomic_files import require_file_name, write_whole
 

@@ -1,4 +1,7 @@
-"""Preparation of an interrupted run, after it has been opened and before the next candidate is trained."""
+"""Preparation of an interrupted run, after it has been opened and before the next candidate is trained.
+
+`evolve.runs.carry_on` then continues the run, and `evolve.search.loop` tells the optimizer the recorded candidates.
+"""
 
 from __future__ import annotations
 

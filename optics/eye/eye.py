@@ -16,12 +16,12 @@ from optics.eye.kernel_bank import KernelBank, prepare
 from optics.eye.kernel_interpolation import NodeError
 from optics.eye.patch import receptor_in, spacing_range
 from optics.eye.polarization import taken_by
-from optics.eye.receptive_field import perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
 from optics.eye.retina import Retina
 from optics.eye.retinal_image import centred, with_centre
 from optics.eye.signals import signals, with_noise
 from optics.eye.summary import Description, describe
+from optics.eye.visual_kernel import perfect_psf, retinal_psf
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import in_range, of_kind, one_of, positive, radiance_cube, whole
 from optics.numerics.autodiff import Array, Scalar, holds_arrays, number, plain, to_user
@@ -127,7 +127,7 @@ class Eye(EyeSpec):
             cell is its geometric image.
 
         The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
-        enough to lose less than the tolerance (limits: see `receptive_field`). Light of a steep relief may count as
+        enough to lose less than the tolerance (limits: see `visual_kernel`). Light of a steep relief may count as
         blocked if it lands farther from the image than the longer side of the retina. A perfect lens has the kernel 1.
 
         The kernel treats the light of each scene cell as coming from its centre. Signals are then a² Σ_b weights[c, b]

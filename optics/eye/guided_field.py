@@ -17,8 +17,8 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.eye.cell_integrals import samples_per_cycle
-from optics.eye.receptive_field import Spot, beams_to, spot_of
 from optics.eye.retina import Retina
+from optics.eye.visual_kernel import Spot, beams_to, spot_of
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import of_kind
 from optics.numerics.autodiff import Array, Scalar
@@ -75,7 +75,7 @@ def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, receptor: tupl
 def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
     """Return the fraction of light that a receptor accepts from each cell around its direction: Dr.Jit (band, ky, kx).
 
-    ky and kx are even if `guide.cells` is even. The orientation is that of `receptive_field.visual_kernel`, which also
+    ky and kx are even if `guide.cells` is even. The orientation is that of `visual_kernel.visual_kernel`, which also
     documents the other arguments.
 
     Raises:

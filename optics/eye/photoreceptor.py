@@ -1,4 +1,7 @@
-"""Signal of a photoreceptor from the light on it: throughput, spectral weighting, noise."""
+"""Signal of a photoreceptor from the light on it: throughput, spectral weighting, noise.
+
+This is the noise of `optics.Eye.see`. In worlds, `sim.render.receptor_noise` draws the noise.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kernel of any receptor: a square behind a perfect lens or a pupil, or a waveguide."""
+"""Choice of a receptor's kernel: `visual_kernel` for a square receptor, `guided_field` for a waveguide."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from optics.eye.band_choice import choose_bands
 from optics.eye.eye_spec import EyeSpec
 from optics.eye.guided_field import Guide, guided_kernel
-from optics.eye.receptive_field import visual_kernel
 from optics.eye.retina import Retina
+from optics.eye.visual_kernel import visual_kernel
 from optics.numerics.arguments import without_derivative
 from optics.numerics.autodiff import Array, Scalar, number, plain
 from optics.numerics.precision import precision

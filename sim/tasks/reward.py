@@ -20,7 +20,7 @@ Evolution". The fitness is the sum of an evaluation episode's rewards, averaged 
 code published with the paper gives a metre of progress the same weight as an action in contact; rhabdom uses the
 weights of the text. Foraging is not in the paper and has the reward of detection. A training run may begin with a w_c
 closer to 0 (setting `learning.contact_ramp` of `evolve`). At the end of training, and in the fitness, the weights are
-those above.
+those above. `sim.tasks.find_goal` and `sim.tasks.find_way` find the events of an action.
 """
 
 from __future__ import annotations

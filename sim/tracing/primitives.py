@@ -4,6 +4,9 @@ Only the outer sides of faces are visible, except for planes. As in MuJoCo's ren
 sees through its surface. Distances are multiples of the direction's length, and infinite for a miss. Roots are computed
 relative to the point at which the ray is nearest to the geom's centre or axis, so that hits of small or distant geoms
 are accurate in float32.
+
+Scenes of upright walls and spheres have their own intersections (`sim.tracing.spheres`,
+`sim.tracing.wall_intersection`).
 """
 
 from __future__ import annotations

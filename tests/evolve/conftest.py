@@ -2,8 +2,8 @@
 
 import pytest
 
-from evolve.analysis.recorder import record
 from evolve.cli.main import main
+from evolve.episodes.recorder import record
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve as carry_on
 from evolve.store.directory import Run

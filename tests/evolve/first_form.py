@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 import numpy as np
 
-from evolve.analysis.episode import Episode
+from evolve.episodes.episode import Episode
 
 COLUMNS = (
     *("position", "heading", "objects", "action", "reward", "signals", "perfect_signals"),

@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 
 import optics
-from optics.eye import receptive_field
+from optics.eye import visual_kernel
 from optics.eye.cell_integrals import Tiles, cell_integrals, samples_per_cycle
-from optics.eye.receptive_field import BESIDE, beams_to, spot_of
+from optics.eye.visual_kernel import BESIDE, beams_to, spot_of
 from optics.point_spread.pictures import pictures
 from sim.eyes.receptive_fields import cells_for
 from validation.benchmarks.kernel_times import VIEWS_DEG, eyes
@@ -34,7 +34,7 @@ def errors(eye: optics.Eye, samples: float) -> list[tuple[float, float]]:
     tiles = Tiles(spot.cells(retina.cell), retina.cell, False)
     pitches = [need.pitch * own / (2 * samples) for need in spot.needs]
     requests = [
-        receptive_field._request(beam, spot, need, spot.window(pitch, 2 * BESIDE), retina)
+        visual_kernel._request(beam, spot, need, spot.window(pitch, 2 * BESIDE), retina)
         for beam, need, pitch in zip(beams, spot.needs, pitches, strict=True)
     ]
     found = []

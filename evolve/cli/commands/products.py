@@ -66,7 +66,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
     """
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
-        from evolve.analysis import recorder
+        from evolve.episodes import recorder
         from evolve.report import exr_export
         from evolve.report.replay import write_page
         from evolve.report.write import write

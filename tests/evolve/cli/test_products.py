@@ -39,7 +39,7 @@ def test_replay_elsewhere_as_json_in_a_browser(call, run, browser, tmp_path):
 
 def test_names_that_no_page_can_have_are_refused_before_an_episode_is_played(call, run, monkeypatch):
     monkeypatch.setattr("evolve.report.replay.record", None)
-    monkeypatch.setattr("evolve.analysis.recorder.record", None)
+    monkeypatch.setattr("evolve.episodes.recorder.record", None)
     for command in ("replay", "report"):
         code, _, err = call(command, run.path, "--out", ".")
         assert (code, err) == (2, f"evolve: error: {Path.cwd()}: is a directory: must be a regular file\n")
@@ -129,7 +129,7 @@ def test_who_is_stopped_among_the_exr_files_has_no_report_yet(finished, monkeypa
     def stopped(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("evolve.analysis.recorder.record", lambda run, pictures: None)
+    monkeypatch.setattr("evolve.episodes.recorder.record", lambda run, pictures: None)
     monkeypatch.setattr("evolve.report.exr_export.export_episode", stopped)
     (finished / "report.html").write_text("of an hour ago")
     with pytest.raises(KeyboardInterrupt):

@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 
 import evolve.cli.run_plan
-from evolve.analysis.recorder import FINE_PIXELS, record
 from evolve.cli.main import main
 from evolve.cli.pace import Pace
 from evolve.cli.run_plan import RunPlan
 from evolve.config.assemble import assemble
+from evolve.episodes.recorder import FINE_PIXELS, record
 from sim.worlds.catalog import EPISODE_STEPS
 
 PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evolve.analysis.episode_file import load_episode, save_episode
 from evolve.config.assemble import assemble, from_text, from_toml, to_toml
 from evolve.config.formats import FORMAT, LAST_OF_FORMER
 from evolve.config.run_config import ConfigError
+from evolve.episodes.episode_file import load_episode, save_episode
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.store.directory import Run, RunError

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import evolve.learning.animal_task as animal_task_module
-from evolve.analysis.held_out import held_out_episodes
-from evolve.analysis.recorder import record
 from evolve.config.assemble import assemble
 from evolve.config.checks import ConfigError
 from evolve.config.numbering import Place
 from evolve.config.run_config import WorldConfig
 from evolve.config.settings import FAMILY
+from evolve.episodes.held_out import held_out_episodes
+from evolve.episodes.recorder import record
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.animal_task import animal_task

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evolve.analysis.recorder import record
 from evolve.config.assemble import assemble, from_text, to_toml
 from evolve.config.numbering import Place
 from evolve.config.run_config import ConfigError
+from evolve.episodes.recorder import record
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.animal_task import animal_task

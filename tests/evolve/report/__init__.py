@@ -17,14 +17,14 @@ facet_figures: test_facet_figures.py
 views: test_facet_figures.py, test_eye_figures.py
 picture: test_picture.py
 player: test_player.py
-picture_sheet: analysis/test_recorder.py
+picture_sheet: episodes/test_recorder.py
 moving_picture: test_moving_picture.py
-replay: analysis/test_episode.py, test_rerun_recording.py, interactive/test_run_products.py
+replay: episodes/test_episode.py, test_rerun_recording.py, interactive/test_run_products.py
 rerun_recording: test_rerun_recording.py, test_rerun_bodies.py
 rerun_bodies: test_rerun_bodies.py
 rerun_layout: test_rerun_recording.py, test_rerun_bodies.py
 rerun_stream: test_rerun_recording.py, test_rerun_bodies.py
-exr_export: analysis/test_episode.py, interactive/test_run_products.py
+exr_export: episodes/test_episode.py, interactive/test_run_products.py
 gene_drift: test_gene_drift.py
 comparison: cli/test_status_and_compare.py, test_priced_report.py
 """

@@ -2,7 +2,7 @@
 
 import pytest
 
-from evolve.analysis.recorder import record
+from evolve.episodes.recorder import record
 from evolve.report.page import render
 from tests.evolve.report.reported import Page, make_run
 

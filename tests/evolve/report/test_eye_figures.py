@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import optics
-from evolve.analysis.recorder import record
 from evolve.analysis.white_light import WhiteLight
+from evolve.episodes.recorder import record
 from evolve.report import eye_figures
 from evolve.report.eye_figures import diffraction_limit, relief_heights
 from evolve.report.markup import html

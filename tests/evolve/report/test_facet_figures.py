@@ -7,10 +7,10 @@ import pytest
 
 import optics
 import sim
-from evolve.analysis.recorder import record
 from evolve.analysis.vision import vision
 from evolve.cli.main import main
 from evolve.config.assemble import assemble
+from evolve.episodes.recorder import record
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.report.exr_export import export_episode

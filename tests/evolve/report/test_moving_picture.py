@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from evolve.analysis.episode import Pictures
 from evolve.config.run_config import ConfigError
+from evolve.episodes.episode import Pictures
 from evolve.report.moving_picture import GAP, HEIGHT, INSET, LONGEST, SPEED, _frame, _frames, write_gif, write_mp4
 from evolve.report.picture import display
 from evolve.report.theme import INK, PAPER

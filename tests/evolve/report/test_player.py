@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sim
-from evolve.analysis.episode import Pictures
-from evolve.analysis.recorder import Recorder
+from evolve.episodes.episode import Pictures
+from evolve.episodes.recorder import Recorder
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.report.picture import display

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from evolve.analysis.recorder import Recorder
+from evolve.episodes.recorder import Recorder
 from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy

@@ -15,10 +15,10 @@ occlusion: test_image_parts.py, test_eye_parts.py, test_occlusion.py
 photoreceptor: test_image_parts.py, test_photoreceptor.py
 polarization: test_eye_parts.py, test_polarization.py
 signals: test_image_parts.py, test_eye.py, test_polarization.py, test_eye_robustness.py
-receptive_field: test_window_parts.py, test_eye_parts.py, test_receptive_field.py, test_scattered_light.py, test_axes.py
+visual_kernel: test_window_parts.py, test_eye_parts.py, test_visual_kernel.py, test_scattered_light.py, test_axes.py
 guided_field: test_guide_parts.py, test_guided_field.py, test_axes.py
 receptor_kernel: test_eye_calls.py, test_guided_field.py, test_eye.py
-retina: test_choice_parts.py, test_window_parts.py, test_kept_kernels.py, test_receptive_field.py, test_steep_reliefs.py
+retina: test_choice_parts.py, test_window_parts.py, test_kept_kernels.py, test_visual_kernel.py, test_steep_reliefs.py
 retinal_image: test_image_parts.py, test_retinal_image.py, test_receptor_density.py
 sensor_pixels: test_choice_parts.py, test_torch.py
 camera: test_camera_parts.py, test_camera.py

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import optics
-from optics.eye import occlusion, polarization, receptive_field, summary
+from optics.eye import occlusion, polarization, summary, visual_kernel
 from optics.eye.kernel_bank import KernelBank, _choices, _grid, _rest
 from optics.eye.kernel_interpolation import Choice, NodeChoice, NodeError, checks, nodes
 from optics.numerics.accuracy import AccuracyError
@@ -224,7 +224,7 @@ def test_measures_that_are_not_accurate_enough_are_listed():
 def test_light_that_edges_diffract():
     """A disk diffracts the fraction 1/(π²Rδ) of its light beyond δ. A ring has more edge, and less area."""
     for radius, fraction in ((1e-4, 1e-2), (3e-4, 1e-3)):
-        found = receptive_field._beyond_edge(optics.Pupil(radius), fraction)
+        found = visual_kernel._beyond_edge(optics.Pupil(radius), fraction)
         assert found == pytest.approx(1 / (math.pi**2 * radius * fraction))
-    ring = receptive_field._beyond_edge(optics.Pupil(3e-4, aperture=optics.Annulus(0.5)), 1e-3)
+    ring = visual_kernel._beyond_edge(optics.Pupil(3e-4, aperture=optics.Annulus(0.5)), 1e-3)
     assert ring == pytest.approx(found * 1.5 / 0.75, rel=1e-3)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from optics import AccuracyError, Eye, HumanEye, PhotonBudget, Pupil
-from optics.eye import receptive_field
+from optics.eye import visual_kernel
 from optics.eye.band_choice import choose_bands
 from tests.optics.device_types import Float64
 from tests.slow_part import sweep
@@ -143,18 +143,18 @@ def test_bad_distances_are_refused_with_given_kernels(wrong, kind):
 def test_as_many_cells_as_a_spot_may_have_and_no_more(monkeypatch):
     """A spot may have exactly the limit of cells, but not one more."""
     eye = Eye(Pupil(25e-6, thin_lens_focal_length=Eye().sensor_distance), (7, 9), bands=1)
-    counted, count = [], receptive_field._cells_within
+    counted, count = [], visual_kernel._cells_within
 
     def noted(*arguments):
         counted.append(count(*arguments))
         return counted[-1]
 
-    monkeypatch.setattr(receptive_field, "_cells_within", noted)
+    monkeypatch.setattr(visual_kernel, "_cells_within", noted)
     eye.kernel(2)
     most = counted[0]
     assert most > 1
-    monkeypatch.setattr(receptive_field, "MOST_CELLS", most)
+    monkeypatch.setattr(visual_kernel, "MOST_CELLS", most)
     replace(eye, fov_deg=eye.fov_deg).kernel(2)
-    monkeypatch.setattr(receptive_field, "MOST_CELLS", most - 1)
+    monkeypatch.setattr(visual_kernel, "MOST_CELLS", most - 1)
     with pytest.raises(AccuracyError, match=rf"at most {most - 1}; increase"):
         replace(eye, fov_deg=eye.fov_deg).kernel(2)

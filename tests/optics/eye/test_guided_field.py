@@ -11,7 +11,7 @@ import optics
 from optics import AccuracyError, Eye, Ommatidium, Pupil, Waveguide, snyder_acceptance
 from optics.eye import guided_field
 from optics.eye.guided_field import check_guide
-from optics.eye.receptive_field import beams_to, spot_of
+from optics.eye.visual_kernel import beams_to, spot_of
 from optics.spectra.spectrum import daylight
 
 FOCAL, PITCH = 50e-6, 3e-6

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import optics
-from optics.eye import receptive_field
-from optics.eye.receptive_field import Spot, _cells_within, _pitch_for_cells, _WindowNeeds, spot_of
+from optics.eye import visual_kernel
 from optics.eye.retina import CellsError, Retina
+from optics.eye.visual_kernel import Spot, _cells_within, _pitch_for_cells, _WindowNeeds, spot_of
 from optics.numerics.accuracy import AccuracyError
 
 WAVE = 500e-9
@@ -64,7 +64,7 @@ def a_beam(angle=(0.0, 0.0), **pupil):
 def test_the_image_of_a_direction_obeys_snells_law(before):
     angle = 0.4, -0.3
     beam = a_beam(angle, object_n=before, index_before=lambda wavelength: before)
-    x, y = receptive_field._image(beam, 2.0)
+    x, y = visual_kernel._image(beam, 2.0)
     across = np.tan(angle)
     if before is None:
         np.testing.assert_allclose((x, y), 2 * across)
@@ -76,7 +76,7 @@ def test_the_image_of_a_direction_obeys_snells_law(before):
 
 def test_light_that_is_reflected_totally_lands_far_away():
     beam = a_beam((1.2, 0.0), object_n=2.0, index_before=lambda wavelength: 2.0)
-    assert receptive_field._image(beam, 1.0) == (pytest.approx(1000 * 2 / 1.5 * math.sin(1.2)), 0.0)
+    assert visual_kernel._image(beam, 1.0) == (pytest.approx(1000 * 2 / 1.5 * math.sin(1.2)), 0.0)
 
 
 def spot_from(monkeypatch, needs, most=math.inf, retina=None, height=None):
@@ -87,8 +87,8 @@ def spot_from(monkeypatch, needs, most=math.inf, retina=None, height=None):
         asked.append(centre)
         return needs[beam.number]
 
-    monkeypatch.setattr(receptive_field, "_image", lambda beam, distance: (beam.number * distance, -distance))
-    monkeypatch.setattr(receptive_field, "_needs", needed)
+    monkeypatch.setattr(visual_kernel, "_image", lambda beam, distance: (beam.number * distance, -distance))
+    monkeypatch.setattr(visual_kernel, "_needs", needed)
     spot = spot_of(beams, retina or a_retina(), most)
     assert asked == [spot.centre] * len(needs)
     return spot
@@ -132,8 +132,8 @@ def test_the_largest_number_of_cells(monkeypatch):
 def test_areas_that_are_tried_for_steep_reliefs(monkeypatch, failing, samples, steep, cells, tried):
     """The error of the first area is raised if all areas fail."""
     asked = []
-    monkeypatch.setattr(receptive_field, "spot_of", lambda beams, retina, most: most)
-    monkeypatch.setattr(receptive_field, "may_be_steep", lambda beam: steep)
+    monkeypatch.setattr(visual_kernel, "spot_of", lambda beams, retina, most: most)
+    monkeypatch.setattr(visual_kernel, "may_be_steep", lambda beam: steep)
 
     def compute(most):
         asked.append(most)
@@ -142,13 +142,13 @@ def test_areas_that_are_tried_for_steep_reliefs(monkeypatch, failing, samples, s
         return f"result {most}"
 
     if not steep:  # all wavelengths must be steep
-        monkeypatch.setattr(receptive_field, "may_be_steep", lambda beam: beam == 1)
+        monkeypatch.setattr(visual_kernel, "may_be_steep", lambda beam: beam == 1)
     retina = a_retina(samples=samples)
     if failing < 3:
-        assert receptive_field._on_spot(compute, [1, 2], retina) == f"result {tried[-1]}"
+        assert visual_kernel._on_spot(compute, [1, 2], retina) == f"result {tried[-1]}"
     else:
         with pytest.raises(AccuracyError, match=r"^number 1$"):
-            receptive_field._on_spot(compute, [1, 2], retina)
+            visual_kernel._on_spot(compute, [1, 2], retina)
     assert asked == tried
 
 
@@ -157,8 +157,8 @@ def test_areas_that_are_tried_for_steep_reliefs(monkeypatch, failing, samples, s
 def test_needs_of_a_wavelength(monkeypatch, scattered, shadow):
     """Diffraction adds the frequency f to the ray from the outermost point to the axis: z tan(asin(sin θ + λ f))."""
     asked = []
-    monkeypatch.setattr(receptive_field, "_beyond_edge", lambda pupil, fraction: asked.append(fraction) or 2e4)
-    monkeypatch.setattr(receptive_field, "_half_side", lambda *given: asked.append(given) or shadow)
+    monkeypatch.setattr(visual_kernel, "_beyond_edge", lambda pupil, fraction: asked.append(fraction) or 2e4)
+    monkeypatch.setattr(visual_kernel, "_half_side", lambda *given: asked.append(given) or shadow)
     pupil = SimpleNamespace(
         radius=0.25,
         transmission=0.5,
@@ -166,7 +166,7 @@ def test_needs_of_a_wavelength(monkeypatch, scattered, shadow):
         slopes=lambda wavelength, source: SimpleNamespace(steepest_inside=0.25),
     )
     beam = SimpleNamespace(pupil=pupil, wavelength=6e-7, index=1.5, source=None)
-    needs = receptive_field._needs(beam, a_retina(tolerance=0.04), (0.25, -0.5))
+    needs = visual_kernel._needs(beam, a_retina(tolerance=0.04), (0.25, -0.5))
     assert asked[:2] == [(6e-7, 0.01), 0.02]
     _, behind, centre, fraction = asked[2]
     assert (behind, centre) == ((2.0, 1.5), (0.25, -0.5))
@@ -177,14 +177,14 @@ def test_needs_of_a_wavelength(monkeypatch, scattered, shadow):
     assert needs.half_window == pytest.approx(min(half, widest))
     assert needs.half_of_rays == shadow
     assert needs.band == pytest.approx(0.25 / 6e-7 + 2e4 + scattered)
-    samples = receptive_field.samples_per_cycle(0.04)
+    samples = visual_kernel.samples_per_cycle(0.04)
     assert needs.pitch == pytest.approx(1 / (samples * 2 * 0.25 / (4e-7 * 2)))
 
 
 def test_needs_of_diffraction_to_all_sides(monkeypatch):
     """Beyond a sine of 1, the window is the widest. Flat pupils that are close have a spectrum of twice their band."""
-    monkeypatch.setattr(receptive_field, "_beyond_edge", lambda pupil, fraction: 3e6)
-    monkeypatch.setattr(receptive_field, "_half_side", lambda *given: 0.1)
+    monkeypatch.setattr(visual_kernel, "_beyond_edge", lambda pupil, fraction: 3e6)
+    monkeypatch.setattr(visual_kernel, "_half_side", lambda *given: 0.1)
     pupil = SimpleNamespace(
         radius=0.25,
         transmission=1.0,
@@ -192,7 +192,7 @@ def test_needs_of_diffraction_to_all_sides(monkeypatch):
         slopes=lambda wavelength, source: SimpleNamespace(steepest_inside=0.0),
     )
     beam = SimpleNamespace(pupil=pupil, wavelength=6e-7, index=1.0, source=None)
-    needs = receptive_field._needs(beam, a_retina(distance=0.001), (0.0, 0.0))
+    needs = visual_kernel._needs(beam, a_retina(distance=0.001), (0.0, 0.0))
     assert needs.half_window == pytest.approx(math.tan(math.radians(50)) * 0.001 + 0.25)
     assert needs.pitch == pytest.approx(1 / (2.25 * 2 * 3e6))
 
@@ -203,16 +203,16 @@ def test_the_brightness_of_a_mask_along_its_edge():
     aperture = SimpleNamespace(outline=SimpleNamespace(points=lambda: points))
     for mask, transmission, expected in ((1, 0.05, 4.0), (1, 0.5, 1.0), (1, 0.0, 1.0), (None, 0.05, 1.0)):
         pupil = SimpleNamespace(mask=mask, transmission=transmission, aperture=aperture, amplitude=lambda x, y: x)
-        assert receptive_field._rim.__wrapped__(pupil) == pytest.approx(expected)
+        assert visual_kernel._rim.__wrapped__(pupil) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("on_retina", [False, True])
 def test_requests_for_a_spot(on_retina):
-    beam = optics.eye.receptive_field.Beam(optics.Pupil(20e-6), optics.PointSource(), WAVE, 2e-4)
+    beam = optics.eye.visual_kernel.Beam(optics.Pupil(20e-6), optics.PointSource(), WAVE, 2e-4)
     need = _WindowNeeds(1e-4, 1e-6, 1.5e6, 2e-5)
     spot = Spot((3e-5, -4e-5), 1e-4, 1e-6, (need,), on_retina)
     retina = a_retina(distance=2e-4, tolerance=3e-3, dtype="float64", most_seconds=7.0)
-    request = receptive_field._request(beam, spot, need, spot.window(1e-6), retina)
+    request = visual_kernel._request(beam, spot, need, spot.window(1e-6), retina)
     problem = request.problem
     assert (request.beam, request.most_seconds, request.method) == (beam, 7.0, "auto")
     assert (problem.window, problem.tolerance, problem.dtype) == (spot.window(1e-6), 3e-3, "float64")
@@ -223,7 +223,7 @@ def test_requests_for_a_spot(on_retina):
 
 def test_the_psf_of_a_perfect_lens():
     """All power is in one cell; the area of a sample is the square of a cell's width."""
-    found = receptive_field.perfect_psf(a_retina(wavelengths=np.array([4e-7, 6e-7])), 0.25)
+    found = visual_kernel.perfect_psf(a_retina(wavelengths=np.array([4e-7, 6e-7])), 0.25)
     np.testing.assert_array_equal(found.psf, np.full((2, 1, 1), 16.0))
     assert (found.dx, found.sensor_distance, found.pupil.radius) == (0.25, 2.0, 0.25)
     [plan] = found.plans
@@ -236,9 +236,7 @@ def test_directions_across_the_pupil(turned, expected):
 
 
 def test_directions_of_beams():
-    beams = receptive_field.beams_to(
-        optics.Pupil(20e-6), a_retina(wavelengths=np.array([4e-7, 6e-7])), 3.0, (0.5, -2.0)
-    )
+    beams = visual_kernel.beams_to(optics.Pupil(20e-6), a_retina(wavelengths=np.array([4e-7, 6e-7])), 3.0, (0.5, -2.0))
     assert [beam.wavelength for beam in beams] == [4e-7, 6e-7]
     for beam in beams:
         assert (beam.distance, beam.source.distance) == (2.0, 3.0)

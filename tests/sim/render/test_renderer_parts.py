@@ -281,13 +281,16 @@ def test_compound_eyes_have_no_labels():
 @pytest.mark.parametrize("bands", range(1, 10))
 def test_weights_of_samples_are_read_in_fours(monkeypatch, bands):
     given = []
-    for name in ("floats", "whole_numbers", "counted"):
+    for name in ("floats", "one_number", "counted"):
         monkeypatch.setattr(ray_kernel, name, lambda values: given.append(values) or values)
+    monkeypatch.setattr(ray_kernel, "Counts", SimpleNamespace(from_numbers=lambda *numbers: numbers))
     eyes = SimpleNamespace(directions=lambda ways, origins: (ways, origins))
     kernel = RayKernel(SimpleNamespace(light="direct", inputs=None), eyes, 2, 3, None)
     weights = RNG.random((7, bands))
-    found = kernel.inputs(np.zeros((7, 3)), None, SimpleNamespace(origins="origins", weights=weights)).weights
+    inputs = kernel.inputs(np.zeros((7, 3)), None, SimpleNamespace(origins="origins", weights=weights))
+    found = inputs.weights
     assert found.shape == (7, 4 * math.ceil(bands / 4))
     np.testing.assert_array_equal(found[:, :bands], weights)
     assert not found[:, bands:].any()
-    assert [7, 3, 2 * 3 * 7] in [list(one) for one in given if isinstance(one, list)]
+    assert inputs.counts == (7, 3)
+    assert [one for one in given if np.ndim(one) == 0] == [2 * 3 * 7, 2 * 3 * 7]

@@ -15,6 +15,6 @@ striped_walls: test_world.py, test_course.py
 layout: test_world.py
 materials: test_world.py
 agent_model: physics/test_local_contacts.py
-ground_plan: evolve/report/test_player.py, evolve/analysis/test_episode.py
+ground_plan: evolve/report/test_player.py, evolve/episodes/test_episode.py
 state: envs/test_vec_env.py, physics/test_physics.py
 """

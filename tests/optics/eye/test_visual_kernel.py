@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from optics import BSplineRelief, Eye, PointSource, Pupil
-from optics.eye import receptive_field
+from optics.eye import visual_kernel
 from optics.eye.cell_integrals import Tiles, cell_integrals
-from optics.eye.receptive_field import BESIDE, _half_side, spot_of
+from optics.eye.visual_kernel import BESIDE, _half_side, spot_of
 from optics.numerics.grid import Grid
 from optics.point_spread.pictures import pictures
 
@@ -51,8 +51,8 @@ def test_kernels_have_samples_beside_the_square_that_holds_their_light(monkeypat
 
     eye = Eye(Pupil(15e-6, thin_lens_focal_length=250e-6), (3, 3), 45.0)
     assert eye.spectral_bands.wavelengths.size  # this choice computes kernels of its own
-    monkeypatch.setattr(receptive_field, "spot_of", spot)
-    monkeypatch.setattr(receptive_field, "pictures", noted)
+    monkeypatch.setattr(visual_kernel, "spot_of", spot)
+    monkeypatch.setattr(visual_kernel, "pictures", noted)
     eye.kernel(16)
     assert windows
     for window in windows:

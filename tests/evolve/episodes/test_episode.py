@@ -15,16 +15,16 @@ import torch
 
 import evolve
 import sim
-from evolve.analysis import episode_file
-from evolve.analysis.episode_file import load_episode, save_episode
-from evolve.analysis.recorder import Recorder, record
 from evolve.config.run_config import WorldConfig
+from evolve.episodes import episode_file
+from evolve.episodes.episode_file import load_episode, save_episode
+from evolve.episodes.recorder import Recorder, record
 from evolve.learning.animal_task import animal_task
 from evolve.learning.policy import PolicyConfig, build_policy, load_policy, save_policy
 from evolve.report import exr_export, replay
 from evolve.store.directory import RunError
 from sim.envs.prepared_task import PreparedTask
-from tests.evolve.analysis.compared import assert_same
+from tests.evolve.episodes.compared import assert_same
 from tests.evolve.first_form import of_first_form
 from tests.evolve.small_run import PHENOTYPE, small_config
 

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from evolve.analysis.episode import Episode, Pictures
-from evolve.analysis.episode_scene import EpisodeScene
 from evolve.config.checks import check_values
 from evolve.config.formats import task_then
 from evolve.config.run_config import EyeConfig, WorldConfig
+from evolve.episodes.episode import Episode, Pictures
+from evolve.episodes.episode_scene import EpisodeScene
 from evolve.genome.phenotype import Phenotype
 from evolve.genome.plain_values import parsed
 from evolve.store import regular_files

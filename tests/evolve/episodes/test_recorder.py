@@ -9,12 +9,12 @@ import pytest
 from PIL import Image
 
 import sim
-from evolve.analysis.episode import Pictures
-from evolve.analysis.episode_file import load_episode, save_episode
-from evolve.analysis.recorder import Recorder, record
 from evolve.analysis.vision import SCENES, seen_and_perfect, vision
 from evolve.cli.main import main
 from evolve.config.assemble import to_toml
+from evolve.episodes.episode import Pictures
+from evolve.episodes.episode_file import load_episode, save_episode
+from evolve.episodes.recorder import Recorder, record
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.report.exr_export import export_episode
@@ -22,7 +22,7 @@ from evolve.report.picture_sheet import film_of_pictures
 from evolve.store.directory import Run
 from evolve.store.versions import fingerprint, run_id
 from sim.scene.variation import DAYLIGHT, filter_to
-from tests.evolve.analysis.compared import assert_same
+from tests.evolve.episodes.compared import assert_same
 from tests.evolve.learning.test_task_module import small, written
 
 BALL = Path(__file__).parents[3] / "examples" / "find_ball.py"

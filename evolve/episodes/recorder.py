@@ -11,10 +11,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from evolve.analysis.episode import Episode, Pictures
-from evolve.analysis.episode_scene import EpisodeScene
 from evolve.config.checks import ConfigError, quoted
 from evolve.config.run_config import RunConfig
+from evolve.episodes.episode import Episode, Pictures
+from evolve.episodes.episode_scene import EpisodeScene
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
 from evolve.learning.final_figures import UnfitPolicy, require_fit, require_test_set

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import sim
-from evolve.analysis.episode_scene import EpisodeScene
 from evolve.config.run_config import EyeConfig, WorldConfig
 from evolve.config.task_card import card_of
+from evolve.episodes.episode_scene import EpisodeScene
 from evolve.genome.phenotype import Phenotype
 from sim.tasks.command import Command
 from sim.worlds.ground_plan import GroundPlan
