@@ -23,7 +23,8 @@ MOST_EDGES = 4000  # choice: an outline of this many straight edges takes about 
 class Bitmap(ReadOnlyArrays):
     """A shape made of the open pixels of a square image: `union(Bitmap(image))` is the aperture.
 
-    The pixels fill the pupil's square [-R, R]², and their edges are exact. Parts outside the pupil's circle are closed.
+    The pixels fill the square [-1, 1]² in units of R, and their edges are exact. `union` closes all parts outside the
+    pupil's circle.
 
     image: (n, n), (y, x), 1 (or True) for open parts, 0 (or False) for closed ones; rows grow with y.
 

@@ -28,7 +28,7 @@ class Shape(Protocol):
         """Edge of the shape. It may contain further pieces that do not belong to the edge."""
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points that lie within the shape."""
+        """Return a mask of the points (x, y) [R] that lie within the shape; ValueError unless they are real."""
 
 
 @dataclass(frozen=True)
@@ -95,14 +95,14 @@ class Oblong:
 
 @dataclass(frozen=True)
 class Spider:
-    """The vanes that support a telescope's secondary mirror, evenly spaced around the centre.
+    """The vanes that support a telescope's secondary mirror. They run outwards from the centre at equal angles.
 
     vanes: number of vanes, 1 to 64.
     width: full width of each vane in units of R.
-    rotation_deg: angle of the first vane from the x axis.
+    rotation_deg: angle of the first vane from the x axis, counterclockwise.
 
     Raises:
-        ValueError: vanes is outside 1 to 64, or width is outside (0, 1].
+        ValueError: vanes is not a whole number from 1 to 64, width is outside (0, 1], or the angle is not finite.
     """
 
     vanes: int
