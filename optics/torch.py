@@ -67,7 +67,7 @@ def psf(
         numbers: a sequence, or a tensor with one axis. Two rows must have the same length and are used pairwise.
     source_angle: direction (x, y) [rad] in which the light travels: two numbers, or a tensor of two elements.
     pixel_means: True for the mean of the PSF over each square pixel of side dx, as a sensor measures it. False for the
-        PSF at the middle of each pixel.
+        samples of `optics.psf`.
     requires_grad: True to raise a ValueError if no tensor requires a gradient.
     device: device of the result. None: the device of the tensors that require gradients, or the processor.
     view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.

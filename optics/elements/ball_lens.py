@@ -133,7 +133,7 @@ class BallLens:
 
         height: distance [m] of the rays from the axis.
 
-        The result is negative for rays that the lens bends away from the axis, and infinite for straight rays.
+        The result is negative for rays that the lens bends away from the axis.
 
         Raises:
             ValueError: see `turning`.

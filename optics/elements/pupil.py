@@ -215,6 +215,7 @@ class Pupil:
         return self.height is not None and (is_differentiable(step) or step != 0)
 
     def rotationally_symmetric(self, wavelength: float) -> bool:
+        """Return whether the pupil is known to be invariant under rotation, also under all requested derivatives."""
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
         mask_is = self.mask is None or self.mask.rotationally_symmetric

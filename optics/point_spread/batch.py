@@ -63,6 +63,7 @@ class PSFBatch(OnWindow):
 
     @property
     def window(self) -> Grid:
+        """Positions of the samples on the sensor [m]."""
         return self.setup.window
 
     def result(self, eye: int, depth: int = 0) -> PSFResult:
@@ -89,6 +90,7 @@ class PSFBatch(OnWindow):
 
     @cached_property
     def psf(self) -> np.ndarray:
+        """PSFs [1/m²], (eye, depth, wavelength, y, x)."""
         return read_only(np.asarray(self.tensor.numpy()))
 
     @property

@@ -81,6 +81,7 @@ class MTF(ReadOnlyArrays):
 
     @cached_property
     def mtf(self) -> np.ndarray:
+        """Contrasts, (wavelength, fy, fx), without derivatives."""
         return read_only(np.asarray(self.tensor.numpy()))
 
     @cached_property

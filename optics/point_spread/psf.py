@@ -43,9 +43,11 @@ def psf(
         images the source, or 240 µm without such a lens.
     source_distance, source_angle: distance [m] of the source, and direction (x, y) [rad] of its light, see PointSource.
     dx, shape, centre: pitch [m], number of samples (y, x) and position (x, y) [m] of sample n//2 of the window.
-    tolerance: relative L2 error of the intensity over the window.
+    tolerance: relative L2 error of the intensity over the window, 1e-12 to 0.5.
     method: "auto", "exact" (no approximations), or one of planner.METHODS. If an approximation is requested by name, it
         runs regardless of its error. The tolerance then applies only to its sampling, and the plan states the error.
+        The samples of "pinhole", "geometric" and "perfect_lens" are means over squares of side dx. "auto" may choose
+        these methods (`PSFResult.holds_cells`). The samples of all other methods are values at points.
     dtype: "float32" or "float64".
     field: True to return the complex amplitude U/√(pupil area) as well (`PSFResult.field`). Only methods that compute
         it are then compared; it takes no additional time.

@@ -60,6 +60,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
 
     @property
     def window(self) -> Grid:
+        """Positions of the samples on the sensor [m]."""
         return self.waves.window
 
     @property
