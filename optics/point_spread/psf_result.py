@@ -110,7 +110,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def power_error(self) -> np.ndarray:
-        """Predicted error of `power`, (wavelength,).
+        """Predicted error of `power`, (wavelength,). Errors: see `power`.
 
         It includes the error of the PSF and half of the power at the window's rim, because samples define the position
         of the rim only to within a cell.
