@@ -65,10 +65,10 @@ def psf(
     wavelengths: one or several wavelengths [m] in vacuum.
     sensor_distance, source_distance: distances [m] behind and in front of the pupil. Each is a number, or a row of
         numbers: a sequence, or a tensor with one axis. Two rows must have the same length and are used pairwise.
-    source_angle: direction (x, y) [rad] of the source: two numbers, or a tensor of two elements.
+    source_angle: direction (x, y) [rad] in which the light travels: two numbers, or a tensor of two elements.
     pixel_means: True for the mean of the PSF over each square pixel of side dx, as a sensor measures it. False for the
-        PSF at the middle of each pixel.
-    requires_grad: True to raise an error if no tensor requires a gradient.
+        samples of `optics.psf`.
+    requires_grad: True to raise a ValueError if no tensor requires a gradient.
     device: device of the result. None: the device of the tensors that require gradients, or the processor.
     view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.
 
@@ -84,8 +84,8 @@ def psf(
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range. See `optics.psf`.
         AccuracyError: see `optics.psf`.
-        BackendError: RHABDOM_DEVICE requires a GPU that torch cannot use.
-        RuntimeError: second derivatives are requested.
+        BackendError: see `optics.psf`, or RHABDOM_DEVICE requires a GPU that torch cannot use.
+        RuntimeError: `device` is unknown to torch or, in a backward pass, second derivatives are requested.
     """
     former = {name: view.pop(name) for name in FORMER if name in view}
     if former or isinstance(pupil, torch.Tensor):
@@ -181,7 +181,9 @@ def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
-        AccuracyError: see `optics.psf`.
+        AccuracyError: see `optics.camera_image`.
+        BackendError: see `psf`.
+        RuntimeError: see `psf`.
     """
     of_kind("pupil", pupil, Pupil, "optics.Pupil(1e-3)")
     return _operation(lambda own: camera.camera_image(scene, own, sensor, **view), pupil, device)
@@ -200,7 +202,7 @@ def eye_signals(
         ValueError: an argument is invalid; the message names it with its value and valid range.
         AccuracyError: see `optics.Eye.see`.
         BackendError: see `psf`.
-        RuntimeError: second derivatives are requested.
+        RuntimeError: see `psf`.
     """
     of_kind("eye", eye, Eye, "optics.Eye(optics.Pupil(30e-6))")
     seen = radiance, samples_per_receptor, rng
@@ -252,16 +254,17 @@ def _guessed(heights: torch.Tensor, stacklevel: int) -> Relief:
 class PointSpread(torch.nn.Module):
     """Module with a learnable relief: forward() returns the pupil's PSF, (wavelength, y, x).
 
-    radius: radius [m] of the pupil.
-    wavelengths, sensor_distance, dx, shape, ...: arguments of `psf`.
+    radius, n: radius [m] of the pupil, and refractive index of its relief.
+    wavelengths, sensor_distance, dx, shape, ...: arguments of `psf`, which are checked by forward().
     heights: initial relief, a `BSplineRelief`, `HeightMap` or `PixelRelief`. None: a flat `BSplineRelief`. A tensor of
         heights [m] is interpreted as control points if it is 4 x 4, and otherwise as samples of a `HeightMap`.
-    n: refractive index of the relief.
-    unit: length [m] of one unit of the learnt parameter. Choose it such that the parameter is near 1, as optimisers
-        expect.
+    unit: length [m] of one unit of the learnt parameter, not 0. Optimisers work best if the parameter is near 1.
     pupil: further arguments of `optics.Pupil`, as a dictionary.
 
     The only learnt parameter is `relief`, which equals heights / unit.
+
+    Raises:
+        ValueError: heights or wavelengths are invalid. For other arguments, and in forward(), see `psf`.
     """
 
     def __init__(

@@ -98,6 +98,11 @@ def goldfish_lens(radius: float = 1.4e-3) -> BallLens:
     The profile is the generalised Luneburg lens. The surface has the index of water. At the core, the lens' proteins
     add (n_core - n_water)(0.940 + 20,000 nm²/λ²) to the index, the dispersion of serum albumin (Perlmann & Longsworth,
     J. Am. Chem. Soc. 70, 2719, 1948), scaled to 550 nm. The radius of 1.4 mm is a typical value.
+
+    radius: radius [m] of the lens.
+
+    Raises:
+        ValueError: the radius is not positive.
     """
     at, water = 550e-9, medium("water")
     around = float(water.at(at))

@@ -97,6 +97,9 @@ def fruit_fly(rings: int = 15) -> AppositionEye:
     interommatidial angle of 5°.
 
     rings: rings of ommatidia around the central one. 15 rings have 721 ommatidia.
+
+    Raises:
+        ValueError: the number of rings is outside 0 to 60.
     """
     return AppositionEye(Ommatidium(FacetLens(16e-6, 11e-6, -11e-6, 8e-6), _guide(1.9e-6, 80e-6)), rings, 5.0)
 
@@ -110,6 +113,9 @@ def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
 
     rings: rings of ommatidia around the central one.
     rhabdomere: diameter [m] of the rhabdomere's tip. Rhabdomeres of at most 1 µm do not taper.
+
+    Raises:
+        ValueError: the number of rings is outside 0 to 60, or the diameter is not positive.
     """
     tip = positive("rhabdomere", rhabdomere)
     facet = Facet(25e-6, 2.2 * 25e-6, tip, 250e-6, min(1e-6, tip))
@@ -124,6 +130,9 @@ def dragonfly(rings: int = 20) -> AppositionEye:
     or for the rhabdom of 2 µm by 500 µm.
 
     rings: rings of ommatidia around the central one.
+
+    Raises:
+        ValueError: the number of rings is outside 0 to 60.
     """
     return AppositionEye(Facet(62e-6, 3 * 62e-6, 2e-6, 500e-6).ommatidium(), rings, 0.24)
 
@@ -136,6 +145,9 @@ def megalopta(rings: int = 10) -> AppositionEye:
     twice as wide and the rhabdoms four to five times as wide as those of bees that are active by day.
 
     rings: rings of ommatidia around the central one.
+
+    Raises:
+        ValueError: the number of rings is outside 0 to 60.
     """
     return AppositionEye(Facet(36e-6, 97e-6, 8e-6, 350e-6).ommatidium(), rings, 1.4)
 

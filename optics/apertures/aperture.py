@@ -98,7 +98,7 @@ class Aperture(ABC):
     @property
     @abstractmethod
     def rotationally_symmetric(self) -> bool:
-        """True if the aperture is invariant under every rotation about the axis."""
+        """True if the aperture is known to be invariant under every rotation about the axis."""
 
     @property
     def mirror_symmetric(self) -> bool:
@@ -107,7 +107,7 @@ class Aperture(ABC):
 
     @property
     def rings(self) -> tuple[tuple[float, float], ...]:
-        """Inner and outer radii of the open rings of a rotationally symmetric aperture, in units of R."""
+        """Inner and outer radii of the open rings, in units of R. Only valid for rotationally symmetric apertures."""
         return ((0.0, 1.0),)
 
     @property
@@ -122,12 +122,18 @@ class Aperture(ABC):
 
     @abstractmethod
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points that lie within the aperture."""
+        """Return a mask of the points that lie within the aperture. Points on the edge may belong to either side.
+
+        x, y: positions in units of R, in arrays whose shapes broadcast.
+
+        Raises:
+            ValueError: a position is not a real number.
+        """
 
     def nodes(self, cycles: float, digits: float) -> Nodes:
         """Return quadrature nodes for integrands with spatial frequencies up to `cycles` cycles per R.
 
-        Sums over the nodes have an error of at most 10^-digits times the area.
+        For integrands of at most 1, sums over the nodes have an error of at most 10^-digits times the area.
 
         The limit `cycles` applies to the local frequency of the integrand at every point and in every direction.
         Frequencies of a varying amplitude count as well.
@@ -148,7 +154,7 @@ class Aperture(ABC):
         the fewest samples.
 
         Raises:
-            ValueError: passband is negative, ripple is outside [1e-13, 0.5], or widest_reach is not positive.
+            ValueError: passband is outside [0, 1e90], ripple is outside [1e-13, 0.5], or widest_reach is not positive.
         """
         in_range("passband", passband, 0.0, MOST_CYCLES)
         in_range("ripple", ripple, LEAST_RIPPLE, 0.5)

@@ -37,10 +37,12 @@ class Combined(Aperture):
     """Union, difference or intersection of shapes, clipped to the pupil's circle.
 
     rule: "union", "difference" or "intersection".
-    shapes: apertures, or `Disk`, `Oblong` and `Spider`, which may lie anywhere.
+    shapes: apertures, or `Disk`, `Oblong`, `Spider` and `Bitmap`. They may extend beyond the circle. For "difference",
+        all others are subtracted from the first.
 
     Raises:
-        ValueError: the rule is unknown, an argument is not a shape, or the opening is empty.
+        ValueError: the rule is unknown, an argument is not a shape, there are too few shapes, the open area is below
+            1e-9 R², or edges almost coincide.
     """
 
     rule: str
@@ -127,16 +129,17 @@ def hexagonal_segments(
 ) -> Combined:
     """Return a segmented mirror: rings of hexagons around a central hexagon.
 
-    The outermost corners lie on the pupil's rim.
+    The outermost corners, including those of omitted segments, lie on the pupil's rim.
 
+    rings: number of rings, 0 to 12.
     gap: gap between neighbours, in units of the distance between their centres.
-    rotation_deg: rotation of the mirror. At 0 the hexagons have corners in the direction of x.
+    rotation_deg: counterclockwise rotation of the mirror. At 0 the hexagons have corners in the direction of x.
     without: numbers of omitted segments. Segment 0 is the central one. Numbers continue ring by ring, counterclockwise
         from `rotation_deg` + 30 degrees. The mirror of the James Webb telescope has 2 rings without segment 0.
 
     Raises:
-        ValueError: rings is outside 0 to 12, gap is outside [0, 1), a segment in `without` does not exist, or no
-            segment is left.
+        ValueError: rings is outside 0 to 12, gap is outside [0, 0.999], the angle is not finite, a segment in `without`
+            does not exist, or no segment is left.
     """
     rings = whole("rings", rings, 0, MOST_RINGS)
     in_range("gap", gap, 0, 0.999)

@@ -30,8 +30,8 @@ class Polygon(Aperture):
     vertices: (n, 2), x and y in units of R, clockwise or counterclockwise. They are stored counterclockwise.
 
     Raises:
-        ValueError: there are fewer than 3 vertices, one is NaN or outside the unit circle, two coincide, or edges
-            cross.
+        ValueError: vertices are not numbers of shape (n, 2), are fewer than 3, or are not all finite and within the
+            unit circle. An edge is shorter than 1e-9 R, or edges cross or touch.
     """
 
     vertices: np.ndarray
@@ -47,7 +47,7 @@ class Polygon(Aperture):
     def regular(cls, n: int, rotation_deg: float = 0.0) -> Polygon:
         """Return a regular polygon with n sides whose vertices lie on the unit circle.
 
-        rotation_deg: angle of the first vertex from the x axis.
+        rotation_deg: angle of the first vertex from the x axis, counterclockwise.
 
         Raises:
             ValueError: n is not a whole number from 3 to 10,000, or rotation_deg is not finite.
@@ -70,7 +70,10 @@ class Polygon(Aperture):
         return float(x), float(y)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points inside: those from which a ray towards +x crosses an odd number of edges."""
+        """Return a mask of the points inside: those from which a ray towards +x crosses an odd number of edges.
+
+        Arguments and errors: see `Aperture.contains`.
+        """
         x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
         inside = np.zeros(x.shape, dtype=bool)
         for (x0, y0), (x1, y1) in zip(self.vertices, np.roll(self.vertices, -1, axis=0), strict=True):

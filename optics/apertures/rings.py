@@ -30,7 +30,7 @@ class Rings(Aperture):
         open centre.
 
     Raises:
-        ValueError: the radii do not ascend, their number is odd or above 500, or one is outside [0, 1].
+        ValueError: the radii do not ascend, their number is odd, 0 or above 500, or one is not a number in [0, 1].
     """
 
     radii: Any
@@ -50,11 +50,14 @@ class Rings(Aperture):
     ) -> Rings:
         """Return a zone plate: every second Fresnel zone for a focal length and a wavelength. All lengths are in m.
 
-        Light from these zones arrives in phase at a distance of one focal length behind the pupil. Zone n ends at the
-        radius √(nλf + n²λ²/4) (Fresnel). A tenth of the light, 1/π², reaches this focus.
+        Parallel light from these zones arrives in phase at one focal length behind the pupil. Zone n ends at the radius
+        √(nλf + n²λ²/4) (Fresnel). A tenth of the incident light, 1/π², reaches this focus.
+
+        wavelength: wavelength behind the pupil, which is that in vacuum divided by `Pupil.medium_n`.
+        open_centre: True if the central zone is open, False if its neighbour is.
 
         Raises:
-            ValueError: a length is not positive, or the number of zones is outside 2 to 500.
+            ValueError: a length is not positive, open_centre is not a bool, or the number of zones is outside 2 to 500.
         """
         radius = positive("aperture_radius", aperture_radius)
         focal = positive("focal_length", focal_length)

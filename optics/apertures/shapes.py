@@ -28,7 +28,7 @@ class Shape(Protocol):
         """Edge of the shape. It may contain further pieces that do not belong to the edge."""
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points that lie within the shape."""
+        """Return a mask of the points (x, y) [R] that lie within the shape; ValueError unless they are real."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,11 @@ class Disk:
 
     @property
     def outline(self) -> Outline:
+        """See `Shape.outline`."""
         return Outline.circles((float(self.radius),), self.centre)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """See `Shape.contains`. Points on the edge belong to the shape."""
         x, y = reals("x", x), reals("y", y)
         return np.asarray(np.hypot(x - self.centre[0], y - self.centre[1]) <= self.radius)
 
@@ -82,12 +84,14 @@ class Oblong:
 
     @property
     def outline(self) -> Outline:
+        """See `Shape.outline`."""
         x, y = self.width / 2, self.height / 2
         turn = np.exp(1j * np.deg2rad(self.rotation_deg))
         corners = turn * np.array([-x - 1j * y, x - 1j * y, x + 1j * y, -x + 1j * y])
         return Outline.polygon(np.column_stack([corners.real, corners.imag]) + self.centre)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """See `Shape.contains`. Points on the edge belong to the shape."""
         x, y = reals("x", x), reals("y", y)
         place = (x - self.centre[0] + 1j * (y - self.centre[1])) * np.exp(-1j * np.deg2rad(self.rotation_deg))
         return np.asarray((np.abs(place.real) <= self.width / 2) & (np.abs(place.imag) <= self.height / 2))
@@ -95,14 +99,14 @@ class Oblong:
 
 @dataclass(frozen=True)
 class Spider:
-    """The vanes that support a telescope's secondary mirror, evenly spaced around the centre.
+    """The vanes that support a telescope's secondary mirror. They run outwards from the centre at equal angles.
 
     vanes: number of vanes, 1 to 64.
     width: full width of each vane in units of R.
-    rotation_deg: angle of the first vane from the x axis.
+    rotation_deg: angle of the first vane from the x axis, counterclockwise.
 
     Raises:
-        ValueError: vanes is outside 1 to 64, or width is outside (0, 1].
+        ValueError: vanes is not a whole number from 1 to 64, width is outside (0, 1], or the angle is not finite.
     """
 
     vanes: int
@@ -117,6 +121,7 @@ class Spider:
 
     @property
     def rectangles(self) -> list[Oblong]:
+        """The vanes, from the centre to 1.5 R."""
         angles = self.rotation_deg + 360 / self.vanes * np.arange(self.vanes)
         middles = BEYOND / 2 * np.exp(1j * np.deg2rad(angles))
         return [
@@ -126,9 +131,11 @@ class Spider:
 
     @property
     def outline(self) -> Outline:
+        """See `Shape.outline`."""
         return Outline.joined([rectangle.outline for rectangle in self.rectangles])
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """See `Shape.contains`. Points on the edge belong to the shape."""
         return np.any([rectangle.contains(x, y) for rectangle in self.rectangles], axis=0)
 
 

@@ -75,7 +75,7 @@ class BallLens:
         lenses of fish (Matthiessen, Pflügers Archiv 27, 510, 1882).
 
         Raises:
-            ValueError: focal_ratio is outside [1, 20].
+            ValueError: focal_ratio is outside [1, 20], or another argument is outside its valid range.
         """
         relative = generalized_luneburg(focal_ratio)
         core, medium = float(relative(np.zeros(1))[0]), float(index_of("medium_n", medium_n).at(MIDDLE))
@@ -86,12 +86,19 @@ class BallLens:
         """Return Maxwell's fish-eye, n = 2 n_medium/(1 + (r/R)²).
 
         It images each point of its surface on the opposite point.
+
+        Raises:
+            ValueError: an argument is outside its valid range, which the message states.
         """
         medium = float(index_of("medium_n", medium_n).at(MIDDLE))
         return cls(radius, 2 * medium, medium, medium, lambda u: (1 - u * u) / (1 + u * u))
 
     def index(self, r: Any, wavelength: float = MIDDLE) -> np.ndarray:
-        """Return the refractive index at distances r [m] from the centre, an array of any shape."""
+        """Return the refractive index at distances r [m] from the centre, an array of any shape.
+
+        Raises:
+            ValueError: a distance is above the radius or NaN, or the wavelength is invalid.
+        """
         u = reals("r", r) / self.radius
         in_range("r", float(u.max(initial=0.0)) * self.radius, 0.0, self.radius)
         core, surface, _ = self._indices(wavelength)
@@ -103,7 +110,8 @@ class BallLens:
         height: distance [m] at which the ray would pass the centre without the lens, below R and above 0.
 
         Raises:
-            ValueError: a height is outside the lens.
+            ValueError: a height is not between 0 and R, both excluded, the wavelength is invalid, or a ray is totally
+                reflected at the surface.
         """
         return _profile(self, wavelength).turning(self._relative(height))
 
@@ -113,6 +121,9 @@ class BallLens:
         ψ is the angle of `turning`.
 
         height: distance h [m] of parallel rays from the axis.
+
+        Raises:
+            ValueError: see `turning`.
         """
         h = self._relative(height)
         return _profile(self, wavelength).turning(h) + 2 * np.arcsin(h) - math.pi
@@ -120,7 +131,12 @@ class BallLens:
     def focus(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
         """Return the distance [m] behind the centre at which rays that arrive parallel to the axis cross the axis.
 
-        height: distance [m] of the rays from the axis. See `deviation`.
+        height: distance [m] of the rays from the axis.
+
+        The result is negative for rays that the lens bends away from the axis.
+
+        Raises:
+            ValueError: see `turning`.
         """
         return np.asarray(reals("height", height) / np.sin(self.deviation(height, wavelength)))
 
@@ -145,10 +161,11 @@ class BallLens:
         lens.
 
         aperture_radius: largest distance [m] of parallel rays from the axis, below R.
-        wavelength: vacuum wavelength [m]. The focal length of the pupil is that for this wavelength.
+        wavelength: vacuum wavelength [m]. The focal length and `medium_n` of the pupil are those for this wavelength.
 
         Raises:
-            ValueError: the aperture is as large as the lens, or the sine of a ray's angle behind the lens exceeds 0.95.
+            ValueError: the aperture is as large as the lens, the lens does not focus, or the sine of a ray's angle
+                behind the lens exceeds 0.95.
         """
         focal, widest = self.focal_length(wavelength), float(self._relative(aperture_radius))
         at, weights = gauss_legendre(RINGS)

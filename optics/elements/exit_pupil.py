@@ -36,7 +36,8 @@ class ExitPupil:
         `distance` has the axes of the image plane, and its origin is the centre of the sphere.
     distance: radius [m] of the reference sphere, whose centre is the image position in the other program.
     residual: root mean square [m] of the difference between wavefront and fit.
-    position: centre (x, y) [m] of the sphere on the image plane; None if the object does not contain it (prysm).
+    position: centre (x, y) [m] of the sphere, in coordinates along the image plane from the origin of the object's
+        coordinates; None if the object does not contain it (prysm).
     sines: components (x, y) along the image plane of the direction of the light at the pupil's centre. (0, 0):
         perpendicular to the image plane.
     wave: the samples from the other program.
@@ -100,8 +101,8 @@ class ExitPupil:
             wavelengths with a common origin include lateral colour. None: the ray through the pupil's centre.
 
         Raises:
-            ValueError: an argument is not finite, the shift is longer than half the distance to the pupil, or the
-                position of the image is unknown.
+            ValueError: an argument is not finite, the shift is longer than half the distance to the pupil, or an origin
+                is given although the position of the image is unknown.
         """
         in_range("shift", shift, -self.distance / 2, self.distance / 2)
         index = number(index_of("medium_n", self.pupil.medium_n).at(self.wave.wavelength))

@@ -54,7 +54,7 @@ class ExitPupils(ReadOnlyArrays):
         shift: distance [m] by which the image plane is moved along the light.
 
         Raises:
-            ValueError: there is no such field, or the shift is not finite.
+            ValueError: there is no such field, or the shift is longer than half the distance to a pupil.
         """
         row = self.pupils[whole("field", field, 0, len(self.fields) - 1)]
         origin = row[len(row) // 2].moved(shift).position
@@ -71,8 +71,8 @@ def read_exit_pupils(
     medium_n, order, image_normal: see `read_exit_pupil`.
 
     Raises:
-        ValueError: the mapping is incomplete, an object does not contain the position of its image, or the images do
-            not lie on one plane with this normal. See also `read_exit_pupil`.
+        ValueError: the mapping is incomplete, the tilt was removed, an object does not contain the position of its
+            image, or the images do not lie on one plane with this normal. See also `read_exit_pupil`.
     """
     held = getattr(system, "data", system)
     if not isinstance(held, Mapping) or not held or not all(isinstance(k, tuple) and len(k) == 2 for k in held):

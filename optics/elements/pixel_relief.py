@@ -20,15 +20,16 @@ REPETITIONS = 32  # choice: repetitions of the pixels' spectrum to include; at m
 
 @dataclass(frozen=True, eq=False)
 class PixelRelief(Relief):
-    """Heights [m] of n x n square pixels that fill the square [-a, a]²: a stepped diffractive optical element.
+    """Heights [m] of n x n square pixels that fill the pupil's square: a stepped diffractive optical element.
 
     samples: heights [m], (n, n), (y, x). To wrap a smooth height h to one wave and quantise it to N levels, use
-        `np.round(h / step) % N * step`. In glass of index n, step = wavelength / (n - 1) / N.
+        `np.round(h / step) % N * step`. For glass of index n in air, step = wavelength / (n - 1) / N.
 
     A Dr.Jit or PyTorch tensor may carry derivatives. For smooth surfaces use `HeightMap`, which interpolates.
 
     Raises:
-        ValueError: the array is not square, is empty, or contains a number that is not finite.
+        ValueError: the array is not square, is empty, is of half precision, or contains anything other than finite real
+            numbers.
     """
 
     samples: np.ndarray | Array

@@ -44,7 +44,8 @@ class Pupil:
     medium_n: refractive index behind the pupil, constant or dispersive (`optics.medium`).
     object_n: refractive index in front of the pupil and around the relief. None: equal to medium_n.
     thin_lens_focal_length: focal length f [m] of an additional ideal lens, exp(-ik medium_n (√(r² + f²) - f)). It
-        focuses parallel light of every wavelength at the distance f behind it. If f is negative, the lens diverges.
+        focuses parallel light of every wavelength at the distance f behind it. If f is negative, the factor is the
+        complex conjugate of that for |f|, and the lens diverges.
     aperture: A, which is 1 in the opening and 0 elsewhere. Circle (default), Annulus, Rings, Polygon, Slit, or a
         `union`, `difference` or `intersection` of shapes.
     wavefront: W [m in vacuum], the same at every wavelength. Zernike or WavefrontMap, over at least the pupil's circle.
@@ -160,10 +161,12 @@ class Pupil:
         """Return the default distance [m] of the sensor behind the pupil, without derivatives.
 
         Without a lens it is 240 µm. With a lens it is the image distance z for a source at a distance s, 1/z = 1/f -
-        n₀/(n s) at 550 nm.
+        n₀/(n s). The indices n₀ in front of the pupil and n behind it are those at 550 nm.
+
+        source_distance: s [m]; infinity for parallel light.
 
         Raises:
-            ValueError: the lens forms no real image, or the distance is invalid.
+            ValueError: the lens forms no real image, or the distance is not positive or carries a derivative.
         """
         positive("source_distance", source_distance, infinite=True)
         if self.thin_lens_focal_length is None:
@@ -178,11 +181,11 @@ class Pupil:
         return 1 / power
 
     def index_behind(self, wavelength: float) -> float:
-        """Return the refractive index between pupil and sensor at a vacuum wavelength [m]."""
+        """Return the index between pupil and sensor at a vacuum wavelength [m]; ValueError as in `Dispersion.at`."""
         return self._index("medium_n", wavelength)
 
     def index_before(self, wavelength: float) -> float:
-        """Return the refractive index between source and pupil at a vacuum wavelength [m]."""
+        """Return the index between source and pupil at a vacuum wavelength [m]; ValueError as in `Dispersion.at`."""
         if self.object_n is None:
             return self.index_behind(wavelength)
         return self._index("object_n", wavelength)
@@ -212,6 +215,7 @@ class Pupil:
         return self.height is not None and (is_differentiable(step) or step != 0)
 
     def rotationally_symmetric(self, wavelength: float) -> bool:
+        """Return whether the pupil is known to be invariant under rotation, also under all requested derivatives."""
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
         mask_is = self.mask is None or self.mask.rotationally_symmetric
@@ -225,7 +229,10 @@ class Pupil:
         return self.aperture.mirror_symmetric and relief_is and wavefront_is and mask_is
 
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource) -> Array:
-        """Return the optical path [m] from the source through points (x, y) [m], arrays as in `Relief.height`."""
+        """Return the optical path [m] from the source through points (x, y) [m], arrays as in `Relief.height`.
+
+        It is relative to the path through the centre without relief and wavefront.
+        """
         total = source.path(x, y) * like(x, self.index_before(wavelength))
         if (shorter := lens_path(self, x, y)) is not None:
             total = total - shorter * like(x, self.index_behind(wavelength))
@@ -234,7 +241,7 @@ class Pupil:
         return total if (ahead := wavefront_ahead(self, x, y)) is None else total - ahead
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
-        """Return the gradient of the path over the disk and its soft edge. A relief's square pixels have no slope."""
+        """Return the gradient of the path over the disk and its soft edge. Square pixels of a relief count as flat."""
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)

@@ -26,7 +26,7 @@ class Dispersion(ABC):
         """Return n at a vacuum wavelength [m]. It carries derivatives if the coefficients do.
 
         Raises:
-            ValueError: n is outside [1, 10] at this wavelength.
+            ValueError: the wavelength is invalid, or n is outside [1, 10] there.
         """
         n = self._n(vacuum_wavelength(wavelength))
         value = number(n)
@@ -57,6 +57,11 @@ class RefractiveIndex(Dispersion):
 
     a: A, at least 1 (vacuum).
     b, c, d: B [m²], C [m⁴] and D [m⁶]; 0 for a material without dispersion.
+
+    a and b may carry derivatives.
+
+    Raises:
+        ValueError: a is outside [1, 10], or b, c or d is not finite.
     """
 
     a: Scalar
@@ -72,7 +77,11 @@ class RefractiveIndex(Dispersion):
 
     @classmethod
     def from_abbe(cls, n_d: float, abbe_number: float) -> RefractiveIndex:
-        """Return the Cauchy curve with index n_d at 587.562 nm and the given Abbe number (infinite: no dispersion)."""
+        """Return the Cauchy curve with index n_d at 587.562 nm and the given Abbe number (infinite: no dispersion).
+
+        Raises:
+            ValueError: n_d or A of the curve is outside [1, 10], or the Abbe number is not positive.
+        """
         in_range("n_d", n_d, 1.0, 10.0, carried=True)
         number = positive("abbe_number", abbe_number, "1", infinite=True)
         b = (n_d - 1) / number / (LINE_F**-2 - LINE_C**-2)
@@ -93,11 +102,12 @@ class RefractiveIndex(Dispersion):
 class Sellmeier(Dispersion):
     """n²(λ) = 1 + Σ B λ²/(λ² - C), λ in vacuum.
 
-    strengths: B.
+    strengths: B, a tuple or a list.
     poles_um2: C [µm²], one for each of the strengths.
 
     Raises:
-        ValueError: there are no terms, the numbers of strengths and poles differ, or a number is not finite.
+        ValueError: an argument is neither a tuple nor a list, there are no terms, the numbers of strengths and poles
+            differ, or a number is not finite.
     """
 
     strengths: tuple[float, ...]
@@ -122,7 +132,11 @@ class Sellmeier(Dispersion):
 
 @dataclass(frozen=True)
 class Cornu(Dispersion):
-    """n(λ) = a + b/(λ - c), λ in vacuum; b and c in µm."""
+    """n(λ) = a + b/(λ - c), λ in vacuum; b and c in µm. Only wavelengths above c are valid.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
 
     a: float
     b_um: float
@@ -161,6 +175,8 @@ def medium(name: str) -> Dispersion:
     """Return the dispersion of a medium of eyes.
 
     name: "water", "cornea", "aqueous", "vitreous", or "chromatic_eye", the single medium of Thibos' reduced human eye.
+        The curve of water was measured from 182 to 1129 nm. Those of cornea, aqueous and vitreous hold from 400 to 900
+        nm. Beyond these ranges they are extrapolated.
 
     Raises:
         ValueError: the medium is unknown.

@@ -80,14 +80,14 @@ class Relief(ABC):
 class BSplineRelief(Relief):
     """One uniform bicubic B-spline patch, h(x, y) = Σ_ij c[i, j] B_i(v) B_j(u), u = (x/a + 1)/2, v = (y/a + 1)/2.
 
-    control_points: c, (4, 4) heights [m], (y, x); the knots are -3 ... 4. The patch can represent every bicubic
-    polynomial, so paraboloids are exact (`paraboloid`). Outside the square the polynomial continues. Source: Piegl &
-    Tiller, The NURBS Book, ch. 2.
+    control_points: c, (4, 4) heights [m], (y, x); the knots are -3 ... 4. a is the pupil's radius. The patch can
+    represent every bicubic polynomial, so paraboloids are exact (`paraboloid`). Outside the square the polynomial
+    continues. Source: Piegl & Tiller, The NURBS Book, ch. 2.
 
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: control_points are not 4 x 4 finite numbers.
+        ValueError: control_points are not 4 x 4 finite real numbers, or are of half precision.
     """
 
     scatters = False  # the slopes of a polynomial describe all its content
@@ -110,7 +110,7 @@ class BSplineRelief(Relief):
     def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
         """Return h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
 
-        With curvature = medium_n / ((n - medium_n) f), it is the paraxial lens exp(-ikr²/2f), times a constant phase.
+        With curvature = medium_n / ((n - object_n) f), it is the paraxial lens exp(-ik medium_n r²/2f).
 
         On uniform knots the polar form of x² has the control values X_i² - δ²/3, with the Greville abscissae X_i = (2i
         - 3) a and the knot spacing δ = 2a.
@@ -160,14 +160,14 @@ class BSplineRelief(Relief):
 
 @dataclass(frozen=True, eq=False)
 class HeightMap(Relief):
-    """Heights [m] sampled at cell centres over the square [-a, a]², joined by cubic splines (not-a-knot ends).
+    """Heights [m] sampled at cell centres over the pupil's square, joined by cubic splines (not-a-knot ends).
 
     samples: (rows, columns), (y, x). Beyond the outermost centres the spline continues for one cell, then linearly.
 
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: the array is not two-dimensional, is empty, or contains a number that is not finite.
+        ValueError: the array is not two-dimensional, empty, of half precision, or not all finite real numbers.
     """
 
     samples: np.ndarray | Array

@@ -18,11 +18,15 @@ STEEPEST = 1.5  # choice [rad]: largest angle of the light to the axis
 class PointSource:
     """A point source. Its wave on the pupil is exp(ik(ρ(x, y) - ρ(0, 0))), with ρ the distance from the source.
 
-    distance: distance [m] in front of the pupil, along the axis. An infinite distance gives a plane wave.
-    angle: (θx, θy) [rad], the direction in which the light travels. A thin lens focuses it near f (tan θx, tan θy),
-    with the off-axis aberrations of a single stigmatic lens.
+    distance: distance [m] in front of the pupil, along the axis. An infinite distance gives a plane wave, and ρ is then
+        the path along its direction.
+    angle: (θx, θy) [rad], the direction in which the light travels at the pupil's centre. A thin lens focuses it near
+        f (tan θx, tan θy), with the off-axis aberrations of a single stigmatic lens.
 
     These numbers may carry derivatives.
+
+    Raises:
+        ValueError: the distance is not positive, or an angle is outside [-1.5, 1.5].
     """
 
     distance: Scalar = math.inf

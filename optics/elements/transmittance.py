@@ -110,8 +110,8 @@ class MaskMap(Mask):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: the samples are not two-dimensional, are empty or are not finite, or one is outside [-1, 1].
-            The spline can exceed this range at jumps of the samples.
+        ValueError: the samples are not two-dimensional, are empty or of half precision, or one is not a real number in
+            [-1, 1]. The reach is not positive, or the spline exceeds [-1, 1] by more than 0.02, as it may at jumps.
     """
 
     samples: np.ndarray | Array

@@ -92,7 +92,8 @@ class Zernike(Aberration):
     A Dr.Jit or PyTorch vector, or a dictionary of such numbers, may carry derivatives.
 
     Raises:
-        ValueError: a mode is unknown, its order is above 30, or a coefficient is not finite.
+        ValueError: a mode is unknown, its order is above 30, a coefficient is not a finite number, a vector does not
+            have 1 to 496 entries, or the radius is not positive.
     """
 
     # A mode has n/2 cycles; its slopes, which grow with n² at the rim, cover higher frequencies.
@@ -121,6 +122,7 @@ class Zernike(Aberration):
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
 
         Noll's polynomials have the normalisation of OSA, a variance of 1. They are used in astronomy and by poppy.
+        A row that is a Dr.Jit array is not accepted.
 
         Raises:
             ValueError: a number is outside 1 to 496, or a coefficient is invalid, see `Zernike`.
@@ -134,7 +136,8 @@ class Zernike(Aberration):
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
 
         Fringe polynomials are 1 at the rim, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ. Their coefficients are therefore
-        divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use them.
+        divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use them. A row that is a
+        Dr.Jit array is not accepted.
 
         Raises:
             ValueError: a number is outside 1 to 36, or a coefficient is invalid, see `Zernike`.
@@ -152,7 +155,11 @@ class Zernike(Aberration):
         return total
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """Return W [m] at positions in units of the radius, as a NumPy array. The polynomials continue beyond 1."""
+        """Return W [m] at positions in units of the radius, as a NumPy array. The polynomials continue beyond 1.
+
+        Raises:
+            ValueError: a position is not a real number, or the shapes of x and y do not broadcast.
+        """
         x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
         total = np.zeros(x.shape)
         for (n, m), value in self.modes.items():
@@ -219,7 +226,8 @@ class WavefrontMap(Aberration):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: the array is not two-dimensional, is empty, or contains a number that is not finite.
+        ValueError: the array is not two-dimensional, is empty, is of half precision, or contains anything other than
+            finite real numbers, or the radius is not positive.
     """
 
     samples: np.ndarray | Array

@@ -30,7 +30,7 @@ def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
     limited by photon noise have larger values.
 
     diameter: diameter D [m] of a facet.
-    interommatidial_deg: interommatidial angle Δφ.
+    interommatidial_deg: interommatidial angle Δφ [degrees].
 
     Raises:
         ValueError: an argument is not positive, or an angle is above 180°.
@@ -46,6 +46,7 @@ def least_eye_parameter(wavelength: float, lattice: str = "hexagon") -> float:
     gratings.
 
     wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
+    lattice: "hexagon" or "square".
 
     Raises:
         ValueError: the wavelength is invalid, or the lattice is unknown.
@@ -57,7 +58,7 @@ def least_eye_parameter(wavelength: float, lattice: str = "hexagon") -> float:
 def sampling_acuity(spacing_deg: float, lattice: str = "hexagon") -> float:
     """Return the finest grating [cycles/degree] that a lattice of receptors resolves: 1/(√3 Δφ), or 1/(2 Δφ).
 
-    spacing_deg: angle Δφ between neighbouring receptors or ommatidia.
+    spacing_deg: angle Δφ [degrees] between neighbouring receptors or ommatidia.
     lattice: "hexagon" or "square".
 
     Raises:
@@ -98,7 +99,7 @@ def ideal_contrast_sensitivity(
     grating, which has many periods. The sensitivity is 1/c. Source: Geisler (J. Opt. Soc. Am. A 1, 775, 1984), used by
     Banks, Geisler & Bennett (Vision Research 27, 1915, 1987).
 
-    cycles_per_degree: frequencies of the gratings.
+    cycles_per_degree: frequencies of the gratings, an array of any shape. The result has the same shape.
     contrast: contrast T that optics and receptors transfer at these frequencies, in [0, 1], of the same shape. For
         example `mean_human_mtf(cycles_per_degree, 2e-3)`.
     photons: number N of photons that the receptors absorb from one square degree during the presentation.

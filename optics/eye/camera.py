@@ -96,18 +96,19 @@ def camera_image(
     depth: distance [m] of the scene along the axis: a number, or a map with one distance per cell (Y, X).
     samples_per_pixel: cells of the scene per pixel along each axis. Defocused edges need more than one.
     field_zones: number of PSFs across the width of the field, or "auto", see `Eye.sight`. 1 uses the PSF on the axis.
-    rng: random generator of the noise. None: no noise; the result contains mean numbers of electrons.
+    rng: random generator of the noise. None: no noise; the result belongs to mean numbers of electrons.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         focuses an infinitely distant point.
     tolerance: relative error of the PSF, see `Eye`.
 
-    Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons. There is one channel with a mosaic, and
-    otherwise one for each type. If the pupil carries derivatives, the result is a Dr.Jit tensor of electrons. For
-    PyTorch, see `optics.torch.camera_image`.
+    Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons as float32. There is one channel with a
+    mosaic, and otherwise one for each type. If the pupil carries derivatives, the result is a Dr.Jit tensor of
+    electrons. For PyTorch, see `optics.torch.camera_image`.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
         AccuracyError: see `optics.psf`.
+        BackendError: see `optics.psf`.
     """
     if rng is not None:
         of_kind("rng", rng, np.random.Generator, "np.random.default_rng(0), or None for no noise")
@@ -129,6 +130,10 @@ def camera_eye(
     """Return the eye that a pupil and a sensor form: its receptors are the pixels, and it has no receptor noise.
 
     Its kernels, PSFs and spectral bands are those of the camera. Arguments as in `camera_image`.
+
+    Raises:
+        ValueError: an argument is invalid, sensor_distance carries a derivative, or the lens forms no real image of
+            parallel light.
     """
     of_kind("lens", lens, Pupil, "Pupil(1e-3, thin_lens_focal_length=5e-3), or an Eye")
     of_kind("sensor", sensor, Sensor, "Sensor((480, 640), 3e-6)")

@@ -39,9 +39,8 @@ class Eye(EyeSpec):
     """An eye: a pupil, a retina of receptors, and noise.
 
     Pupil and retina have the axes of the OSA and of ANSI Z80.28, as seen by an observer in front of the eye: x to the
-    right, which is the owner's left, and y up. The image is inverted. Rows that ascend with y and columns that ascend
-    with x are therefore in the order of the visual field. Row 0 sees the top, and column 0 sees the left. All arrays
-    have this order.
+    right, which is the owner's left, and y up. The image is inverted, so rows that ascend with y and columns that
+    ascend with x are in the order of the visual field: row 0 sees the top and column 0 the left, in all arrays.
 
     pupil: a Pupil. None is a perfect lens without blur and with a throughput of 1.
     resolution: number of receptors (height, width). Receptors are square with the side sensor_width / width, unless
@@ -84,7 +83,7 @@ class Eye(EyeSpec):
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
-        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance.
+        AccuracyError: rays are too steep for accurate signals of microvilli; with bands="auto", see also `psf`.
     """
 
     @property
@@ -108,6 +107,7 @@ class Eye(EyeSpec):
         perfect lens is one sample with all power.
 
         Raises:
+            ValueError: z is not positive.
             AccuracyError: see `optics.psf`.
         """
         positive("z", z, infinite=True, carried=True)
@@ -122,9 +122,9 @@ class Eye(EyeSpec):
 
         It is the PSF, integrated over cells. A receptor consists of samples_per_receptor² cells of its own shape.
 
-        z: distance of the scene along the axis [m].
+        z: distance [m] of the scene along the axis, positive or infinite.
         direction_deg: direction (right, up) of the light from the axis (None: the patch's eccentricity). The centre
-            cell is its geometric image.
+            cell is its geometric image. Angles are -80 to 80.
 
         The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
         enough to lose less than the tolerance (limits: see `visual_kernel`). Light of a steep relief may count as
@@ -135,9 +135,8 @@ class Eye(EyeSpec):
         cell instead (see `light_from` of `sight`).
 
         With waveguides, the kernel is the fraction of each scene cell's light that a receptor accepts, averaged over
-        the cell. The cells lie around the receptor's direction. Signals are then not averaged over the receptor. ky and
-        kx are even if samples_per_receptor is even. The sum of the kernel is relative to a square that absorbs all
-        light.
+        the cell. The cells lie around the receptor's direction. Signals are not averaged over the receptor. ky and kx
+        are even if samples_per_receptor is even. The kernel's sum is relative to a square that absorbs all light.
 
         Raises:
             AccuracyError: see `optics.psf`.
@@ -157,7 +156,7 @@ class Eye(EyeSpec):
         return Retina(self.retina_distance, wavelengths, cell, self.tolerance, *settings)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the fewest bands that keep a receptor's predicted error within the tolerance."""
+        """Return the fewest bands that keep a receptor's predicted error within the tolerance; errors as in `psf`."""
         retina = self._retina_of(np.empty(0), self.smallest_receptor, CELLS_FOR_BANDS)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
 
@@ -225,7 +224,7 @@ class Eye(EyeSpec):
 
         radiance: radiance (band, Y, X) of the scene's cells. A receptor consists of s x s cells of its own shape, with
             s = samples_per_receptor. Radiance is constant within each cell (for the alternative, see `light_from` of
-            `Eye.sight`). The scene is centred on the axis and dark outside. It has at least h s x w s cells. A larger
+            `Eye.sight`). The scene is centred on the field, and dark outside. It has at least h s x w s cells. A larger
             scene must exceed this height and this width by even numbers.
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or a map with one per cell (Y, X). In a map, near surfaces
@@ -242,7 +241,7 @@ class Eye(EyeSpec):
 
         Raises:
             ValueError: radiance has another shape or is not finite; z has another shape, is not positive or holds NaN;
-                or the light is polarised and receptors have no microvilli.
+                sight is for another eye; or the light is polarised and receptors have no microvilli.
             AccuracyError: see `optics.psf`, or z has so wide a range that the tolerance requires too many kernels.
         """
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
@@ -293,7 +292,8 @@ class Eye(EyeSpec):
             the field.
 
         Raises:
-            ValueError: the direction is outside the field.
+            ValueError: the direction is outside the field, or z is not positive.
+            AccuracyError: see `optics.psf`.
         """
         own = self if self.lattice is None and direction_deg is None else receptor_in(self, direction_deg)
         found = describe(own, number(own.white_signal), own.psf(z), partial(own.kernel, z=z))

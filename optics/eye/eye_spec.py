@@ -43,7 +43,8 @@ class EyeSpec:
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
-        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance.
+        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance. In
+            an Eye with bands="auto", see also `optics.psf`.
     """
 
     pupil: Pupil | None = None
@@ -260,6 +261,11 @@ class EyeSpec:
 
         Every receptor type then has the correct quantum catch, if there are at least as many bands as types. The value
         of a band may be negative; see `SpectralBands.band_values`.
+
+        radiance: a Spectrum, or a function of wavelengths [m].
+
+        Raises:
+            ValueError: the radiance is something else, or is not finite.
         """
         return self.spectral_bands.band_values(radiance, self.receptors)
 

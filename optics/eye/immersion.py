@@ -27,7 +27,7 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
     medium: the medium in front of the pupil; None: air
 
     Raises:
-        ValueError: an argument has the wrong type.
+        ValueError: an argument has the wrong type, or the new field of view is outside [1e-3, 170] degrees.
     """
     of_kind("eye", eye, EyeSpec, "optics.Eye()")
     if medium is not None:

@@ -34,7 +34,7 @@ class Fovea:
     out.
 
     e2_deg: angle E₂ [degrees] at which acuity is half of that at the fovea, 1e-3 to 1e3.
-    center_deg: angles (right, up) [degrees] of the fovea from the eye's axis.
+    center_deg: angles (right, up) [degrees] of the fovea from the eye's axis, -80 to 80.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -48,7 +48,7 @@ class Fovea:
         object.__setattr__(self, "center_deg", direction("Fovea: center_deg", self.center_deg))
 
     def __call__(self, right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
-        """Return the density per area of the flat retina, for angles [degrees] from the axis."""
+        """Return the relative density per area of the flat retina, for angles [degrees] from the axis."""
         right, up = self.center_deg
         return _per_length(right_deg, right, self.e2_deg) * _per_length(up_deg, up, self.e2_deg)
 
@@ -74,7 +74,7 @@ class VisualStreak:
         in_range("VisualStreak: elevation_deg", self.elevation_deg, -WIDEST_DEG, WIDEST_DEG)
 
     def __call__(self, right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
-        """Return the density per area of the flat retina, for angles [degrees] from the axis."""
+        """Return the relative density per area of the flat retina, for angles [degrees] from the axis."""
         return _per_length(right_deg, 0.0, np.inf) * _per_length(up_deg, self.elevation_deg, self.e2_deg)
 
 

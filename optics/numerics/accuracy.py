@@ -46,9 +46,9 @@ class AccuracyError(ValueError):
 
 @dataclass(frozen=True)
 class Option:
-    """One of the compared methods, with its samples, predicted error, predicted time and verdict.
+    """One of the compared methods, with its samples, predicted error, predicted time [s] and verdict.
 
-    The verdict is "chosen" or the reason why the method was rejected.
+    The verdict is "chosen" or the reason why the method was rejected. Samples and error are as in `Plan`.
     """
 
     method: str
@@ -69,7 +69,8 @@ class Plan:
         ray and adds to `predicted_error`. All methods of `optics.psf` have this error; only `optics.vector_focus`
         avoids it. The bound is valid for windows that contain the brightest point of the light, but not for windows
         that are dark everywhere.
-    seconds: predicted time of a call with compiled kernels on two cores; 0 without a prediction.
+    why: reason for the choice, in words.
+    seconds: predicted time [s] of a call with compiled kernels on two cores; 0 without a prediction.
     options: all methods that were compared.
     derivative_error: upper bound of the relative L2 error of derivatives, for a random functional of the PSF. None: the
         PSF carries no derivatives, or an approximation predicts no error of them.

@@ -53,6 +53,8 @@ LIBRARY_PATTERNS = (
 class BackendError(RuntimeError):
     """Dr.Jit cannot compute: no usable LLVM library, no GPU, or an array on a device that is not selected.
 
+    An invalid value of RHABDOM_DEVICE also raises it.
+
     The message is one line with the remedy.
     """
 
@@ -198,7 +200,7 @@ def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm 
 def require() -> Llvm:
     """Make sure that Dr.Jit can use LLVM in this process. Call this function before any use of Dr.Jit.
 
-    Sets ``DRJIT_LIBLLVM_PATH`` to the library and returns the library.
+    Sets ``DRJIT_LIBLLVM_PATH`` to the library and returns the result of its test.
 
     Raises:
         BackendError: no library is usable. The message lists the tested libraries and states the remedy.

@@ -26,7 +26,10 @@ class Grid:
 
     shape: number of samples (y, x).
     dx: pitch [m], or [1/m] for spatial frequencies.
-    centre: position (x, y) of sample n//2.
+    centre: position (x, y) of sample n//2, in the unit of dx.
+
+    Raises:
+        ValueError: shape holds other than two whole numbers of at least 1, dx is not positive, or centre is not finite.
     """
 
     shape: tuple[int, int]
@@ -58,6 +61,7 @@ class Grid:
 
     @classmethod
     def square(cls, n: int, dx: float) -> Grid:
+        """Return n x n samples around (0, 0)."""
         return cls((n, n), dx)
 
     def moved(self, centre: tuple[float, float]) -> Grid:
@@ -66,20 +70,22 @@ class Grid:
 
     @property
     def x(self) -> np.ndarray:
+        """Positions of the columns, in the unit of dx."""
         return self.centre[0] + sample_positions(self.shape[1], self.dx)
 
     @property
     def y(self) -> np.ndarray:
+        """Positions of the rows, in the unit of dx."""
         return self.centre[1] + sample_positions(self.shape[0], self.dx)
 
     @property
     def half_width(self) -> float:
-        """Largest distance of a sample from the origin along an axis."""
+        """Upper bound of the distance of a sample from the origin along an axis; exact if the grid is centred there."""
         return max(abs(middle) + n // 2 * self.dx for middle, n in zip(self.centre, self.shape[::-1], strict=True))
 
     @property
     def half_diagonal(self) -> float:
-        """Largest distance of a sample from the origin."""
+        """Upper bound of the distance of a sample from the origin; exact if the grid is centred there."""
         x, y = (abs(middle) + n // 2 * self.dx for middle, n in zip(self.centre, self.shape[::-1], strict=True))
         return float(np.hypot(x, y))
 

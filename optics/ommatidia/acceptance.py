@@ -53,16 +53,17 @@ class AcceptanceFunction(ReadOnlyArrays):
 
 
 def acceptance_function(ommatidium: Ommatidium, wavelengths: np.ndarray, loss: float = 5e-3) -> AcceptanceFunction:
-    """Return the acceptance function of an ommatidium. Repeated calls return the same object.
+    """Return the acceptance function of an ommatidium. Calls with equal arguments return the same object.
 
     The window is widened until it contains all but the fraction `loss` of the light that the modes accept from all
-    directions, at each wavelength. Its half width is at most a sine of 0.5.
+    directions, at each wavelength. Its half width is at most a sine of 0.5, so wider fields lose more.
 
     wavelengths: vacuum wavelengths [m], (band,).
     loss: fraction in [1e-5, 0.1].
 
     Raises:
-        ValueError: an argument is outside its valid range, or the rhabdom guides no mode.
+        ValueError: an argument is outside its valid range, the rhabdom guides no mode, or see `Waveguide.modes`. The
+            pupil has a relief of pixels, or a number of it carries a derivative.
     """
     of_kind("ommatidium", ommatidium, Ommatidium, "Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6))")
     at = tuple(float(one) for one in wavelength_row(wavelengths))

@@ -25,7 +25,7 @@ class FacetLens:
     diameter: width [m] of the hexagon between opposite sides, or of the circle.
     radius_front, radius_back: radii of curvature [m], positive if the centre lies behind the surface. A biconvex lens
         has a negative radius_back.
-    thickness: thickness [m] of the lens on its axis.
+    thickness: thickness [m] of the lens on its axis, 0 or more.
     n, object_n, medium_n: refractive indices of the lens, of the medium in front of it, and of the cone behind it. Each
         is a number or a dispersion curve. With curves, the focus of an `Ommatidium` with this lens depends on the
         wavelength, but `pupil` has the same focus for all wavelengths.
@@ -59,7 +59,11 @@ class FacetLens:
             raise ValueError(f"radius_front = {self.radius_front:g}: must make a lens that focuses parallel light")
 
     def power(self, wavelength: float) -> float:
-        """Return the power P = P₁ + P₂ - t P₁P₂/n [1/m] at a vacuum wavelength [m]."""
+        """Return the power P = P₁ + P₂ - t P₁P₂/n [1/m] at a vacuum wavelength [m], with the thickness t.
+
+        Raises:
+            ValueError: the wavelength or an index at this wavelength is invalid, as in all methods of the lens.
+        """
         front, back, n = self._surfaces(wavelength)
         return front + back - self.thickness / n * front * back
 
@@ -85,6 +89,9 @@ class FacetLens:
         For light of all wavelengths, the ideal lens has the focal length of this lens at `wavelength` [m].
 
         others: further arguments of `Pupil`, such as a wavefront for the lens' aberrations.
+
+        Raises:
+            ValueError: an argument is invalid.
         """
         corners = 2 / math.sqrt(3) if self.shape == "hexagon" else 1.0
         return Pupil(

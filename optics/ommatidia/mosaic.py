@@ -25,10 +25,12 @@ MOST = 2**22  # choice: largest number of directions at which a radiance is eval
 def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
     """Return the viewing directions (n, 2) of ommatidia in hexagonal rings about the axis: angles [rad] along x and y.
 
-    The angle between neighbours is Δφ, and rows run along x.
+    The angle between neighbours is Δφ, and rows run along x. There are n = 1 + 3 rings (rings + 1) directions.
+
+    interommatidial_deg: Δφ [degrees].
 
     Raises:
-        ValueError: rings is outside 0 to 60, or the angle is not positive.
+        ValueError: rings is not a whole number from 0 to 60, or the angle is not positive.
     """
     whole("rings", rings, 0, MOST_RINGS)
     apart = math.radians(positive("interommatidial_deg", interommatidial_deg, "degrees"))
@@ -45,7 +47,7 @@ class AppositionEye:
 
     ommatidium: the ommatidium that all directions share.
     rings: number of rings around the ommatidium on the axis.
-    interommatidial_deg: Δφ between neighbours.
+    interommatidial_deg: Δφ [degrees] between neighbours, 1e-3 to 30.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -69,7 +71,12 @@ class AppositionEye:
         """Return directions x, y [rad] relative to the ommatidium's axis, flat, and their weights, which sum to 1.
 
         The directions are every second sample of `acceptance_function`. They contain at least 99 % of the accepted
-        light.
+        light, unless the field reaches a sine of 0.5.
+
+        wavelength: vacuum wavelength [m].
+
+        Raises:
+            ValueError: see `acceptance_function`.
         """
         accepted = acceptance_function(self.ommatidium, np.array([vacuum_wavelength(wavelength)]), LOST)
         samples = slice(len(accepted.sines) // 2 % EVERY, None, EVERY)  # contains the axis
@@ -85,7 +92,8 @@ class AppositionEye:
             for each group of n ommatidia.
 
         Raises:
-            ValueError: the radiance is not finite, or its shape differs from that of the angles.
+            ValueError: radiance is not a function, its values are not finite real numbers, or their shape differs from
+                that of the angles. See also `field`.
         """
         if not callable(radiance):
             raise ValueError(f"radiance = {shown(radiance)}: must be a function of angles x and y [rad]")
@@ -105,8 +113,10 @@ class AppositionEye:
         in front of the lens. The spacing of the ommatidia is a separate limit: their array resolves gratings up to
         1/(√3 Δφ).
 
+        azimuth_deg: direction [degrees] along which the grating varies, from x towards y.
+
         Raises:
-            ValueError: a frequency is negative, or a number is not finite.
+            ValueError: a frequency is outside [0, 1e9], or the azimuth is not finite. See also `field`.
         """
         in_range("cycles_per_degree", cycles_per_degree, 0.0, 1e9)
         turn = math.radians(finite("azimuth_deg", azimuth_deg))

@@ -30,8 +30,9 @@ class Ommatidium:
     lens: a FacetLens, or any Pupil.
     rhabdom: the waveguide.
     distance: distance [m] from the plane of the lens (the second principal plane of a FacetLens) to the end of the
-        rhabdom, at 550 nm. None: the focal length of the lens at 550 nm. The position of the rhabdom is the same for
-        all wavelengths, but a FacetLens with dispersion curves focuses each wavelength at its own distance.
+        rhabdom, at 550 nm. None: the focal length of the lens at 550 nm, or 240 µm for a Pupil without a focal length.
+        The position of the rhabdom is the same for all wavelengths, but a FacetLens with dispersion curves focuses each
+        wavelength at its own distance.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -66,7 +67,7 @@ class Ommatidium:
         return Beam(self.lens.pupil(wavelength), PointSource(), wavelength, distance)
 
     def modes(self, wavelength: float = 500e-9) -> tuple[Mode, ...]:
-        """Return the guided modes of the rhabdom at a vacuum wavelength [m]: see `Waveguide.modes`."""
+        """Return the guided modes of the rhabdom at a vacuum wavelength [m]. Errors: see `Waveguide.modes`."""
         return self.rhabdom.modes(wavelength)
 
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
@@ -79,7 +80,8 @@ class Ommatidium:
 
         Raises:
             ValueError: an angle has a sine above 0.5 or below -0.5, the shapes of the angles cannot be broadcast, or
-                the rhabdom has no modes.
+                the rhabdom has no modes. The pupil has a relief of pixels, or a number of it carries a derivative. See
+                also `Waveguide.modes`.
         """
         x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)
         try:
@@ -113,8 +115,11 @@ class Ommatidium:
         It is measured along a line through the axis at an azimuth from x. If the sensitivity has several lobes, the
         angle is that between the two outermost directions at half maximum.
 
+        azimuth_deg: azimuth [degrees] from x towards y, -360 to 360.
+
         Raises:
-            ValueError: see `mode_power`.
+            ValueError: the azimuth is outside its range, the rhabdom is so far from the focus that no peak is found, or
+                see `mode_power`.
         """
         pupil = self.pupil
         turn = math.radians(in_range("azimuth_deg", azimuth_deg, -360, 360))
@@ -149,7 +154,11 @@ class Ommatidium:
 
     @property
     def rhabdom_distance(self) -> float:
-        """Distance [m] from the plane of the lens to the end of the rhabdom, at 550 nm."""
+        """Distance [m] from the plane of the lens to the end of the rhabdom, at 550 nm.
+
+        Raises:
+            ValueError: `distance` is None, and the pupil forms no real image of parallel light.
+        """
         return self.pupil.image_distance(math.inf) if self.distance is None else self.distance
 
 
@@ -170,9 +179,10 @@ def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wave
 
     diameter, rhabdom: diameters D of the facet and d of the rhabdom [m].
     focal_length: focal length f = n₀/P [m] in front of the lens.
+    wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
 
     Raises:
-        ValueError: a length is not positive.
+        ValueError: a length is not positive, or the wavelength is above 1 m.
     """
     for name, value in (("diameter", diameter), ("focal_length", focal_length), ("rhabdom", rhabdom)):
         positive(name, value)

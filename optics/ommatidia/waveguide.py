@@ -41,7 +41,13 @@ class Mode:
     sine: bool = False
 
     def field(self, x: Any, y: Any) -> np.ndarray:
-        """Return the amplitude ψ [1/m] at (x, y) [m], with ∫ψ² = 1: J_l(Ur/b) in the core and K_l(Wr/b) outside."""
+        """Return the amplitude ψ [1/m] at (x, y) [m], with ∫ψ² = 1: J_l(Ur/b) in the core and K_l(Wr/b) outside.
+
+        x, y: positions relative to the waveguide's axis, in arrays whose shapes broadcast.
+
+        Raises:
+            ValueError: a position is not a real number, or shapes do not broadcast.
+        """
         from scipy.special import jv, kve
 
         x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
@@ -128,7 +134,8 @@ class Waveguide:
         """Return V = πd/λ √(n_core² - n_clad²) of the tip at a vacuum wavelength [m]. Below 2.405, it has one mode.
 
         Raises:
-            ValueError: the index of the core is not above that of the surroundings, or V is above 60.
+            ValueError: the index of the core is not above that of the surroundings, V is above 60, or the wavelength is
+                invalid.
         """
         at = vacuum_wavelength(wavelength)
         core, clad = (index_of(name, getattr(self, name)).at(at) for name in ("n_core", "n_clad"))
@@ -142,7 +149,8 @@ class Waveguide:
     def modes(self, wavelength: float) -> tuple[Mode, ...]:
         """Return the modes that the tip guides at a vacuum wavelength [m], the best confined first.
 
-        Modes with l >= 1 come in pairs.
+        Modes with l >= 1 come in pairs. There is none if V is very small, such as 0.3: light then travels almost only
+        outside the core.
 
         Raises:
             ValueError: see `v_number`, or the guide tapers too fast for light to stay in its mode.

@@ -42,6 +42,7 @@ class PSFBatch(OnWindow):
 
     tensor: PSFs [1/m²] as a Dr.Jit tensor (eye, depth, wavelength, y, x) with derivatives.
     psf: the same as a NumPy array.
+    dx: pitch [m] of the samples.
     plans: one plan per PSF, in the same order, as a flat tuple.
     members: light of each PSF, in the order of `plans`.
     setup: parameters that all PSFs share.
@@ -62,6 +63,7 @@ class PSFBatch(OnWindow):
 
     @property
     def window(self) -> Grid:
+        """Positions of the samples on the sensor [m]."""
         return self.setup.window
 
     def result(self, eye: int, depth: int = 0) -> PSFResult:
@@ -88,6 +90,7 @@ class PSFBatch(OnWindow):
 
     @cached_property
     def psf(self) -> np.ndarray:
+        """PSFs [1/m²], (eye, depth, wavelength, y, x)."""
         return read_only(np.asarray(self.tensor.numpy()))
 
     @property
@@ -111,10 +114,10 @@ def psf_batch(
     """Return `optics.psf` of every pupil over one window, for every source distance and wavelength.
 
     pupils: one pupil per eye.
-    wavelengths: wavelengths [m] in vacuum.
+    wavelengths: sequence of wavelengths [m] in vacuum.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which each pupil's ideal lens
         images the first source, see `optics.psf`.
-    source_distances: distances [m] of sources on the axis.
+    source_distances: sequence of distances [m] of sources on the axis.
     dx, shape, tolerance, method, dtype: see `optics.psf`.
 
     At tolerances of 3e-4 or more, all PSFs are planned together, and PSFs with equal numbers of samples are computed as
@@ -125,6 +128,7 @@ def psf_batch(
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.
         AccuracyError: see `optics.psf`.
+        BackendError: see `optics.psf`.
     """
     for name, values in (("pupils", pupils), ("wavelengths", wavelengths), ("source_distances", source_distances)):
         if not is_sized(values) or len(values) == 0:

@@ -40,11 +40,13 @@ def encircled_energy(
     that alias onto them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the
     circle, which are computed if the window does not contain them.
 
-    centre: None for the middle of the PSF's window.
+    radii: a number or a row of numbers. At 0 the result is 0.
+    centre: None for sample n//2 of the PSF.
     with_error: True to return (value, predicted error).
 
     Raises:
-        ValueError: a radius is negative or extends beyond the window.
+        ValueError: a radius is negative, NaN or extends beyond the outermost samples, the centre lies outside them, or
+            `result` is not a PSF.
         AccuracyError: the samples are too coarse, or too few around the circle, and other samples cannot be computed.
             The message states which samples are sufficient.
     """

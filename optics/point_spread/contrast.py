@@ -31,7 +31,7 @@ ROOM = 0.5  # choice: an enlarged window exceeds the necessary width by √2 to 
 def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.02) -> MTF:
     """Return |F{PSF}| divided by all the light that arrives (Goodman, Introduction to Fourier Optics, §6.3.2).
 
-    For a `WhitePSF` there is one MTF per receptor type.
+    For a `WhitePSF` there is one MTF per receptor type. The result is the contrast, which is 1 at frequency 0.
 
     arriving: fraction of the pupil's power that arrives on the unbounded plane, a number or (wavelength,), in (0, 1].
         None: all light except the evanescent part, which the pupil's edge and steep slopes of its relief cause.
@@ -39,7 +39,8 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
         than 1/(2 cutoff) apart alias frequencies. If necessary, the PSF is recomputed over a wider or finer window.
 
     Raises:
-        ValueError: arriving has the wrong shape, or the light in the window exceeds it by more than 0.01.
+        ValueError: arriving has the wrong shape, is outside (0, 1], is given for a `WhitePSF`, or the light in the
+            window exceeds it by more than 0.01. The tolerance is not positive, or `result` is not a PSF.
         AccuracyError: samples or window are insufficient for the tolerance, and others cannot be computed. The message
             states which are sufficient.
     """
@@ -155,8 +156,9 @@ def image_quality(
 
     result: a PSF, or its MTF if this is known already.
     nyquist: Nyquist frequency of the retina, f_N = 1 / (2 receptor pitch) [1/m].
-    throughput: T = a².
-    noise_sigma: σ, in units of the signal.
+    throughput: T in [0, 1], such as a² for a pupil of the relative radius a. It may carry a derivative, and the result
+        is 0 if T is 0.
+    noise_sigma: σ, in units of the signal, 0 to 1e6.
     tolerance: see `optics.mtf`. A known MTF has its own tolerance.
     with_error: True to return (value, predicted error), each (wavelength,).
 

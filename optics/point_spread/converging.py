@@ -185,10 +185,12 @@ class VectorFocus(ReadOnlyArrays):
 
     intensity: |Ex|², |Ey|², |Ez|² divided by the pupil's area, (3, y, x) [1/m²]. These are the excitations of molecules
         with a dipole along x, y or z.
-    scalar: the PSF of scalar theory, (y, x).
-    field: Ex, Ey, Ez, (3, y, x), without the carrier e^{ikz}. None unless the light is fully polarised.
-    parts: one or two fields that do not interfere and add up to the light, (part, 3, y, x).
-    centre: (x, y) [m] of the middle sample.
+    scalar: the PSF of scalar theory, (y, x) [1/m²].
+    dx: pitch [m] of the samples.
+    field: Ex, Ey, Ez [1/m], (3, y, x), without the carrier e^{ikz}. Their squared moduli are `intensity`. None unless
+        the light is fully polarised.
+    parts: one or two such fields that do not interfere and add up to the light, (part, 3, y, x).
+    centre: (x, y) [m] of sample n//2.
     polarization: Stokes parameters of the light in front of the pupil, divided by the first.
     plan: method and predicted error, the relative L2 error of the intensity over the window.
     towards: the light from which the field can be recomputed. None if `vector_focus` did not compute the field.

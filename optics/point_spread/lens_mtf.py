@@ -78,7 +78,8 @@ def lens_mtf(
 ) -> LensMTF:
     """Return the contrasts of a lens in light of all its wavelengths, with lateral colour, through focus.
 
-    The optical transfer function is the mean Σ w(λ) OTF(λ), with all PSFs relative to one point of the image plane.
+    The optical transfer function is the mean Σ w(λ) OTF(λ), with all PSFs relative to one point of the image plane. At
+    frequency 0, the result is the fraction of the light within the windows of the PSFs, slightly below 1.
 
     lens: from `read_exit_pupils`.
     frequencies: spatial frequencies [1/m] on the image plane, a number or (frequency,).
@@ -89,6 +90,7 @@ def lens_mtf(
     Raises:
         ValueError: an argument is invalid, or a frequency is beyond the cutoff of the lens.
         AccuracyError: see `optics.mtf` and `optics.psf`.
+        BackendError: see `optics.mtf` and `optics.psf`.
     """
     of_kind("lens", lens, ExitPupils, "read_exit_pupils(wavefront)")
     in_range("tolerance", tolerance, 1e-4, 0.5)

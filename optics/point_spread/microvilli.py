@@ -19,7 +19,7 @@ __all__ = ["Microvilli"]
 class Microvilli:
     """Parallel microvilli, perpendicular to the light's axis, as in a rhabdomere.
 
-    azimuth_deg: direction of the microvilli, from x towards y.
+    azimuth_deg: direction of the microvilli [degrees], from x towards y, -360 to 360.
     dichroic_ratio: absorption of light polarised along the microvilli, divided by absorption of light polarised across
         them. It ranges from 1 (no preference) to infinity.
 
@@ -40,6 +40,9 @@ class Microvilli:
         """Return the absorbed light, (y, x) [1/m²], with complete absorption of light polarised along the microvilli.
 
         With m the direction of the microvilli, it is |E·m|² + (|E|² - |E·m|²)/ratio.
+
+        Raises:
+            ValueError: `light` is not a VectorFocus.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         along = (np.abs(self._along(light)) ** 2).sum(axis=0)
@@ -59,12 +62,12 @@ class Microvilli:
         the light is recomputed.
 
         radius: radius [m] of the receptor.
-        centre: centre (x, y) [m] of the receptor; None for the window's middle.
+        centre: centre (x, y) [m] of the receptor; None for sample n//2.
         with_error: True to return (value, predicted error). It includes the errors of the sum and of `vector_focus`.
 
         Raises:
-            ValueError: the receptor extends beyond the window.
-            AccuracyError: the receptor is too large for the required samples.
+            ValueError: an argument is invalid, or the receptor extends beyond the outermost samples.
+            AccuracyError: the receptor is too large for the required samples, or `light` is not from `vector_focus`.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         flag("with_error", with_error)
@@ -81,7 +84,9 @@ class Microvilli:
         are nearly parallel to the axis, and is smaller if rays are steep. For the arguments, see `signal`.
 
         Raises:
-            ValueError: `light` is polarised: only an unpolarised field contains both planes of polarisation.
+            ValueError: `light` is polarised: only an unpolarised field contains both planes of polarisation. See also
+                `signal`.
+            AccuracyError: see `signal`.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         if any(light.polarization[1:]):

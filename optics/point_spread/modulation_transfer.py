@@ -81,6 +81,7 @@ class MTF(ReadOnlyArrays):
 
     @cached_property
     def mtf(self) -> np.ndarray:
+        """Contrasts, (wavelength, fy, fx), without derivatives."""
         return read_only(np.asarray(self.tensor.numpy()))
 
     @cached_property
@@ -105,7 +106,8 @@ class MTF(ReadOnlyArrays):
         fx, fy: components of each frequency along x and y, of equal or broadcastable shapes. They are flattened.
 
         Raises:
-            ValueError: a frequency is not finite, or beyond the Nyquist frequency of the PSF's samples.
+            ValueError: a frequency is not a finite real number, or is beyond the Nyquist frequency of the PSF's
+                samples. Shapes do not broadcast.
         """
         f = np.stack([part.ravel() for part in np.broadcast_arrays(reals("fx", fx), reals("fy", fy))])
         nyquist = 0.5 / self._dx
@@ -168,13 +170,13 @@ class MTF(ReadOnlyArrays):
     def profile(self, frequencies: np.ndarray, with_error: bool = False) -> Any:
         """Return the mean contrast over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
 
-        The frequencies need not lie on the grid. Beyond the Nyquist frequency of the PSF's samples (half a cycle per
-        sample), contrasts are 0.
+        The frequencies need not lie on the grid. Arrays are flattened. At frequency 0 the contrast is 1. Contrasts
+        count as 0 if |fx| or |fy| is beyond the Nyquist frequency of the PSF's samples (half a cycle per sample).
 
         with_error: whether to return (value, predicted error), each (wavelength, frequency).
 
         Raises:
-            ValueError: the PSF has a single sample, or the frequencies are invalid.
+            ValueError: the PSF has a single sample, there are no frequencies, or one is not a finite real number.
             AccuracyError: contrasts change so fast with orientation that the error of a mean over 1024 orientations may
                 exceed the predicted error.
         """

@@ -41,21 +41,25 @@ def psf(
         provided that it is accurate enough.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         images the source, or 240 µm without such a lens.
-    source_distance, source_angle: distance [m] and direction (x, y) [rad] of the source, see PointSource.
+    source_distance, source_angle: distance [m] of the source, and direction (x, y) [rad] of its light, see PointSource.
     dx, shape, centre: pitch [m], number of samples (y, x) and position (x, y) [m] of sample n//2 of the window.
-    tolerance: relative L2 error of the intensity over the window.
+    tolerance: relative L2 error of the intensity over the window, 1e-12 to 0.5.
     method: "auto", "exact" (no approximations), or one of planner.METHODS. If an approximation is requested by name, it
         runs regardless of its error. The tolerance then applies only to its sampling, and the plan states the error.
+        The samples of "pinhole", "geometric" and "perfect_lens" are means over squares of side dx. "auto" may choose
+        these methods (`PSFResult.holds_cells`). The samples of all other methods are values at points.
     dtype: "float32" or "float64".
-    field: True to return the complex amplitude as well (`PSFResult.field`). Only methods that compute it are then
-        compared; it takes no additional time.
+    field: True to return the complex amplitude U/√(pupil area) as well (`PSFResult.field`). Only methods that compute
+        it are then compared; it takes no additional time.
 
     Both distances, the angle and all parameters of the pupil may be Dr.Jit arrays that carry derivatives: see
     PSFResult.tensor. For tensors of PyTorch, use `optics.torch.psf`.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
-        AccuracyError: no method meets the tolerance within the limits on memory and time.
+        AccuracyError: no method meets the tolerance within the limits on memory and time, or the window is too large
+            or too dark.
+        BackendError: Dr.Jit has no usable LLVM library or GPU, or an array is on another device.
     """
     source = PointSource(source_distance, source_angle)
     at = sensor_place(of_kind("pupil", pupil, Pupil, "Pupil(25e-6)"), sensor_distance, source.distance)
@@ -82,7 +86,10 @@ def plan(
     dtype: str = "float32",
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Plan:
-    """Return the plan of `psf` at one wavelength without computing the PSF. Arguments and errors: see `psf`."""
+    """Return the plan of `psf` at one wavelength without computing the PSF. Arguments and errors: see `psf`.
+
+    `psf` compares its result with the direct sum. Its plan can therefore state another error or method.
+    """
     source = PointSource(source_distance, source_angle)
     at = sensor_place(of_kind("pupil", pupil, Pupil, "Pupil(25e-6)"), sensor_distance, source.distance)
     setup = Setup(at, source, Grid(shape, dx, centre), tolerance, method, dtype)

@@ -43,7 +43,7 @@ OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are
 
 @dataclass(frozen=True, eq=False)
 class PSFResult(ReadOnlyArrays, OnWindow):
-    """A PSF on a grid of positions on the sensor. Sample n//2 is at `centre` (x, y) [m], and y increases with the row.
+    """A PSF on samples of the sensor, dx [m] apart. Sample n//2 is at `centre` (x, y) [m]; y increases with the row.
 
     tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of the parameters.
     psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
@@ -52,7 +52,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     requests: one per wavelength, also of a mean; measures recompute the PSF from them (empty for PSFs not from `psf`).
     shares: weight of each request in a mean over wavelengths (see `mean`), (request,). None: it is not a mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
-        derivatives; None unless `psf` was called with field=True. The amplitude includes the carrier exp(ikz), and its
+        derivatives; None unless `psf` was called with field=True. The amplitude [1/m] has the carrier exp(ikz), and its
         squared modulus is the PSF. `field` is the same as one complex NumPy array.
     for_window: True if the samples of the pupil suffice only for the light in the window. Sums over dark parts may then
         exceed their error bound, so measures compute the PSF again, from samples that resolve all light.
@@ -110,7 +110,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def power_error(self) -> np.ndarray:
-        """Predicted error of `power`, (wavelength,).
+        """Predicted error of `power`, (wavelength,). Errors: see `power`.
 
         It includes the error of the PSF and half of the power at the window's rim, because samples define the position
         of the rim only to within a cell.
@@ -123,7 +123,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def cutoff(self) -> np.ndarray:
-        """Highest frequency [1/m] of the intensity, 2R/√(R² + z²) n/λ, (wavelength,)."""
+        """Highest frequency [1/m] of the intensity, 2R/√(R² + z²) n/λ with n behind the pupil, (wavelength,)."""
         radius, distance = self.pupil.radius, number(self.sensor_distance)
         index = np.array([self.pupil.index_behind(float(wavelength)) for wavelength in self.wavelengths])
         found: np.ndarray = 2 * radius / math.hypot(radius, distance) * index / self.wavelengths
@@ -174,12 +174,12 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return float(self.cutoff.max() * self.wavelengths.max() / shortest)
 
     def mean(self, shares: np.ndarray) -> PSFResult:
-        """Return the PSF of light of all wavelengths at once, (1, y, x), at their mean wavelength, with derivatives.
+        """Return the PSF of light of all wavelengths at once, (1, y, x), with derivatives; its wavelength is the mean.
 
         shares: fraction of each wavelength in the light, (wavelength,). Fractions sum to 1.
 
         Raises:
-            ValueError: shares has the wrong shape or sum.
+            ValueError: shares are not real numbers, or have the wrong shape or sum.
         """
         parts = reals("shares", shares)
         if parts.shape != self.wavelengths.shape or not math.isclose(float(parts.sum()), 1, rel_tol=1e-6):
@@ -218,12 +218,12 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         )
 
     def recompute_on(self, window: Grid, what: str) -> PSFResult:
-        """Return the PSF of the same light over another window, to the same tolerance.
+        """Return the PSF of the same light over another window, to the same tolerance and without the amplitude.
 
         what: name of the measure, for the error message.
 
         Raises:
-            AccuracyError: the requests of the PSF are not known, or the window is too large.
+            AccuracyError: the requests of the PSF are not known, or this window cannot be computed within the limits.
         """
         height, width = window.shape
         here = f"{self.tensor.shape[1]} x {self.tensor.shape[2]} samples {self.dx:.3g} m apart"

@@ -50,6 +50,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
+        ValueError: `result` is not a PSF, or with_error is not a bool.
         AccuracyError: the maximum lies outside the window, or the PSF is brighter at a point outside the window that
             rays reach. The same error results if the samples are too coarse and finer ones cannot be computed. The
             message states which samples are sufficient.

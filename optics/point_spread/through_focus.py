@@ -43,6 +43,7 @@ class ThroughFocus(ReadOnlyArrays):
         """Return a measure of each PSF, for example `optics.strehl_ratio`, (distance, wavelength, ...).
 
         measure: function that returns an array (wavelength, ...). To pass it further arguments, use a lambda.
+            Derivatives are dropped.
         """
         return np.stack([plain(measure(result)) for result in self.results])
 
@@ -76,11 +77,12 @@ def through_focus(pupil: Pupil, sensor_distances: Any, **asked: Any) -> ThroughF
 
     sensor_distances: distances [m] behind the pupil, ascending. Distances around `pupil.image_distance(math.inf)` cover
         the focus of an ideal lens.
-    asked: further arguments of `optics.psf`, such as wavelengths, dx and shape.
+    asked: further arguments of `optics.psf`, such as wavelengths, dx and shape, apart from sensor_distance.
 
     Raises:
         ValueError: the distances are not a row of ascending positive numbers, or another argument is invalid.
         AccuracyError: see `optics.psf`.
+        BackendError: see `optics.psf`.
     """
     if "sensor_distance" in asked:
         raise ValueError("sensor_distance: must be left out, because sensor_distances contains it")

@@ -46,7 +46,7 @@ def vector_focus(
     Fresnel number.
 
     wavelength: wavelength [m] in vacuum.
-    sensor_distance: distance [m] behind the pupil; None: the focus of the lens.
+    sensor_distance: distance [m] behind the pupil. None: the focus of the ideal lens, or 240 µm without one.
     polarization: polarisation of the light in front of the pupil: a Jones vector (x, y) or Stokes parameters (S0, S1,
         S2, S3). Here S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey) and S3 = 2 Im(Ex* Ey). None: unpolarised. For oblique light,
         the x and y of these definitions are rotated with the light's direction.
@@ -58,9 +58,12 @@ def vector_focus(
     tolerance: relative L2 error of the intensity over the window.
 
     Raises:
-        ValueError: an argument is invalid, the relief is pixelated, or a parameter carries derivatives.
-        AccuracyError: no method meets the tolerance within the limits on memory and time, or an aplanatic lens has a
-            Fresnel number below 20. The rays of such a lens do not meet in a point.
+        ValueError: an argument is invalid, the relief is pixelated, a parameter carries derivatives, or the pupil of an
+            aplanatic lens is not an ideal lens alone, lit along its axis.
+        AccuracyError: no method meets the tolerance within the limits on memory and time, a ray behind the pupil has a
+            sine above 0.98, or an aplanatic lens has a Fresnel number below 20. The rays of such a lens do not meet in
+            a point.
+        BackendError: see `optics.psf`.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
     lambda_ = vacuum_wavelength(wavelength)

@@ -60,6 +60,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
 
     @property
     def window(self) -> Grid:
+        """Positions of the samples on the sensor [m]."""
         return self.waves.window
 
     @property
@@ -89,6 +90,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         See `optics.mtf`.
 
         Raises:
+            ValueError: see `optics.mtf`.
             AccuracyError: see `optics.mtf`.
         """
         found, count = combined_mtf(self.waves, np.vstack([self.weights, self.coarse]), tolerance), len(self.weights)
@@ -158,15 +160,16 @@ def white_psf(
 
     light: name of an illuminant, a Spectrum, or spectral power as a function of wavelengths [m].
     receptors: receptor types, see `optics.receptors_of`. Results are in the order of the types.
-    waves: number of wavelengths over the receptors' range: an odd number, or "auto" for the fewest that meet the
+    waves: number of wavelengths over the receptors' range: odd, 5 to 513, or "auto" for the fewest that meet the
         tolerance. Cubic splines interpolate PSFs between the wavelengths. The plan of the first wavelength is used for
         all, provided that it is accurate enough.
     tolerance: relative L2 error over the window, for PSFs and spectrum together.
-    asked: further arguments of `optics.psf`.
+    asked: further arguments of `optics.psf`, apart from wavelengths.
 
     Raises:
         ValueError: an argument is invalid, or a type of receptor does not absorb the light.
         AccuracyError: there are too few wavelengths (the message states a sufficient number). See also `optics.psf`.
+        BackendError: see `optics.psf`.
     """
     by_itself = isinstance(waves, str) and waves == "auto"
     count = FIRST if by_itself else whole("waves", waves, 5, MOST_WAVES)

@@ -49,7 +49,8 @@ class Misaligned:
     """A pupil of a system that is decentred, and tilted about its centre.
 
     decentre: position (x, y) [m] of the pupil's centre relative to the axis.
-    tilt: angles (x, y) [rad]. A positive angle moves the pupil's +x (or +y) side in the direction of the light.
+    tilt: angles (x, y) [rad], -0.2 to 0.2. A positive angle moves the pupil's +x (or +y) side in the direction of the
+        light.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.

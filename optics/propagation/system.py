@@ -70,7 +70,8 @@ class SystemStep:
 class StackResult(ReadOnlyArrays, OnWindow):
     """A field behind a system.
 
-    u: complex field (y, x) at the pitch dx [m]. Sample n//2 is the centre.
+    u: complex field (y, x) at the pitch dx [m], with the carrier exp(ikz). Sample n//2 is on the axis.
+    steps: power and accuracy of each propagation from plane to plane.
     predicted_error: relative L2 error of the intensity.
     window: grid of the samples [m]; `x` and `y` are the positions of its columns and rows.
     """
@@ -106,15 +107,19 @@ def propagate_through(
     u: complex field (y, x) in front of the first element, at the pitch dx [m]; the field is zero outside. If u is None,
         the first element must be a pupil, which `source` illuminates (by default, a plane wave of unit amplitude).
     wavelength: wavelength [m] in vacuum.
-    out_dx, out_shape: pitch [m] and shape (y, x) of the output. By default, they equal those of u.
-    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u.
+    out_dx, out_shape: pitch [m] and shape (y, x) of the output. By default, they equal those of u. They are required if
+        u is None.
+    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u. For its
+        smallest value and dtype, see `optics.propagate`.
     backward: True if u is the field behind the last element, which is propagated back to the plane in front of the
         first element. Propagation and phases are reversed. Light that apertures blocked or that decayed is not
         restored.
 
     Raises:
-        ValueError: an argument is invalid (named with its value and valid range), or a parameter carries derivatives.
-        AccuracyError: no sampling meets the tolerance. The message states which tolerance is possible.
+        ValueError: an argument is invalid (named with its value and valid range), a parameter carries derivatives, two
+            pupils touch, a relief has pixels, or the medium is dispersive or differs between elements.
+        AccuracyError: no sampling meets the tolerance, or a tilt is too large for it.
+        BackendError: see `optics.psf`.
     """
     if isinstance(elements, str) or not isinstance(elements, Sequence):
         raise ValueError(f"elements = {shown(elements)}: must be a list of Pupil, Misaligned and FreeSpace")

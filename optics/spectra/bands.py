@@ -47,6 +47,9 @@ class SpectralBands(ReadOnlyArrays):
         O(bands⁻²).
 
         receptors: `Receptors`, or any argument of `receptors_of`.
+
+        Raises:
+            ValueError: bands is not a whole number from 1 to 64, or the receptors are invalid.
         """
         kinds = receptors_of(receptors)
         edges = np.linspace(*kinds.limits_nm, whole("bands", bands, 1, FINEST) + 1)
@@ -72,6 +75,10 @@ class SpectralBands(ReadOnlyArrays):
         radiance: a Spectrum, or a function of wavelengths [m]. For a surface, it is reflectance times illuminant.
         receptors: the receptors for which these bands were made.
         nonnegative: True for values of at least 0. Catches are then as close to the exact ones as this permits.
+
+        Raises:
+            ValueError: radiance is neither a Spectrum nor a function, is not finite at a wavelength, or has another
+                number of values. Another argument is invalid.
         """
         if not isinstance(radiance, Spectrum) and not callable(radiance):
             raise ValueError(

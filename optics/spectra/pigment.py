@@ -106,9 +106,13 @@ class Pigment:
 
     @property
     def peak_nm(self) -> float:
-        """Wavelength of the highest sensitivity [nm]."""
+        """Wavelength of the peak of the α band [nm]."""
         return self.lambda_max_nm
 
     def at(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Return the quantal sensitivity at `wavelengths` [m]."""
+        """Return the quantal sensitivity at `wavelengths` [m], an array of any shape.
+
+        Raises:
+            ValueError: a wavelength is not positive, or is above 1 m.
+        """
         return pigment_absorptance(wavelengths, self.lambda_max_nm * 1e-9, self.chromophore)

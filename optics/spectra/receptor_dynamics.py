@@ -26,9 +26,9 @@ class ReceptorDynamics:
         to b in the quotient
     adaptation_ms: time constant of b [ms]
     dark_light: signal that is equivalent to the receptor's spontaneous activity, relative to that of white in daylight
-    event_threshold: θ. If above 0, the output is the number of events since the last observation, with a sign. An event
-        occurs whenever ln(s + dark_light) has changed by θ since the last event (Lichtsteiner et al. 2008, IEEE J.
-        Solid-State Circuits 43:566). None: no events
+    event_threshold: θ, at least 1e-3. The output is the number of events since the last observation, with a sign. An
+        event occurs whenever ln(s + dark_light) has changed by θ since the last event (Lichtsteiner et al. 2008, IEEE
+        J. Solid-State Circuits 43:566). None: no events
     motion: elementary motion detectors between neighbours in a row. Their outputs are channels that follow those of the
         receptors. a is the left receptor, b is the right one, and D is a low-pass filter. "hassenstein_reichardt"
         (1956): D(a) b - a D(b). "barlow_levick" (1965): max(a - D(b), 0) - max(b - D(a), 0). With these, an object that

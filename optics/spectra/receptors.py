@@ -74,11 +74,15 @@ class Receptors:
         return len(self.types) if self.mosaic is None else 1
 
     def arranged(self, mosaic: Sequence[Sequence[int]] | np.ndarray | None) -> Receptors:
-        """Return the same types arranged in this mosaic."""
+        """Return the same types arranged in this mosaic.
+
+        Raises:
+            ValueError: see `Receptors`.
+        """
         return replace(self, mosaic=None if mosaic is None else _mosaic(mosaic, len(self.types)))
 
     def layout(self, resolution: tuple[int, int]) -> np.ndarray | None:
-        """Return the type of every receptor, (h, w) int; None without a mosaic."""
+        """Return the type of every receptor, (h, w) int, for a resolution (h, w); None without a mosaic."""
         readable("resolution", resolution)
         if self.mosaic is None:
             return None

@@ -72,11 +72,15 @@ class Spectrum:
 
     @property
     def peak_nm(self) -> float:
-        """Wavelength of the largest value [nm]."""
+        """Wavelength of the largest value [nm]; the shortest one if several values are equal."""
         return self.wavelengths_nm[int(np.argmax(self.values))]
 
     def at(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Return the values at `wavelengths` [m]."""
+        """Return the values at `wavelengths` [m], an array of any shape.
+
+        Raises:
+            ValueError: a wavelength is not positive, or is above 1 m.
+        """
         return np.interp(vacuum_wavelengths(wavelengths) * 1e9, self.wavelengths_nm, self.values)
 
 
@@ -145,6 +149,8 @@ ILLUMINANTS = ("A", "D50", "D55", "D65", "D75", "E", "FL2", "FL11", "LED-B3")
 def illuminant(name: str) -> Spectrum:
     """Return the relative spectral power of a CIE illuminant on 300-780 nm. It is 1 at 560 nm.
 
+    name: "A", "D50", "D55", "D65", "D75", "E", "FL2", "FL11" or "LED-B3". The last three are dark below 380 nm.
+
     Raises:
         ValueError: the name is unknown.
     """
@@ -169,6 +175,8 @@ REFLECTANCES = (
 
 def reflectance(name: str) -> Spectrum:
     """Return the reflectance of a patch of the ColorChecker, measured on 380-780 nm and constant below 380 nm.
+
+    name: name of the patch, such as "foliage" or "light skin"; `optics.spectra.spectrum.REFLECTANCES` has all names.
 
     Raises:
         ValueError: the name is unknown.
