@@ -61,6 +61,7 @@ class EyeRenderer:
     Raises:
         ValueError: n_envs is below 1, the rays do not fit into memory, or the scene does not support the fidelity.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
