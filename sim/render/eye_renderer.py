@@ -167,7 +167,8 @@ class EyeRenderer:
         """Start rendering only some of the worlds; the signals are (len(worlds), eye, channel, height, width).
 
         `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to FEW worlds
-        are rendered in separate buffers, so that a frame of all worlds may be pending at the same time.
+        are rendered in separate buffers, so that a frame of all worlds may be pending at the same time. The errors are
+        those of `signals`, and an IndexError for an unknown world.
         """
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
@@ -192,7 +193,7 @@ class EyeRenderer:
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, len(self.mounts), height, width)
 
     def radiance(self, poses: Placed) -> np.ndarray:
-        """Return the spectral radiance along every ray, (env, eye, ray, band) float32; see `receptor_radiance`."""
+        """Return the spectral radiance along every ray, (env, eye, ray, band) float32, like `receptor_radiance`."""
         layers = self._components(self._launched(poses, self._rays).wait())
         rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
         return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)

@@ -33,9 +33,9 @@ def choose_fidelity(
     If there is none, a FidelityWarning states by how much the tolerance is exceeded.
 
     world, eyes: the world, and the eyes of every agent in it
-    tolerance: allowed error of a receptor's signal (root mean square), both over all receptors and over receptors that
-        see a nearby object, in the unit of signals; None: half of the eyes' `noise_sigma`, but at least 0.005 times the signal of a white
-        surface
+    tolerance: allowed error of a receptor's signal (root mean square, in the unit of signals), both over all receptors
+        and over receptors that see a nearby object; None: half of the eyes' `noise_sigma`, but at least 0.005 times the
+        signal of a white surface
     bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments.
         Compound eyes always have their own.
     tracer: tracer for the trials, see `sim.BatchedRenderer`
