@@ -61,7 +61,7 @@ class Run:
 
         Raises:
             RunError: the directory is not empty, or cannot be written.
-            LockedError: another process is creating a run there.
+            LockedError: another process is creating a run there, or the lock cannot be written.
         """
         path = Path(path)
         try:
@@ -143,7 +143,7 @@ class Run:
         """Return the lock of this run, a context manager. A process must hold it to write to the run.
 
         Raises:
-            LockedError: on entry into the context, another process holds the lock.
+            LockedError: on entry into the context, another process holds the lock, or the lock cannot be written.
         """
         self._lock = RunLock(self.path)
         return self._lock
@@ -193,7 +193,7 @@ class Run:
         return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
-        """Remove the checkpoints of candidates whose training will not continue."""
+        """Remove the checkpoints of candidates whose training will not continue; OSError if that is impossible."""
         for candidate_id in candidate_ids:
             for path in (self.path / TRAININGS).glob(f"{candidate_id:06d}-*.safetensors"):
                 path.unlink(missing_ok=True)
@@ -240,7 +240,7 @@ class Run:
         raise RunError(f"{self.path}: there is no candidate {candidate_id}; {len(self.candidates)} have been evaluated")
 
     def generation(self, number: int) -> list[Candidate]:
-        """Return the evaluated candidates of one generation, in the order of their ids."""
+        """Return the evaluated candidates of one generation, in the order of their ids; [] if there are none."""
         ids = generation_ids(number, self.config.search.population)
         first, end = (bisect_left(self.candidates, one, key=lambda c: c.id) for one in (ids.start, ids.stop))
         return list(self.candidates[first:end])

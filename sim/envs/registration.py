@@ -37,7 +37,7 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
 
     Raises:
         ValueError: `task` is no `sim.Task`, or its `episode_steps` is invalid.
-        gymnasium.error.Error: the id has an invalid form.
+        Error: the id has an invalid form. The class is `gymnasium.error.Error`.
     """
     from optics.numerics.arguments import whole
     from sim.tasks.task import Task

@@ -53,7 +53,8 @@ class BatchedRenderer(EyeRenderer):
 
         Raises:
             ValueError: as in the constructor, or the fidelity and the scene have different numbers of bands.
-            optics.AccuracyError, optics.BackendError: see the constructor.
+            optics.AccuracyError: see the constructor.
+            optics.BackendError: see the constructor.
         """
         renderer = cls.__new__(cls)
         renderer._open(scene, n_envs, fidelity)
