@@ -81,7 +81,7 @@ class OpenedRun(Run):
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate with the highest fitness, or the earliest of several; None before a candidate has succeeded."""
+        """Candidate with the highest fitness, the earliest if several have it; None before one has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 
@@ -101,7 +101,8 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ValueError: the eyes that the task places differ from those of the candidate, or `task` is no `sim.Task`.
+            ValueError: `task` is no `sim.Task`, has no mounts or several kinds of eyes, or its `place` fails or returns
+                another number of mounts.
             OSError: the policy's file cannot be read.
         """
         from evolve.analysis.recorder import trained_policy
@@ -112,7 +113,9 @@ class OpenedRun(Run):
         return Frozen(with_phenotype(task, candidate.phenotype, self.config), trained_policy(self, candidate))
 
     def held_out(self, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None) -> Episodes:
-        """Return evaluation episodes in the test set of layouts, which neither training nor selection has used.
+        """Play episodes in the test set of layouts, which neither training nor selection has used.
+
+        Return the sum of rewards and the verdict of each episode, (episode,) each.
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episodes

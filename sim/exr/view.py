@@ -100,7 +100,7 @@ class View:
 
     @property
     def spectral(self) -> np.ndarray | None:
-        """The radiance if there is any, otherwise the reflectance."""
+        """The radiance if there is any, otherwise the reflectance; None without both."""
         return self.reflectance if self.radiance is None else self.radiance
 
 

@@ -35,8 +35,8 @@ class CompoundEye:
     directions: viewing directions in the frame of the mount: unit vectors (ahead, left, up), (n, 3), or (azimuth to the
         left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The field is always
         converted to unit vectors.
-    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. Ommatidia that are
-        the same object share an acceptance function, so zones with equal ommatidia are prepared faster.
+    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. An object that
+        occurs several times has its acceptance function computed once; equal objects are computed separately.
     receptors: receptor types, see `optics.Eye`. Mosaics are not supported here; use `types`.
     types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). With one column, each
         ommatidium has a single receptor, as in a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7
@@ -154,7 +154,7 @@ class CompoundEye:
 
     @cached_property
     def kinds(self) -> tuple[tuple[optics.Ommatidium, ...], np.ndarray]:
-        """Distinct ommatidia, and for each direction the index of its ommatidium among them, (n,)."""
+        """Distinct objects of `ommatidium`, and for each direction the index of its ommatidium among them, (n,)."""
         if isinstance(self.ommatidium, optics.Ommatidium):
             return (self.ommatidium,), np.zeros(len(self), int)
         numbers: dict[optics.Ommatidium, int] = {}

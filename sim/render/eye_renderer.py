@@ -150,6 +150,7 @@ class EyeRenderer:
             ValueError: the number of worlds or the shape of `light` is wrong; the poses belong to another model, are
                 not finite or have not been computed yet; or the worlds differ from the model in a part that is not in
                 `varied` (see `sim.ModelRenderer`).
+            IndexError: `poses` is an empty list.
         """
         return self.launch(poses, light).wait()
 

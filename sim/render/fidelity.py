@@ -90,7 +90,10 @@ class Fidelity:
 
     @property
     def predicted_error(self) -> float | None:
-        """Error of a receptor's signal due to all stages (root mean square); None if no stage predicts one."""
+        """Error of a receptor's signal due to all stages (root mean square); None if no stage predicts one.
+
+        For the eyes' own bands, it includes the upper bound of `Level.predicted_error`.
+        """
         known = [level.predicted_error for level in self.levels if level.predicted_error is not None]
         return math.hypot(*known) if known else None
 

@@ -147,12 +147,12 @@ class Mirror:
         Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
 
         camera: name or id of a camera of the model, or a Viewpoint
-        width, height: size of the image [pixels]
+        width, height: size of the image [pixels], whole numbers
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}.
             "direct" shows only emitters behind a transparent geom; a MirrorWarning names such geoms once.
-        spp: samples per pixel
-        seed: seed of the samples
-        sampler: "independent", or "multijitter", which has less noise in images
+        spp: samples per pixel, a whole number
+        seed: seed of the samples, a whole number
+        sampler: "independent", or "multijitter", whose images have less noise
 
         Raises:
             ValueError: the camera is unknown or no plain perspective, the integrator is unknown, there is less than one

@@ -43,7 +43,9 @@ HEADLIGHT = ("active", "diffuse")
 
 @dataclass(frozen=True)
 class Poses:
-    """Positions [m], (world, element, 3), and rotations, (world, element, 3, 3), as in mjData after mj_forward.
+    """Positions [m] and directions, (world, element, 3), and rotations, (world, element, 3, 3), of elements of a model.
+
+    The values are those of mjData after mj_forward. Only the precision of the arrays is checked.
 
     geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat: positions and rotations of geoms, sites and cameras
     xpos, xmat: positions and rotations of bodies

@@ -58,12 +58,12 @@ class World(ReadOnlyArrays):
     starts: starting positions of the agent, at the centres of cells (`sim.worlds.layout.Starts`)
     object_spawn: possible positions of objects, at the centres of cells [m], (n, 2)
     goal_region: goal region in navigation and mazes, (x_min, y_min, x_max, y_max) [m]; None in other tasks
-    spectra: measured spectra of materials and lights, by name, which the renderers use instead of their colours
+    spectra: measured spectra of materials and lights, by name. Renderers use them instead of the model's colours
     alone: model of the agent without the rest of the world, with which agents near walls are simulated faster; None:
         they are simulated in the whole model
     training_starts: starting positions of the agent in training; None: `starts`
     episode_steps: number of actions after which an episode is truncated; None: the task's default
-    mazes: number of mazes, or of courses, which are arranged from south to north; 1 in other tasks
+    mazes: number of mazes or courses, which are arranged from south to north; 1 in other tasks
     medium: water or air that fills the world; None: clear air
     """
 
