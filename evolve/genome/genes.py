@@ -146,7 +146,8 @@ class Gene:
         integer gene changes by `step` and is clipped to [use.low, use.high].
 
         sigma: step size, as a fraction of the gene's range
-        normal, step: random numbers, from a standard normal distribution, and a whole number such as 1 or -1
+        normal: random number from a standard normal distribution
+        step: change of the value of an integer gene, a whole number such as 1 or -1
         """
         if self.kind == "integer":
             value = self.decode(u, use) + step

@@ -217,7 +217,7 @@ class Phenotype:
     def to_json(self) -> dict[str, Any]:
         """Return the fields by name, as values that JSON can represent, for a run's record.
 
-        The last four fields and `time_constant_ms` are omitted if they are None; all others are always present.
+        The last four fields and `time_constant_ms` are omitted if they are None. Other fields are always present.
         """
         found = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
         return {name: value for name, value in found.items() if value is not None or name not in OMITTED}

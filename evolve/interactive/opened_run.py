@@ -115,7 +115,8 @@ class OpenedRun(Run):
     def held_out(self, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None) -> Episodes:
         """Play episodes in the test set of layouts, which neither training nor selection has used.
 
-        Return the sum of rewards and the verdict of each episode, (episode,) each.
+        The result has `returns`, sums of rewards, and `verdicts` (1: solved, -1: not solved, 0: undecided), (episode,)
+        each.
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episodes

@@ -59,8 +59,8 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect:
     pixel_aspect: width of a pixel divided by its height, with which viewers display the file
 
     Raises:
-        ValueError: pixel_aspect is not positive and finite, there are no views, `views` contains something else than
-            views, two views have the same name, or JSON cannot represent an attribute.
+        ValueError: pixel_aspect is not positive and finite, there are no views, `views` contains anything other
+            than views, two views have the same name, or JSON cannot represent an attribute.
         OSError: the file cannot be written.
     """
     import OpenEXR

@@ -122,7 +122,7 @@ def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
     mounts: several mounts, or none
 
     Raises:
-        ValueError: `mounts` is a single mount, or contains something else than mounts.
+        ValueError: `mounts` is a single mount, or contains anything other than mounts.
     """
     return tuple(one for mount in items("mounts", mounts, Mount, EXAMPLE) for one in (mount, mount.mirrored()))
 

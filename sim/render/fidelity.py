@@ -92,7 +92,7 @@ class Fidelity:
     def predicted_error(self) -> float | None:
         """Error of a receptor's signal due to all stages (root mean square); None if no stage predicts one.
 
-        For the eyes' own bands, it includes the upper bound of `Level.predicted_error`.
+        It includes the error of the bands, which may be an upper bound (see `Level`).
         """
         known = [level.predicted_error for level in self.levels if level.predicted_error is not None]
         return math.hypot(*known) if known else None

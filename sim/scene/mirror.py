@@ -1,7 +1,7 @@
 """`mirror(model)`: any MuJoCo model as a spectral Mitsuba scene that follows mjData.
 
 The scene contains all geoms with their materials and textures, lights, the skybox, and cameras. Faces are visible from
-the same side as in MuJoCo, so a camera inside a body sees through its surface. A MirrorWarning lists omissions.
+the same side as in MuJoCo, so a camera inside a body sees through its surface. A MirrorWarning lists omitted features.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class Mirror:
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
-        """Return the BSDF of a geom, also outside the scene; KeyError for an unknown name, IndexError for an id."""
+        """Return the BSDF of a geom in or outside the scene. KeyError: unknown name. IndexError: unknown id."""
         index = self.model.geom(geom).id
         with in_variant(self.variant):
             return self._bsdf(index)
@@ -179,7 +179,7 @@ class Mirror:
         self._has_warned_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
-        """Return the viewpoint of a camera of the model at the last `sync`; ValueError for a camera as in `render`."""
+        """Return the viewpoint of a camera of the model at the last `sync`. Errors: see `render`."""
         return cameras.viewpoint(self.model, self._places, camera)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:

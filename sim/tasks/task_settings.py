@@ -96,6 +96,9 @@ class TaskSettings:
         """Return the number of values in an action.
 
         The default is the number of controls of the task's actuators. Most actuators have one control.
+
+        Raises:
+            KeyError: the model lacks an actuator of the task.
         """
         return len(controls_of(model, self.actuators))
 
@@ -103,7 +106,7 @@ class TaskSettings:
         """Return the mounts of the eyes of an evolving animal.
 
         The default spreads the eyes in a fan around the first of `mounts`, see `sim.fan`. A run with this default
-        needs a single mount.
+        needs a single mount and a single kind of eyes.
 
         n_eyes: number of eyes
         placement_range_deg, elevation_deg: angles that evolve [degrees], see `sim.fan`

@@ -39,7 +39,7 @@ class Course:
 
     Raises:
         ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
-            "S"; a start lies in the goal or has no suitable path to it; or an argument has another type or range. On a
+            "S"; a start lies in the goal or has no suitable path to it; or an argument has a wrong type or range. On a
             suitable path, the distance from the start never decreases by more than MOST_FALL, 1.5 m.
     """
 
@@ -124,7 +124,8 @@ class Course:
     def heading(self, cell: Cell) -> float:
         """Return the direction of the shortest path from a cell to the goal [rad], counterclockwise from east.
 
-        It is the direction to the cell LOOK_AHEAD (3) steps further on the path. In the goal it is 0.
+        It points to the cell that is 3 steps (LOOK_AHEAD) further along the path, or to the first cell of the goal. In
+        the goal, the direction is 0.
         """
         ahead = cell
         for _ in range(LOOK_AHEAD):
