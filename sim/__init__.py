@@ -16,7 +16,7 @@ choose_model_fidelity               rendering accuracy for eyes on a model
 Task                                a user task for a robot with eyes, written for one world at a time
 BatchTask                           a user task written for arrays of all worlds, which runs faster
 check_batch_task                    test whether a batch task follows the protocol of BatchTask
-Outcome, RewardTerms                return values of `judge` in a batch task
+Outcome, RewardTerms                return value of `judge` in a batch task, and the terms of its reward
 Physics                             protocol of the physics of a batch of worlds
 ArrayWorlds, SlidingAgents          two implementations of Physics: for any MuJoCo model, and for the built-in agent
 Encounter, Frozen                   several animals in one world that see each other

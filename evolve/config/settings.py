@@ -125,7 +125,10 @@ class WorldConfig:
 
 @dataclass(frozen=True)
 class SearchConfig:
-    """Settings of the search, such as optimizer and population. `evolve config schema` describes each field."""
+    """Settings of the search, such as optimizer and population. `RunConfig` checks the values.
+
+    `evolve config schema` describes each field.
+    """
 
     population: int = setting(16, Interval(2, 10_000), "candidates per generation")
     generations: int = setting(50, Interval(1, 100_000), "generations")
@@ -154,7 +157,10 @@ class SearchConfig:
 
 @dataclass(frozen=True)
 class LearningConfig:
-    """Settings of the training of each candidate by PPO. `evolve config schema` describes each field."""
+    """Settings of the training of each candidate by PPO. `RunConfig` checks the values.
+
+    `evolve config schema` describes each field.
+    """
 
     total_steps: int = setting(1_000_000, Interval(1, 10**10), "number of agent steps in a training run")
     n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated in parallel")
@@ -228,7 +234,10 @@ DIRECT = WiringConfig()  # each receptor is an input of its eye's own encoder
 
 @dataclass(frozen=True)
 class EvaluationConfig:
-    """Settings of the evaluation of fitness. `evolve config schema` describes each field."""
+    """Settings of the evaluation of fitness. `RunConfig` checks the values.
+
+    `evolve config schema` describes each field.
+    """
 
     episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the task fitness")
 

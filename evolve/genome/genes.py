@@ -62,10 +62,10 @@ LAMBDA_MAX: Mapping[str, float] = {f"lambda_max_{i}_nm": peak for i, peak in enu
 
 @dataclass(frozen=True)
 class GeneConfig:
-    """Use of one gene in a run. Values are in the unit of the gene.
+    """Use of one gene in a run. Values are in the unit of the gene, and `RunConfig` checks them.
 
-    The search varies an open gene within [low, high], beginning at `start`. A frozen gene (`open` is False) has the
-    value `start`.
+    The search varies an open gene within [low, high], beginning at `start`; `low` must be below `high`. A frozen gene
+    (`open` is False) has the value `start`.
 
     opens_at: first generation in which the search varies the gene; before it, the gene has the value `start`
     """
@@ -97,6 +97,7 @@ def highest(name: str, uses: Mapping[str, GeneConfig]) -> float:
 class Gene:
     """One gene, a quantity that evolution can change.
 
+    name: name of the gene in settings, tables and records
     cluster: one of CLUSTERS
     kind: "real" or "integer"
     range: valid values in any run
@@ -119,8 +120,9 @@ class Gene:
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Return the gene's value at the coordinate u in [0, 1]. Values of an integer gene occupy equal intervals.
+        """Return the gene's value at a coordinate. Values of an integer gene occupy equal intervals.
 
+        u: coordinate in [0, 1], which is not checked
         use: use of the gene in a run; the coordinates 0 and 1 correspond to `use.low` and `use.high`
         """
         if self.kind == "real":
@@ -128,7 +130,11 @@ class Gene:
         return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)
 
     def encode(self, value: float, use: GeneConfig) -> float:
-        """Return the coordinate u of a value, the inverse of `decode`; for an integer, the middle of its interval."""
+        """Return the coordinate u of a value, the inverse of `decode`; for an integer, the middle of its interval.
+
+        Raises:
+            ZeroDivisionError: the gene is real, and `use.low` equals `use.high`.
+        """
         if self.kind == "real":
             return (value - use.low) / (use.high - use.low)
         return (value - use.low + 0.5) / (use.high - use.low + 1)
@@ -136,8 +142,12 @@ class Gene:
     def mutated(self, u: float, sigma: float, normal: float, step: int, use: GeneConfig) -> float:
         """Return the coordinate u after one mutation.
 
-        The coordinate of a real gene changes by `normal` times sigma and is reflected at 0 and 1. The value of an
-        integer gene changes by `step` and is clipped to [low, high].
+        The coordinate of a real gene changes by `normal` times `sigma` and is reflected at 0 and 1. The value of an
+        integer gene changes by `step` and is clipped to [use.low, use.high].
+
+        sigma: step size, as a fraction of the gene's range
+        normal: random number from a standard normal distribution
+        step: change of the value of an integer gene, a whole number such as 1 or -1
         """
         if self.kind == "integer":
             value = self.decode(u, use) + step

@@ -48,16 +48,16 @@ class Genotype:
         return tuple(sorted({self.uses[gene.name].opens_at for gene in self.open_genes}))
 
     def varied(self, generation: int) -> NDArray[np.intp]:
-        """Return the genome indices of the genes that the search varies in a generation."""
+        """Return the genome indices of the genes that the search varies in a generation, (k,), in ascending order."""
         return np.array([i for i, g in enumerate(self.open_genes) if self.uses[g.name].opens_at <= generation], np.intp)
 
     def decode(self, genome: NDArray[np.float64]) -> dict[str, float]:
-        """Return the values of all genes by name, both open and frozen. Coordinates outside [0, 1] are clipped.
+        """Return the values of all genes by name, both open and frozen.
 
-        genome: coordinates, (dimension,)
+        genome: coordinates of the open genes, (dimension,); coordinates outside [0, 1] are clipped
 
         Raises:
-            ValueError: the length of `genome` is not `dimension`, a coordinate is not finite, or the coordinates are in
+            ValueError: the length of `genome` is not `dimension`, or the coordinates are not finite numbers, or are in
                 half precision.
         """
         genome = np.asarray(full_precision("genome", genome), dtype=np.float64)
@@ -69,7 +69,7 @@ class Genotype:
         return values
 
     def count(self, steps: int) -> float:
-        """Return the number of genotypes if a real gene has `steps` distinct values."""
+        """Return the number of genotypes if each open real gene has `steps` distinct values."""
         sizes = [
             self.uses[g.name].high - self.uses[g.name].low + 1 if g.kind == "integer" else steps
             for g in self.open_genes

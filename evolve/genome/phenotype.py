@@ -51,12 +51,13 @@ class Phenotype:
     fov_deg: an eye's horizontal field of view [deg]
     resolution: numbers of receptors or ommatidia along the height and along the width of an eye
     relative_aperture: pupil diameter / retina width
-    relief: N x N heights in [0, 1] of the maximum `eye.relief_height`, row-major (y, x). For N = 4 they are control
+    relief: N x N heights as fractions of `eye.relief_height`, in [0, 1], row-major (y, x). For N = 4 they are control
         points of a bicubic B-spline patch; for larger N they are heights at cell centres that a cubic spline
         interpolates
     refractive_index: index of the relief's material at 588 nm
     memory_frames: number of frames that the brain sees
-    neurons, layers: neurons in each hidden layer, and number of hidden layers, of actor and critic
+    neurons: number of neurons in each hidden layer of actor and critic
+    layers: number of hidden layers of actor and critic
     aperture_shape: index into APERTURE_SHAPES
     dispersion: 1 / Abbe number of the relief's material; 0: no dispersion
     lambda_max_nm: wavelengths at which the pigments of the receptor types absorb most [nm]; None: the setting
@@ -71,7 +72,9 @@ class Phenotype:
     acute_zone: density of ommatidia in the middle of a compound eye / mean density
 
     If eyes have a perfect lens or are compound eyes, `relative_aperture`, `relief` and `refractive_index` are None. The
-    last four fields are None for camera eyes. If they or `time_constant_ms` are None, records omit them.
+    last four fields are None for camera eyes.
+
+    Methods raise a ValueError if a field is outside the range that `optics` or `sim` allows.
     """
 
     n_eyes: int
@@ -100,7 +103,7 @@ class Phenotype:
     def ommatidium(self, eye: EyeConfig) -> optics.Ommatidium | None:
         """Return the ommatidium of compound eyes, whose facet is a lens with a curved front; None for camera eyes.
 
-        eye: settings of the eyes of a run, here and in the other methods
+        eye: settings of the eyes of a run; the other methods have the same argument
         """
         import optics
 
@@ -125,7 +128,7 @@ class Phenotype:
         )
 
     def dynamics(self, eye: EyeConfig) -> optics.ReceptorDynamics | None:
-        """Return the temporal properties of the receptors; None for receptors without memory."""
+        """Return the properties of the receptors in time; None for receptors without memory."""
         import optics
 
         if self.time_constant_ms is None:
@@ -214,7 +217,7 @@ class Phenotype:
     def to_json(self) -> dict[str, Any]:
         """Return the fields by name, as values that JSON can represent, for a run's record.
 
-        The last four fields and `time_constant_ms` are omitted if they are None.
+        The last four fields and `time_constant_ms` are omitted if they are None. Other fields are always present.
         """
         found = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
         return {name: value for name, value in found.items() if value is not None or name not in OMITTED}
@@ -239,7 +242,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
     config: settings of the run, such as a `RunConfig`
 
     Raises:
-        ValueError: the number of coordinates differs from the number of open genes, or a coordinate is not finite.
+        ValueError: the coordinates are not finite numbers, one for each open gene, or are in half precision.
     """
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics and not config.eye.compound

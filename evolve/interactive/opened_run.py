@@ -81,7 +81,7 @@ class OpenedRun(Run):
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate with the highest fitness, or the earliest of several; None before a candidate has succeeded."""
+        """Candidate with the highest fitness, the earliest if several have it; None before one has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 
@@ -101,7 +101,8 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ValueError: the eyes that the task places differ from those of the candidate.
+            ValueError: `task` is no `sim.Task`, has no mounts or several kinds of eyes, or its `place` fails or returns
+                another number of mounts.
             OSError: the policy's file cannot be read.
         """
         from evolve.episodes.recorder import trained_policy
@@ -112,7 +113,10 @@ class OpenedRun(Run):
         return Frozen(with_phenotype(task, candidate.phenotype, self.config), trained_policy(self, candidate))
 
     def held_out(self, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None) -> Episodes:
-        """Return evaluation episodes in the test set of layouts, which neither training nor selection has used.
+        """Play episodes in the test set of layouts, which neither training nor selection has used.
+
+        The result has `returns`, sums of rewards, and `verdicts` (1: solved, -1: not solved, 0: undecided), (episode,)
+        each.
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episodes
@@ -122,7 +126,7 @@ class OpenedRun(Run):
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ConfigError: the run has no test set, or the user task was not named when the run was opened, or fails.
             ValueError: `episodes` is below 1, or `seed` is negative.
-            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: the policy's file cannot be read.
         """
         from evolve.episodes.held_out import held_out_episodes
@@ -130,7 +134,9 @@ class OpenedRun(Run):
         return held_out_episodes(self, candidate_id, seed, episodes)
 
     def resume(self, callbacks: Sequence[Callback] = (), progress: bool = True) -> None:
-        """Continue an interrupted run to its end. A finished run stays unchanged. See `evolve.run` for the arguments.
+        """Continue an interrupted run to its end. A finished run stays unchanged.
+
+        callbacks, progress: see `evolve.run`
 
         Raises:
             LockedError: another process is working on the run.
@@ -138,7 +144,7 @@ class OpenedRun(Run):
                 format is too old, or the search proposes candidates that differ from those on record.
             ConfigError: the user task was not named when the run was opened, or fails at its start; or callbacks are
                 not functions.
-            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             ExecutorError: no worker can evaluate candidates.
             OSError: a file of the run cannot be read or written.
         """
@@ -148,9 +154,10 @@ class OpenedRun(Run):
                 watchers.carry_on(self)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a table with one row per candidate: its outcome, its acuities, and the values of its genes.
+        """Return a table with one row per candidate, indexed by its id: outcome, acuities and values of genes.
 
-        For a failed candidate, fitness, task fitness and costs are NaN, and `failure` contains the reason.
+        Acuities are in cycles/degree. Genes that an animal lacks are NaN. For a failed candidate, fitness, task fitness
+        and costs are NaN, and `failure` contains the reason.
         """
         return candidate_table(self.candidates)
 
@@ -197,10 +204,12 @@ class OpenedRun(Run):
     def report(self) -> Path:
         """Write the report, which is one HTML page, and return its path.
 
+        Without a successful candidate, the page has no episode.
+
         Raises:
             RunError: the best candidate's policy is missing or damaged.
             ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
-            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """
         from evolve.report.write import write
@@ -223,7 +232,8 @@ class OpenedRun(Run):
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
-        every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8
+        every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8. A number
+            requires "rrd" in `also`
         also: formats of additional files next to the page: "rrd" (a recording for Rerun), "gif" and "mp4"
         out: path of the page; None: a name in the run directory
         mode: "evaluation", or "test" for the layouts of the test set
@@ -233,7 +243,7 @@ class OpenedRun(Run):
             ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set,
                 or the user task was not named when the run was opened, or fails.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
-            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """
         from evolve.report.replay import write_replay
@@ -249,14 +259,14 @@ class OpenedRun(Run):
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
-        every: number of actions from one recorded moment to the next
+        every: number of actions from one file to the next, 1 to 1,000,000
         out: folder of the files; None: `exr` in the run directory
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ConfigError: an argument is invalid, or the user task was not named when the run was opened, or fails.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
-            BackendError: Dr.Jit finds no usable LLVM library or GPU.
+            optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """
         from evolve.report.exr_export import export_run

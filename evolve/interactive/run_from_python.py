@@ -39,10 +39,12 @@ def run(
     task: task for which eyes evolve: a name, or "FILE.py:CLASS" of a user task; None: the task that the preset or the
         settings name
     preset: settings to start from: "quick" (minutes), "paper" (a day), or an experiment
-    settings: settings by dotted name, such as {"search.generations": 2, "seed": 1}; they override all other settings
-    config: TOML file with settings, which override those of the preset
-    scale: scale of an experiment: "laptop" or "paper"; None: "laptop"
-    start_from: "RUN:ID" of an animal of another run, whose genes are the start values; None: the default values
+    settings: settings by dotted name, such as {"search.generations": 2, "seed": 1}; they override all other settings.
+        Values are numbers, texts, True or False. None: no such settings
+    config: path of a TOML file with settings, which override those of the preset; None: no file
+    scale: scale of an experiment, "laptop" or "paper"; None: "laptop". Other presets accept None only
+    start_from: "RUN:ID" of an animal of another run, or "RUN" for its best animal, whose genes are the start values;
+        None: the default values
     out: run directory; None: runs/TASK-PRESET-N, with the first free number N
     callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
         the run
@@ -50,10 +52,11 @@ def run(
 
     Raises:
         ConfigError: a setting or an argument is invalid, or the user task fails; the message is one line.
-        RunError: the directory is not empty or cannot be written, or the animal of `start_from` does not exist.
-        LockedError: another process is creating a run in the directory.
-        BackendError: Dr.Jit finds no usable LLVM library or GPU.
-        ExecutorError: no worker can evaluate candidates.
+        RunError: the directory is not empty or cannot be written, the animal of `start_from` does not exist, or the
+            record of its run is damaged.
+        LockedError: another process is creating a run in the directory; see `evolve.store.lock`.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        ExecutorError: no worker can evaluate candidates; see `evolve.search.job`.
         OSError: a file of the run cannot be read or written.
     """
     _check(task=task, preset=preset, settings=settings, config=config, scale=scale, start_from=start_from, out=out)
@@ -90,10 +93,10 @@ def resume(
             fails; the message is one line.
         RunError: the run does not exist, its format is too old, its record is damaged or cannot be written, or the
             search proposes candidates that differ from those on record.
-        LockedError: another process is working on the run.
-        BackendError: Dr.Jit finds no usable LLVM library or GPU.
-        ExecutorError: no worker can evaluate candidates.
-        OSError: a file of the run cannot be read.
+        LockedError: another process is working on the run; see `evolve.store.lock`.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        ExecutorError: no worker can evaluate candidates; see `evolve.search.job`.
+        OSError: a file of the run cannot be read or written.
     """
     _check(directory=directory, task=task)
     opened = OpenedRun.open(directory, task, before_damage)

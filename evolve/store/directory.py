@@ -61,7 +61,7 @@ class Run:
 
         Raises:
             RunError: the directory is not empty, or cannot be written.
-            LockedError: another process is creating a run there.
+            LockedError: another process is creating a run there, or the lock cannot be written.
         """
         path = Path(path)
         try:
@@ -143,7 +143,7 @@ class Run:
         """Return the lock of this run, a context manager. A process must hold it to write to the run.
 
         Raises:
-            LockedError: on entry into the context, another process holds the lock.
+            LockedError: on entry into the context, another process holds the lock, or the lock cannot be written.
         """
         self._lock = RunLock(self.path)
         return self._lock
@@ -193,7 +193,7 @@ class Run:
         return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
-        """Remove the checkpoints of candidates whose training will not continue."""
+        """Remove the checkpoints of candidates whose training will not continue; OSError if that is impossible."""
         for candidate_id in candidate_ids:
             for path in (self.path / TRAININGS).glob(f"{candidate_id:06d}-*.safetensors"):
                 path.unlink(missing_ok=True)
@@ -220,7 +220,7 @@ class Run:
 
     @property
     def best(self) -> Candidate | None:
-        """Candidate with the highest fitness, or the earliest of several; None before a candidate has succeeded."""
+        """Candidate with the highest fitness, the earliest if several have it; None before one has succeeded."""
         done = [candidate for candidate in self.candidates if candidate.failure is None]
         return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
 
@@ -240,7 +240,7 @@ class Run:
         raise RunError(f"{self.path}: there is no candidate {candidate_id}; {len(self.candidates)} have been evaluated")
 
     def generation(self, number: int) -> list[Candidate]:
-        """Return the evaluated candidates of one generation, in the order of their ids."""
+        """Return the evaluated candidates of one generation, in the order of their ids; [] if there are none."""
         ids = generation_ids(number, self.config.search.population)
         first, end = (bisect_left(self.candidates, one, key=lambda c: c.id) for one in (ids.start, ids.stop))
         return list(self.candidates[first:end])

@@ -82,7 +82,7 @@ def make_vec_env(
         Arrays then have one row for each animal of each world.
     eyes: the agent's eyes: one `sim.Eyes`, or several kinds of eyes by name; None: the default, `sim.Eyes()`
     n_envs: number of worlds, 1 to 1,000,000
-    seed: seed of episodes and noise; None: a random seed
+    seed: seed of episodes and noise, a whole number of at least 0; None: a random seed
     memory: number of frames in an observation, 1 to 1,000,000
     mode: "training", "evaluation" or "test". In evaluation of a built-in task, objects that the agent reached reappear
         elsewhere, and reward terms have the weights of the fitness. "test" is an evaluation for final results. It
@@ -94,8 +94,8 @@ def make_vec_env(
     fidelity: a complete `sim.Fidelity` instead of rays_per_receptor, or "auto", which has the same meaning as
         rays_per_receptor="auto". A `sim.Fidelity` may also be passed as rays_per_receptor.
     world_seed, mazes, course, layouts, wall_height: the layout that all worlds share, see `sim.build_world`
-    least_return: in training, an episode is truncated once its rewards sum to this value or less; None: never
-    episode_steps: number of actions after which an episode is truncated; None: the task's default
+    least_return: in training, an episode is truncated once its rewards sum to this value or less, below 0; None: never
+    episode_steps: number of actions after which an episode is truncated, 1 or more; None: the task's default
     spectra: spectra of materials and lights by name, used instead of their colours: see `sim.build_world`
     medium: water or air between surfaces and eyes: see `sim.build_world`
     vary: ranges of quantities that are drawn for each episode, see docs/tasks.md. With {"light": (low, high)}, each
@@ -110,9 +110,11 @@ def make_vec_env(
     model that are not rendered.
 
     Raises:
-        ValueError: an argument is invalid.
+        ValueError: an argument is invalid, or has no effect for this task.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
-        RuntimeError: a method of a user task fails at the start of the first episode.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        RuntimeError: a method of a `sim.Task` fails at the start of the first episode. An exception of a
+            `sim.BatchTask` is raised unchanged.
     """
     if episode_steps is not None:
         _require_whole("episode_steps", episode_steps, 1)
@@ -144,15 +146,16 @@ def make_parallel_env(
 ) -> EncounterEnv:
     """Return a PettingZoo parallel environment of several animals in one world; see `sim.Encounter`.
 
-    seed: seed of episodes and noise, until `reset` receives one; None: a random seed
-    memory: number of frames in an observation
+    seed: seed of episodes and noise, a whole number of at least 0, until `reset` receives one; None: a random seed
+    memory: number of frames in an observation, 1 to 1,000,000
     render_mode: "rgb_array": the model with all animals' eyes; "eyes": the signals of their eyes, one image for each
-        animal
+        animal; None: no images
 
     Raises:
-        ValueError: an argument is invalid.
+        ValueError: an argument is invalid, or two animals drive the same actuator.
         ImportError: PettingZoo is not installed.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
         RuntimeError: a method of a user task fails at the start of the first episode.
     """
     if not isinstance(encounter, Encounter):

@@ -17,7 +17,7 @@ SEED = 0
 def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     """Play random actions in a few worlds, and compare the task's behaviour with the description of `sim.BatchTask`.
 
-    Gymnasium's `check_env` does the same for environments.
+    Nothing is rendered. Gymnasium's `check_env` does the same for environments.
 
     n_envs: number of worlds, at least 2
     steps: number of actions
@@ -33,9 +33,11 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     - After a stored state has been restored, the same actions have the same results.
 
     Raises:
-        ValueError: the task does not behave as described. The message states the method, the array, the world, and the
-            correct behaviour.
-        RuntimeError: a method of the task fails.
+        ValueError: the task does not behave as described, is no `sim.BatchTask`, or `n_envs` is below 2. The message
+            states the method, the array, the world, and the correct behaviour.
+        RuntimeError: the task changes the model of all worlds, or the model enables MuJoCo's "sleep".
+
+    An exception in a method of the task is raised unchanged.
     """
     if not isinstance(task, BatchTask):
         raise ValueError(f"task = {task!r:.80}: must be a sim.BatchTask")

@@ -28,7 +28,9 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     Raises:
         ValueError: an argument is invalid, or is `seed` or `n_envs`.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
-        RuntimeError: a method of a user task fails at the start of the first episode.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        RuntimeError: a method of a `sim.Task` fails at the start of the first episode. An exception of a
+            `sim.BatchTask` is raised unchanged.
     """
 
     metadata = {"render_modes": [*RENDER_MODES], "render_fps": 5}  # noqa: RUF012 (Gymnasium's own declaration)
@@ -66,7 +68,8 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
         Raises:
             ValueError: the seed is neither a whole number of at least 0 nor None, or `options` are given.
-            RuntimeError: `close` has been called, or a method of a user task fails.
+            RuntimeError: `close` has been called, or a method of a `sim.Task` fails. An exception of a `sim.BatchTask`
+                is raised unchanged.
         """
         seed = seed_of("seed", seed)
         super().reset(seed=seed)
@@ -80,8 +83,12 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Take one action; return observation, reward, terminated, truncated and `info`.
 
+        If a method of a `sim.Task` fails, the episode ends, and info["failure"] is the reason. An exception of a
+        `sim.BatchTask` is raised unchanged.
+
         Raises:
-            ValueError: the action is not real, finite numbers of the right shape, or it is masked.
+            ValueError: the action is not real, finite numbers of the right shape, or it is masked; or a `sim.BatchTask`
+                returns an invalid array.
             RuntimeError: there has been no reset yet, or `close` has been called.
         """
         observation, reward, terminated, truncated, info = self._batch.step_once(action)
@@ -92,7 +99,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         """Return an image (y, x, 3) uint8 as set by `render_mode`; None without a mode.
 
         Raises:
-            RuntimeError: there has been no reset yet.
+            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
         """
         return None if self.render_mode is None else self._batch.get_images()[0]
 

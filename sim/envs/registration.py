@@ -30,13 +30,14 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
 
     An existing registration of the id is replaced.
 
-    id_: id, such as "FindBall-v0"
+    id_: id of the form "NAME-vN" or "NAMESPACE/NAME-vN", such as "FindBall-v0"
     task: the task, or its class; its `episode_steps` is the length of episodes, unless `gymnasium.make` receives
         `max_episode_steps`
-    options: arguments of `sim.make_vec_env`, such as memory
+    options: arguments of `sim.make_vec_env`, such as memory. They are checked when an environment is made
 
     Raises:
-        ValueError: `task` is not a task, or its `episode_steps` is invalid.
+        ValueError: `task` is no `sim.Task`, or its `episode_steps` is invalid.
+        Error: the id has an invalid form. The class is `gymnasium.error.Error`.
     """
     from optics.numerics.arguments import whole
     from sim.tasks.task import Task

@@ -208,7 +208,7 @@ class EyesVecEnv(OneEnvironment):
         """Return images (y, x, 3) uint8 of every world, as set by `render_mode`; an empty list without a mode.
 
         Raises:
-            RuntimeError: there has been no reset yet.
+            RuntimeError: there has been no reset yet, `close` has been called, or an action is pending.
         """
         self._calls.require_begun()
         return self._pictures.taken()

@@ -59,8 +59,8 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect:
     pixel_aspect: width of a pixel divided by its height, with which viewers display the file
 
     Raises:
-        ValueError: pixel_aspect is not positive, there are no views, two views have the same name, or JSON cannot
-            represent an attribute.
+        ValueError: pixel_aspect is not positive and finite, there are no views, `views` contains anything other
+            than views, two views have the same name, or JSON cannot represent an attribute.
         OSError: the file cannot be written.
     """
     import OpenEXR
@@ -101,8 +101,9 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can state any size
 
     Raises:
-        ExrError: the file is truncated, damaged, altered, too large, or has no spectral channels.
-        FileNotFoundError: the file does not exist.
+        ExrError: the file cannot be read, is truncated, damaged, altered or too large, or has no spectral channels.
+            ExrError is a subclass of ValueError.
+        FileNotFoundError: the file does not exist, or is a folder.
     """
     import OpenEXR
 

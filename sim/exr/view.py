@@ -21,11 +21,11 @@ class View:
     name: name of the eye, such as "left"
     wavelengths_nm: wavelengths of the bands of radiance and reflectance [nm], (band,)
     radiance: spectral radiance, (band, y, x) float32, or None. A white Lambertian surface that faces daylight has the
-        radiance of CIE D65, 1 at 560 nm.
-    receptors: signals of receptors, (channel, y, x) float32, or None
+        radiance of CIE D65, which is 1 at 560 nm.
+    receptors: signals of receptors, (channel, y, x) float32, or None; y and x may differ from those of the radiance
     rgb: linear sRGB preview of the radiance, or of the reflectance in daylight, (y, x, 3) float32; None: `write_exr`
-        computes it
-    attributes: further values that JSON can represent, such as seed, time step or position
+        computes it. Without radiance and reflectance, it is ignored
+    attributes: further values by name that JSON can represent, such as seed, time step or position
     peaks_nm: peak wavelength of each receptor channel [nm], (channel,); the preview shows the channel with the longest
         peak as red. None: channels are in descending order of their peaks.
     reflectance: reflectance or transmittance, (band, y, x) float32, or None
@@ -34,7 +34,8 @@ class View:
 
     Raises:
         ValueError: the name is empty or not printable; there is no radiance, reflectance or receptors; an array has the
-            wrong shape or half precision; or wavelengths are not finite, not distinct, or not in nanometres.
+            wrong shape or half precision; or wavelengths or peaks are not finite, not in nanometres, or not one for
+            each band or channel. The wavelengths must also be distinct.
     """
 
     name: str
@@ -51,11 +52,11 @@ class View:
     def from_ommatidia(cls, name: str, eye: CompoundEye, frame: np.ndarray, **others: Any) -> View:
         """Return the view of a compound eye: signals and direction of each ommatidium, as a single row of pixels.
 
-        frame: signals of one mount, (ommatidium, channel), as in an observation
-        others: further fields of the view
+        frame: signals of one mount at one moment, (ommatidium, channel), as in an observation
+        others: further fields of the view, except for `receptors`, `peaks_nm` and `directions`
 
         Raises:
-            ValueError: the frame has another shape.
+            ValueError: the frame has another shape, or a field of the view is invalid.
         """
         if _shape(frame) != (len(eye), eye.channels):
             raise ValueError(
@@ -99,7 +100,7 @@ class View:
 
     @property
     def spectral(self) -> np.ndarray | None:
-        """The radiance if there is any, otherwise the reflectance."""
+        """The radiance if there is any, otherwise the reflectance; None without both."""
         return self.reflectance if self.radiance is None else self.radiance
 
 

@@ -35,8 +35,8 @@ class CompoundEye:
     directions: viewing directions in the frame of the mount: unit vectors (ahead, left, up), (n, 3), or (azimuth to the
         left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The field is always
         converted to unit vectors.
-    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. Ommatidia that are
-        the same object share an acceptance function, so zones with equal ommatidia are prepared faster.
+    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. An object that
+        occurs several times has its acceptance function computed once; equal objects are computed separately.
     receptors: receptor types, see `optics.Eye`. Mosaics are not supported here; use `types`.
     types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). With one column, each
         ommatidium has a single receptor, as in a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7
@@ -49,6 +49,7 @@ class CompoundEye:
         `optics.Eye`, (memory, eye, channel, row, column). None: the directions are in no order
     radius: radius [m] of the eye's surface, a sphere around the mount on which the facets lie. Facets must not overlap.
         None: all facets are at the mount, and may overlap
+    spectral_bands: attribute, the bands and the weights of the receptor types in them (`optics.SpectralBands`)
 
     Raises:
         ValueError: an argument is invalid, there are no ommatidia or more than 1,000,000, their number is no multiple
@@ -113,9 +114,9 @@ class CompoundEye:
         return replace(self, directions=both, ommatidium=each, types=types, rows=None)
 
     def directions_on(self, mounts: Sequence[Mount]) -> np.ndarray:
-        """Return the viewing directions of eyes on these mounts, unit vectors (ommatidia of all mounts, 3).
+        """Return the viewing directions of eyes on one or more mounts, unit vectors (ommatidia of all mounts, 3).
 
-        Their components are (ahead, left, up) of the object that carries the mounts.
+        Their components are (ahead, left, up) in the frame of the object that carries the mounts.
         """
         ahead, left, up = self.directions.T
         in_eye = np.stack([-left, up, ahead], axis=-1)
@@ -153,7 +154,7 @@ class CompoundEye:
 
     @cached_property
     def kinds(self) -> tuple[tuple[optics.Ommatidium, ...], np.ndarray]:
-        """Distinct ommatidia, and for each direction the index of its ommatidium among them, (n,)."""
+        """Distinct objects of `ommatidium`, and for each direction the index of its ommatidium among them, (n,)."""
         if isinstance(self.ommatidium, optics.Ommatidium):
             return (self.ommatidium,), np.zeros(len(self), int)
         numbers: dict[optics.Ommatidium, int] = {}
@@ -161,7 +162,15 @@ class CompoundEye:
         return tuple(numbers), np.array(index)
 
     def acceptance(self, kind: int) -> AcceptanceFunction:
-        """Return the acceptance function of the ommatidium with this index in `kinds`, for the eye's bands."""
+        """Return the acceptance function of the ommatidium with this index in `kinds`, for the eye's bands.
+
+        The properties `solid_angles`, `white` and `photons` raise the same errors, except for the IndexError.
+
+        Raises:
+            IndexError: there is no ommatidium with this index.
+            ValueError: the rhabdom guides no light in a band.
+            optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        """
         return acceptance_function(self.kinds[0][kind], self.spectral_bands.wavelengths)
 
     @cached_property
@@ -202,7 +211,7 @@ class CompoundEye:
         return None if self.photons is None else self.photons.reshape(-1, *self.resolution)
 
     def as_frames(self, signals: np.ndarray) -> np.ndarray:
-        """Return signals (..., eye, channel, row, column) as (..., ommatidia of all eyes, channel)."""
+        """Return signals (..., eye, channel, row, column) in the form (..., ommatidia of all eyes, channel)."""
         frames = np.swapaxes(signals.reshape(*signals.shape[:-2], -1), -1, -2)
         return np.ascontiguousarray(frames.reshape(*frames.shape[:-3], -1, frames.shape[-1]))
 

@@ -53,12 +53,9 @@ class Eyes:
     waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; this requires
         `optics`. None: each receptor receives all light that falls on its square.
     pupil_turned: True if the pupils are rotated by 180° about their axes
-    vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170], which determines the height of the
-        receptors. None: receptors are square.
-    dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: receptors
-        without memory
-    density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: all receptors have
-        the same size
+    vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170]. None: receptors are square
+    dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: no memory
+    density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: it is uniform
     ommatidium: an optics.Ommatidium: the eyes are compound eyes. `resolution` is then the number of rows and of
         ommatidia in a row of `sim.hexagonal_rows`; fov_deg / width is the angle between neighbours. Compound eyes
         have neither optics, waveguide, vertical_fov_deg, dynamics nor density, and ignore sensor_width. None: the eyes
@@ -145,7 +142,11 @@ class Eyes:
                 raise ValueError(f"Eyes: {name} = {value}: must be None for compound eyes, which have an ommatidium")
 
     def eye(self) -> WorldEye:
-        """Return one eye: its optics and retina, or a compound eye."""
+        """Return one eye: an `optics.Eye`, or a `sim.CompoundEye`.
+
+        Raises:
+            ValueError: `noise_sigma` is above 1e6, or `sensor_width` is outside [1e-15, 1e15] m.
+        """
         from optics import Eye
 
         if self.ommatidium is not None:
@@ -179,7 +180,8 @@ class Eyes:
     def with_perfect_lens(self) -> Eyes:
         """Return camera eyes behind a perfect lens, with the same receptors and fields of view.
 
-        A vertical field of view above 170 degrees raises a ValueError.
+        Raises:
+            ValueError: the vertical field of view is above 170 degrees.
         """
         vertical = self.vertical_fov_deg if self.ommatidium is None else self.fovy_deg
         camera = replace(self, ommatidium=None, acute_zone=1.0, vertical_fov_deg=vertical)
@@ -211,8 +213,7 @@ class Eyes:
     def azimuths(self) -> np.ndarray:
         """Return the azimuth of each optical axis [rad], (n_eyes,), from left (+) to right (-).
 
-        The axes are spaced evenly over the placement range: three eyes over a range of 90° look to 45°, 0° and
-        -45°. A single eye looks ahead.
+        Axes are spaced evenly: three eyes over a range of 90° look to 45°, 0° and -45°. A single eye looks ahead.
         """
         if self.n_eyes == 1:
             return np.zeros(1)
@@ -222,7 +223,7 @@ class Eyes:
     def column_azimuths(self) -> np.ndarray:
         """Return the azimuth of each column of receptors relative to the eye's axis [rad], (width,), left is positive.
 
-        A `density` is ignored. In a compound eye, rows are shifted to either side by a quarter of the columns' spacing.
+        The result ignores `density` and, in a compound eye, the shift of its rows by a quarter of the columns' spacing.
         """
         columns = self.resolution[1]
         if self.ommatidium is not None:
@@ -242,7 +243,7 @@ class Eyes:
 
     @property
     def fovy_deg(self) -> float:
-        """Vertical field of view of one eye [deg]: `vertical_fov_deg`, or that of square receptors or of ommatidia."""
+        """Vertical field of view of one eye [deg], also if `vertical_fov_deg` is None."""
         if self.ommatidium is not None:
             return lattice_fovy_deg(*self.resolution, self.fov_deg)
         if self.vertical_fov_deg is not None:

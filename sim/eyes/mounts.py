@@ -81,12 +81,15 @@ class Mount:
         raise ValueError(f"Mount: no {what} {self.on!r} in the model{did_you_mean(self.on, names)}")
 
     def local(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the position of the pupil [m] (3,) and the eye's frame (3, 3).
+        """Return the position of the pupil [m], (3,), and the eye's frame, (3, 3).
 
         Both are given in the frame of the object that carries the eye. The columns of the eye's frame are (right, up,
         ahead).
 
         kind: kind of the object, "site", "camera" or "body"
+
+        Raises:
+            KeyError: the kind is unknown.
         """
         ahead, left, up = _AXES[kind]
         azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
@@ -116,16 +119,19 @@ def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
 def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
     """Return each mount followed by its mirror image on the other side of the body.
 
+    mounts: several mounts, or none
+
     Raises:
-        ValueError: `mounts` does not contain only mounts.
+        ValueError: `mounts` is a single mount, or contains anything other than mounts.
     """
     return tuple(one for mount in items("mounts", mounts, Mount, EXAMPLE) for one in (mount, mount.mirrored()))
 
 
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
-    """Return mounts in a circle around the z axis of an object, from left to right. The eyes look outwards.
+    """Return mounts in a circle around the upward axis of an object, from left to right. The eyes look outwards.
 
-    `Eyes` uses the same arrangement on the built-in agent.
+    For a body or site, this is its z axis. A single eye looks ahead. `Eyes` uses the same arrangement on the built-in
+    agent.
 
     on: name of a body, site or camera
     n_eyes: number of eyes, 1 to 10,000

@@ -78,14 +78,15 @@ def facet_frames(directions: np.ndarray) -> np.ndarray:
 def hexagonal_patch(
     rings: int, interommatidial_deg: float, azimuth_deg: float = 0.0, elevation_deg: float = 0.0
 ) -> np.ndarray:
-    """Return viewing directions in hexagonal rings around a direction, unit vectors (n, 3) of (ahead, left, up).
+    """Return viewing directions in hexagonal rings around a centre, unit vectors (ahead, left, up), (n, 3).
 
     15 rings have 721 ommatidia, about as many as an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere
     by Lambert's equal-area projection, so every ommatidium has the same solid angle.
 
     rings: number of rings around the central ommatidium, 0 to 60
-    interommatidial_deg: angle between neighbours at the centre [degrees]
-    azimuth_deg, elevation_deg: direction of the centre [degrees], to the left and upwards
+    interommatidial_deg: angle between neighbours at the centre [degrees], above 0
+    azimuth_deg: azimuth of the centre [degrees], to the left
+    elevation_deg: elevation of the centre [degrees], upwards, in [-90, 90]
 
     Raises:
         ValueError: an argument is out of range, or the lattice does not fit on a sphere.

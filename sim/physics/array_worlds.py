@@ -30,7 +30,10 @@ class ArrayWorlds(MujocoWorlds):
     time: further such array [s], (n, 1)
 
     All other arrays of mjData (`xpos`, `geom_xpos`, `site_xpos`, `sensordata`, `cvel` ...) are read-only. They are
-    stacked when they are first read after a step.
+    stacked over worlds when they are first read after a step. A name that mjData lacks raises an AttributeError.
+
+    Raises:
+        ValueError: `variation` names an object that the model lacks or that cannot vary.
     """
 
     qpos: np.ndarray

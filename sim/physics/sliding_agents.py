@@ -26,14 +26,15 @@ UNSTABLE = "unstable physics"
 class SlidingAgents:
     """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
 
-    `sim.Physics` describes the methods that are not described here.
+    `sim.Physics` describes the methods that have no description in this class. Methods that need the state raise a
+    RuntimeError before the first call of `place`.
 
     world: layout, model and starting positions
     n: number of worlds
     threads: number of threads that may step them
     variation: ranges of quantities that differ between episodes; None: there are none
     before, state: attributes, all worlds before and after the last action
-    motion: attribute, motion of the agents during that action; None before the first
+    motion: attribute, motion of the agents during the last action; None before the first action
     chance: attribute, random streams of the worlds
 
     Raises:
@@ -64,7 +65,7 @@ class SlidingAgents:
         """Current state of all worlds.
 
         Raises:
-            RuntimeError: the worlds have not been reset yet.
+            RuntimeError: `place` has not been called yet.
         """
         if self._state is None:
             raise RuntimeError("the worlds have not begun: call reset first")
@@ -83,11 +84,11 @@ class SlidingAgents:
     ) -> None:
         """Start episodes in some worlds, with these positions and headings.
 
-        worlds: indices of the worlds; the other arrays have one row for each of them
-        agents: positions of the agents, (world, 2) [m]
-        headings: headings of the agents, (world,) [rad]
-        objects: positions of the objects, (world, k, 2) [m]
-        courses: headings of the objects, (world, k) [rad]
+        worlds: indices of the worlds, (world,); the other arrays have one row for each of them
+        agents: positions (x, y) of the agents [m], (world, 2)
+        headings: headings of the agents [rad], (world,)
+        objects: positions (x, y) of the objects [m], (world, k, 2)
+        courses: headings of the objects [rad], (world, k)
         """
         n, k = len(worlds), len(self.world.objects)
         centres = np.empty((n, k, 3))
@@ -107,15 +108,21 @@ class SlidingAgents:
         self._state = fresh if n == self.n else others.put(worlds, fresh)
 
     def steer(self, actions: np.ndarray) -> None:
-        """Set the commands of forward speed and of change in heading, (n, 2) in [-1, 1], for the next step."""
+        """Set the forward speed and the change of heading in the next step, (n, 2), each as a command in [-1, 1].
+
+        Speeds range from 0 to MAX_SPEED (10 m/s). Changes range from -MAX_TURN to MAX_TURN (45°), positive to the left.
+        """
         self._command = actions
 
     def move_objects(self, objects: np.ndarray, courses: np.ndarray) -> None:
-        """Set the positions of the objects after the next step, (n, k, 3) [m], and their headings (n, k) [rad]."""
+        """Set the positions of the objects after the next step [m], (n, k, 3), and their headings [rad], (n, k).
+
+        The first `step` needs a previous call. Later steps without another call leave the objects at these positions.
+        """
         self._moved = objects, courses
 
     def put_objects(self, objects: np.ndarray) -> None:
-        """Move objects to these positions after an action, (n, k, 3) [m]."""
+        """Move the objects to these positions [m], (n, k, 3), after an action."""
         self._state = replace(self.state, objects=objects)
 
     def count(self, goals: np.ndarray, adversaries: np.ndarray) -> None:

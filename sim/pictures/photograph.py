@@ -100,20 +100,22 @@ def see_photograph(
 
     photograph: sRGB values in [0, 1], (y, x, 3), at least 8 x 8 pixels, of a camera that maps straight lines to
         straight lines.
-    animal: one of "blowfly", "dragonfly", "fruit_fly", "honeybee", "megalopta", "eagle", "goldfish", "human",
-        "jumping_spider" and "mouse".
+    animal: an animal with compound eyes, "blowfly", "dragonfly", "fruit_fly", "honeybee" or "megalopta"; or one with
+        single-lens eyes, "eagle", "goldfish", "human", "jumping_spider" or "mouse".
     width_deg: angular width of the photograph [degrees], in [0.1, 120].
     uv: fraction of ultraviolet light, in [0, 1], that a white surface reflects. A photograph does not contain this
         information. Below 400 nm, the reflectances of `srgb_basis` are multiplied by `uv`.
-    depth: distance [m] of the scene along the axis, a single number or an array (y, x). Eyes are focused at infinity,
-        so near surfaces are blurred, and they hide parts of far ones (`optics.Eye.see`). None: infinity.
+    depth: distance [m] of the scene along the axis, above 0, a single number or an array (y, x). Eyes are focused at
+        infinity, so near surfaces are blurred, and they hide parts of far ones (`optics.Eye.see`). None: infinity.
         Compound eyes accept None only, because their small facets are in focus at all distances.
-    progress: function that is called with the completed fraction. None: no calls.
+    progress: function that is called with the completed fraction, above 0 and at most 1. None: no calls.
 
     Raises:
         ValueError: an argument is outside its range, the image or `depth` has the wrong shape, the field has more than
             40,000 ommatidia, or `depth` is given for a compound eye.
-        optics.AccuracyError: the depth varies too much for the kernels of one image; see `optics.Eye.see`.
+        optics.AccuracyError: the depth varies too much, or the scene is too near, for the kernels of one image; see
+            `optics.Eye.see`.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     one_of("animal", animal, ANIMALS)
     width = in_range("width_deg", width_deg, 0.1, 120.0)

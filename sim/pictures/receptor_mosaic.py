@@ -51,7 +51,7 @@ class ReceptorMosaic:
         height: height of the image in pixels, 16 to 8192.
 
         Raises:
-            ValueError: the height is outside its range.
+            ValueError: the height is no whole number in its range, or the photograph is no array (y, x, 3).
         """
         from PIL import Image
 
@@ -68,10 +68,10 @@ class ReceptorMosaic:
         return np.concatenate([np.asarray(left), between, drawn], axis=1)
 
     def write_png(self, path: str | Path, photograph: np.ndarray | None = None, height: int = 600) -> None:
-        """Write `image` to a PNG file.
+        """Write the return value of `image` to a PNG file; an existing file is replaced.
 
         Raises:
-            ValueError: the height is outside its range.
+            ValueError: see `image`.
             OSError: the file cannot be written.
         """
         from PIL import Image
@@ -79,7 +79,7 @@ class ReceptorMosaic:
         Image.fromarray(self.image(photograph, height)).save(path, format="PNG")
 
     def write_exr(self, path: str | Path) -> None:
-        """Write the signals to an OpenEXR file, with one pixel for each receptor (see `sim.read_exr`).
+        """Write the signals to an OpenEXR file, with one pixel for each receptor; `sim.read_exr` reads it.
 
         Raises:
             OSError: the file cannot be written.

@@ -33,9 +33,10 @@ class BatchedRenderer(EyeRenderer):
         if it is larger
 
     Raises:
-        ValueError: n_envs is below 1, the rays do not fit into memory, the world does not support the fidelity, or
-            tracer="closed_form" is given for a world without a closed form.
+        ValueError: n_envs is below 1, the rays do not fit into memory, the fidelity is no `sim.Fidelity`, the world or
+            the eyes do not support it, or `tracer` is unknown or "closed_form" for a world without a closed form.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
 
     def __init__(
@@ -51,7 +52,9 @@ class BatchedRenderer(EyeRenderer):
         """Return the renderer of a prepared scene.
 
         Raises:
-            ValueError: as in the constructor, or the numbers of bands of the fidelity and of the scene differ.
+            ValueError: as in the constructor, or the fidelity and the scene have different numbers of bands.
+            optics.AccuracyError: see the constructor.
+            optics.BackendError: see the constructor.
         """
         renderer = cls.__new__(cls)
         renderer._open(scene, n_envs, fidelity)

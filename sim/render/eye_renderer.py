@@ -61,6 +61,7 @@ class EyeRenderer:
     Raises:
         ValueError: n_envs is below 1, the rays do not fit into memory, or the scene does not support the fidelity.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
@@ -149,6 +150,7 @@ class EyeRenderer:
             ValueError: the number of worlds or the shape of `light` is wrong; the poses belong to another model, are
                 not finite or have not been computed yet; or the worlds differ from the model in a part that is not in
                 `varied` (see `sim.ModelRenderer`).
+            IndexError: `poses` is an empty list.
         """
         return self.launch(poses, light).wait()
 
@@ -166,7 +168,8 @@ class EyeRenderer:
         """Start rendering only some of the worlds; the signals are (len(worlds), eye, channel, height, width).
 
         `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to FEW worlds
-        are rendered in separate buffers, so that a frame of all worlds may be pending at the same time.
+        are rendered in separate buffers, so that a frame of all worlds may be pending at the same time. The errors are
+        those of `signals`, and an IndexError for an unknown world.
         """
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
@@ -191,7 +194,7 @@ class EyeRenderer:
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, len(self.mounts), height, width)
 
     def radiance(self, poses: Placed) -> np.ndarray:
-        """Return the spectral radiance along every ray, (env, eye, ray, band) float32; see `receptor_radiance`."""
+        """Return the spectral radiance along every ray, (env, eye, ray, band) float32, like `receptor_radiance`."""
         layers = self._components(self._launched(poses, self._rays).wait())
         rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
         return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)

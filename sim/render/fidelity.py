@@ -41,9 +41,9 @@ class Level:
 class Fidelity:
     """Accuracy with which a world is rendered for given eyes. `print` shows it as a table.
 
-    rays_per_receptor: average number of samples (rays or areas) per receptor. Behind a pupil it may be below 1, since
-        receptors share rays and may share areas.
-    bands: number of spectral bands, used instead of the eye's own
+    rays_per_receptor: average number of samples (rays or areas) per receptor, above 0 and at most 10⁷. Behind a pupil
+        it may be below 1, since receptors share rays and may share areas.
+    bands: number of spectral bands, 1 to 4096, used instead of the eye's own; an eye allows at most 64
     depth: distances for which the eye has a PSF
     light: "direct": light of lamps after one reflection; "bounce": also after two reflections; "all": after any number
         of reflections, with samples="areas" only
@@ -54,9 +54,9 @@ class Fidelity:
         and rays_per_receptor rays if the signals of the four differ. It needs a perfect lens and direct light, and is
         chosen automatically only for user models.
     frames: number of rendered frames per action, for receptors with `dynamics`: a divisor of the number of physics
-        steps per action. None: environments choose the fewest whose error is allowed
-    tolerance: allowed error of a receptor's signal (root mean square); None if nothing was chosen. In adaptive edge
-        sampling, rays whose signals differ by at most the tolerance count as equal.
+        steps per action, at most 10⁶. None: environments choose the fewest whose error is allowed
+    tolerance: allowed error of a receptor's signal (root mean square), above 0; None if nothing was chosen. In adaptive
+        edge sampling, rays whose signals differ by at most the tolerance count as equal.
     levels: chosen level of each stage, with its reason
 
     Raises:
@@ -90,7 +90,10 @@ class Fidelity:
 
     @property
     def predicted_error(self) -> float | None:
-        """Error of a receptor's signal due to all stages (root mean square); None if no stage predicts one."""
+        """Error of a receptor's signal due to all stages (root mean square); None if no stage predicts one.
+
+        It includes the error of the bands, which may be an upper bound (see `Level`).
+        """
         known = [level.predicted_error for level in self.levels if level.predicted_error is not None]
         return math.hypot(*known) if known else None
 

@@ -73,7 +73,7 @@ def choose_model_fidelity(
     If there is none, a FidelityWarning states by how much the tolerance is exceeded. Bands are the eye's own.
 
     model, eye, mounts: see `ModelRenderer`
-    poses: poses at several moments that are typical of later use, as a list of MjData or as `sim.Poses`
+    poses: poses at one or more moments that are typical of later use, as a list of MjData or as `sim.Poses`
     tolerance: allowed error of a signal (root mean square), over receptors whose field is not uniform; None: half of
         the eye's `noise_sigma`, but at least 0.005 times the signal of a white surface
     groups, spectra, varied, medium: see `ModelRenderer`
@@ -81,8 +81,10 @@ def choose_model_fidelity(
         at these moments, over receptors that bounced light reaches
 
     Raises:
-        ValueError: the tolerance is not positive, `light` is unknown, or ModelRenderer refuses an argument.
+        ValueError: the tolerance is not positive and finite, `light` is unknown, or ModelRenderer refuses an argument.
+        IndexError: `poses` is an empty list.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     if light not in (*FOLLOWED, AUTO):
         raise ValueError(f"light = {light!r}: must be 'direct', 'bounce' or 'auto'")

@@ -30,7 +30,7 @@ class ModelRenderer(EyeRenderer):
 
     model: an MjModel, or a source that compiles to one (`sim.mirror`)
     eye: optics and retina of all eyes (`optics.Eye`), or a `sim.CompoundEye`; the fidelity's bands replace its bands
-    mounts: places of the eyes on the model
+    mounts: places of the eyes on the model, one or more `sim.Mount`
     n_envs: number of worlds
     fidelity: samples, bands, depth layers and light. None: 16 rays per receptor, direct light of lamps, and the eye's
         own bands, 4 by default. light="bounce" adds light after a second reflection, and the light of the sky and of
@@ -54,6 +54,7 @@ class ModelRenderer(EyeRenderer):
             eccentricity, the model does not support the fidelity, or the rays do not fit into memory. No eye may be
             inside a primitive or a closed mesh in the model's reference pose.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
 
     def __init__(

@@ -30,14 +30,16 @@ MOST_PIXELS = 16  # chosen: the largest number of pixels along a cell's side
 class ReferenceRenderer:
     """A renderer of one eye at a time: it traces an image on the tangent plane, and passes it to `optics.Eye.see`.
 
+    The methods raise the errors of `Mirror.render` for an invalid integrator, sampler, seed or `spp`.
+
     world, eyes: as in `sim.BatchedRenderer`
     integrator: Mitsuba's integrator: "path", "direct", or a description such as {"type": "path", "max_depth": 3}
     spp: samples per pixel of an image; a cell is one pixel if receptors are square, and several otherwise
-    samples_per_receptor: cells along a receptor's side; None: 1 for a perfect lens, 4 behind a pupil, and more for
-        narrow rhabdoms
+    samples_per_receptor: cells along a receptor's side, 1 to 64; None: 1 for a perfect lens, 4 behind a pupil, and more
+        for narrow rhabdoms
     depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
         blurred like light from infinity
-    depth_layers: number of kernels between these distances, or "auto"
+    depth_layers: number of kernels between these distances, 1 to 64, or "auto"
     sampler: Mitsuba's sampler: "independent", or "multijitter" for less noise
     variant: spectral variant of Mitsuba, such as "scalar_spectral", which runs without LLVM; None: the default of this
         machine
@@ -47,8 +49,10 @@ class ReferenceRenderer:
 
     Raises:
         ValueError: an argument is invalid, the world has a medium, the eyes are compound eyes, or the sides of a
-            receptor are not in the ratio of small whole numbers.
+            receptor are not in a ratio of whole numbers up to 16.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        ImportError: Mitsuba lacks the variant, or cannot run it.
     """
 
     def __init__(
@@ -97,7 +101,7 @@ class ReferenceRenderer:
         return height, width
 
     def pictures(self, state: WorldState) -> np.ndarray:
-        """Return the spectral radiance on the tangent plane, (env, eye, band, Y, X)."""
+        """Return the spectral radiance on the tangent plane, (env, eye, band, Y, X), in the unit of `Mirror.render`."""
         return np.array([[self._picture(view) for view in self._views(state, i)] for i in range(state.n)])
 
     def radiance(self, state: WorldState) -> np.ndarray:

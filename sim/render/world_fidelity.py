@@ -33,16 +33,18 @@ def choose_fidelity(
     If there is none, a FidelityWarning states by how much the tolerance is exceeded.
 
     world, eyes: the world, and the eyes of every agent in it
-    tolerance: allowed error of a receptor's signal (root mean square), both over all receptors and over receptors that
-        see a nearby object; None: half of the eyes' `noise_sigma`, but at least 0.005 times the signal of a white
-        surface
+    tolerance: allowed error of a receptor's signal (root mean square, in the unit of signals), both over all receptors
+        and over receptors that see a nearby object; None: half of the eyes' `noise_sigma`, but at least 0.005 times the
+        signal of a white surface
     bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments.
         Compound eyes always have their own.
     tracer: tracer for the trials, see `sim.BatchedRenderer`
 
     Raises:
-        ValueError: the tolerance is not positive, `bands` is unknown, or BatchedRenderer refuses the world.
+        ValueError: an argument has the wrong type, the tolerance is not positive and finite, `bands` is unknown, or
+            BatchedRenderer refuses the world, the eyes or the tracer.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     of_kind("world", world, World, "sim.build_world('detection')")
     of_kind("eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")

@@ -1,8 +1,7 @@
 """`mirror(model)`: any MuJoCo model as a spectral Mitsuba scene that follows mjData.
 
 The scene contains all geoms with their materials and textures, lights, the skybox, and cameras. Faces are visible from
-the same side as in MuJoCo, so a camera inside a body sees through its surface. One MirrorWarning names all features
-that cannot be mirrored.
+the same side as in MuJoCo, so a camera inside a body sees through its surface. A MirrorWarning lists omitted features.
 """
 
 from __future__ import annotations
@@ -47,16 +46,17 @@ def mirror(
     data: initial poses; None: the model's reference pose
     bodies: names of the bodies whose geoms are included ("world" is the static body); None: all bodies
     groups: visible geom groups; a geom with alpha 0 is never visible
-    variant: a spectral Mitsuba variant; None: that of this machine. "scalar_spectral" runs without LLVM, but slowly.
-    spectra: reflectances of materials and emission of lights, by name, which replace their colours. Values are
-        `optics.Spectrum`, or names accepted by `optics.reflectance` and `optics.illuminant`. "headlight" is the name of
-        the camera's light: {"headlight": "A"}
+    variant: a spectral Mitsuba variant; None: the default for this machine. "scalar_spectral" is slow but needs no LLVM
+    spectra: reflectances of materials and emission of lights by name, instead of their colours. Each is an
+        `optics.Spectrum` or a name of `optics.reflectance` or `optics.illuminant`. The camera's light is "headlight".
 
     A MirrorWarning lists features that have no counterpart.
 
     Raises:
         ValueError: the model does not compile or has no visible geoms, a body is unknown, `sync` would refuse the data,
             the variant has no spectra, or `spectra` names an unknown material or one with a coloured texture.
+        ImportError: Mitsuba lacks the variant, or cannot run it.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     return Mirror(
         source.load(model), data, bodies=bodies, groups=groups, variant=variant or default_variant(), spectra=spectra
@@ -108,9 +108,7 @@ class Mirror:
             warnings.warn(message, MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
-        """Move all shapes, lights and cameras to the poses in `data` (after mj_forward or mj_step).
-
-        A scene in which nothing moved is not rebuilt.
+        """Move shapes, lights and cameras whose poses in `data` (after mj_forward or mj_step) have changed.
 
         Raises:
             ValueError: the data belong to another model, contain no poses yet, or a pose is not finite.
@@ -128,7 +126,7 @@ class Mirror:
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
-        """Return the BSDF of a geom, even if it is not in the scene; KeyError if the model has no such geom."""
+        """Return the BSDF of a geom in or outside the scene. KeyError: unknown name. IndexError: unknown id."""
         index = self.model.geom(geom).id
         with in_variant(self.variant):
             return self._bsdf(index)
@@ -149,12 +147,12 @@ class Mirror:
         Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
 
         camera: name or id of a camera of the model, or a Viewpoint
-        width, height: size of the image [pixels]
+        width, height: size of the image [pixels], whole numbers
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}.
             "direct" shows only emitters behind a transparent geom; a MirrorWarning names such geoms once.
-        spp: samples per pixel
-        seed: seed of the samples
-        sampler: "independent", or "multijitter", which has less noise in images
+        spp: samples per pixel, a whole number
+        seed: seed of the samples, a whole number
+        sampler: "independent", or "multijitter", whose images have less noise
 
         Raises:
             ValueError: the camera is unknown or no plain perspective, the integrator is unknown, there is less than one
@@ -181,7 +179,7 @@ class Mirror:
         self._has_warned_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
-        """Return the viewpoint of a camera of the model at the last `sync`; errors are those of `cameras.viewpoint`."""
+        """Return the viewpoint of a camera of the model at the last `sync`. Errors: see `render`."""
         return cameras.viewpoint(self.model, self._places, camera)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
@@ -189,7 +187,10 @@ class Mirror:
         return self._first_hits(camera, width, height)[0]
 
     def render_depth(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
-        """Return the depth along the camera's axis [m] at each pixel's centre, (y, x) float32; infinite for no geom."""
+        """Return the depth along the camera's axis [m] at pixels' centres, (y, x) float32; infinite for no geom.
+
+        Errors: see `render`.
+        """
         return self._first_hits(camera, width, height)[1]
 
     def _first_hits(self, camera: str | int | Viewpoint, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:

@@ -43,7 +43,9 @@ HEADLIGHT = ("active", "diffuse")
 
 @dataclass(frozen=True)
 class Poses:
-    """Positions [m], (world, element, 3), and rotations, (world, element, 3, 3), as in mjData after mj_forward.
+    """Positions [m] and directions, (world, element, 3), and rotations, (world, element, 3, 3), of elements of a model.
+
+    The values are those of mjData after mj_forward. Only the precision of the arrays is checked.
 
     geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat: positions and rotations of geoms, sites and cameras
     xpos, xmat: positions and rotations of bodies
@@ -94,7 +96,10 @@ class Poses:
     def from_data(cls, datas: Sequence[mujoco.MjData] | mujoco.MjData) -> Poses:
         """Collect the poses of all worlds.
 
-        datas: one mjData per world, or a single mjData for one world
+        datas: one mjData per world, after mj_forward or mj_step, or a single mjData for one world
+
+        Raises:
+            IndexError: there are no worlds.
         """
         datas = [datas] if isinstance(datas, mujoco.MjData) else datas
         stacked = {name: np.array([getattr(data, name) for data in datas]) for name in OF_DATA}
@@ -104,7 +109,7 @@ class Poses:
 
     @classmethod
     def joined(cls, *parts: Poses) -> Poses:
-        """Return the poses of the worlds of all parts together."""
+        """Return the poses of all worlds of one or more parts, in order. The worlds belong to one model."""
         found: dict[str, list[Any]] = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
         joined: dict[str, Any] = {n: None if each[0] is None else np.concatenate(each) for n, each in found.items()}
         return cls(**joined)
@@ -127,13 +132,20 @@ class Poses:
         return self.geom_xmat[:, geoms]
 
     def take(self, worlds: np.ndarray) -> Poses:
-        """Return the poses of the worlds with these indices."""
+        """Return the poses of the worlds with these indices, in this order; IndexError for an unknown world."""
         arrays: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         taken: dict[str, Any] = {name: None if array is None else array[worlds] for name, array in arrays.items()}
         return Poses(**taken)
 
     def frames(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the origins (world, 3) and rotations (world, 3, 3) of a site, a camera or a body."""
+        """Return the origins [m], (world, 3), and rotations, (world, 3, 3), of a site, a camera or a body.
+
+        kind, index: "site", "camera" or "body", and its id
+
+        Raises:
+            KeyError: the kind is unknown.
+            IndexError: the model has no element with this id.
+        """
         name = {"site": "site_x", "camera": "cam_x", "body": "x"}[kind]
         return getattr(self, f"{name}pos")[:, index], getattr(self, f"{name}mat")[:, index]
 

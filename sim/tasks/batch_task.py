@@ -56,6 +56,9 @@ class BatchTask(TaskSettings):
     `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a
     task follows this description.
 
+    An exception in a method ends the simulation of all worlds, and reaches the caller of the environment unchanged.
+    The environment raises a ValueError if a method returns an invalid array.
+
     renders_early: if True, rendering may begin before an action is judged, which is faster. In this case, `rewards`,
         `terminated`, `succeeded` and `proprioception` must not move bodies in a world, unless `judge` returns an
         outcome that lists this world in `Outcome.changed`.
@@ -89,7 +92,8 @@ class BatchTask(TaskSettings):
         The default maps each value to the full range of one control of the actuators; a control without limits gets
         the value itself.
 
-        Return the reason for each world that cannot continue, by the index of the world, or None if all can.
+        Return the reason for each world that cannot continue, by the index of the world, or None if there is no such
+        world.
         """
         mine = controls_of(worlds.model, self.actuators)
         limited = worlds.model.actuator_ctrllimited[mine].astype(bool)
@@ -115,7 +119,7 @@ class BatchTask(TaskSettings):
     def proprioception(self, worlds: Any) -> np.ndarray | Mapping[str, np.ndarray]:
         """Return the part of the observation that does not come from eyes, (n, k), or several such arrays by name.
 
-        By default, there is no such part.
+        All values must be finite. By default, there is no such part.
         """
         return {}
 
@@ -128,7 +132,7 @@ class BatchTask(TaskSettings):
         failed: the worlds that could not continue, each with the reason
 
         Raises:
-            ValueError: a method returned an array of the wrong shape.
+            ValueError: `rewards` did not return a mapping, or a method did not return numbers of the right shape.
         """
         n, name = worlds.n, type(self).__name__
         terms = {
@@ -150,7 +154,10 @@ class BatchTask(TaskSettings):
         return Outcome(RewardTerms(list(terms), stacked), terminated, success, failure)
 
     def first_info(self, worlds: Any, chosen: np.ndarray) -> Sequence[Mapping[str, Any]] | None:
-        """Return additional entries of `info` at the start of an episode for each chosen world; None: no additions."""
+        """Return additional entries of `info` at the start of an episode, a mapping for each chosen world.
+
+        None: no additions.
+        """
         return None
 
     def commands(self) -> tuple[Command, ...]:
@@ -163,7 +170,7 @@ class BatchTask(TaskSettings):
         This method is called after every action. By default, an episode is solved if `succeeded` is true after its
         last action.
 
-        before: return value of this method after the previous action
+        before: return value of this method after the previous action; None after the first action
         info: `info` of the last action
         """
         return bool(info["is_success"])
@@ -223,7 +230,11 @@ class BatchTask(TaskSettings):
         return self.act(worlds, actions) or {}
 
     def all_proprioception(self, worlds: Any, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
-        """Return the proprioception of every agent in the chosen worlds, as arrays by name for each agent."""
+        """Return the proprioception of every agent in the chosen worlds, as arrays (k, value) by name for each agent.
+
+        Raises:
+            ValueError: `proprioception` did not return one row of finite numbers for each world.
+        """
         felt, name = self.proprioception(worlds), f"{type(self).__name__}: proprioception"
         known = felt if isinstance(felt, Mapping) else {"feels": felt}
         found = {key: columns(f"{name}: {key!r}", array, worlds.n) for key, array in known.items()}

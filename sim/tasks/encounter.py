@@ -50,7 +50,7 @@ class Frozen:
 
     @property
     def memory(self) -> int:
-        """Number of frames in the observations that the policy expects."""
+        """Number of frames in the observations that the policy expects; 1 if it has no `observation_space`."""
         known = getattr(getattr(self.policy, "observation_space", None), "spaces", {})
         eyes = [one for one in known.values() if len(one.shape) == FRAMES_AXES or hasattr(one, "directions")]
         return max((one.shape[0] for one in eyes), default=1)
@@ -105,11 +105,13 @@ class Encounter:
     def alone(self, name: str, policies: Mapping[str, Any]) -> Task:
         """Return the task of one learning animal, for `make_vec_env` and `make_env`. The other animals do not learn.
 
-        policies: policies of other animals, by name, see `sim.Frozen`; the actions of an animal without a policy are
-            zeros
+        name: name of the learning animal
+        policies: policies of other animals, by name, see `sim.Frozen`; {}: none. The actions of an animal without a
+            policy are zeros
 
         Raises:
-            ValueError: no animal has this name, or `policies` contains the learning animal.
+            ValueError: no animal has this name or a name in `policies`, `policies` contains the learning animal, or a
+                policy is neither a function nor an object with `predict`.
         """
         for asked in (name, *policies):
             if asked not in self.names:

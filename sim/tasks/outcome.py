@@ -36,7 +36,13 @@ class RewardTerms:
 
     @classmethod
     def of_rows(cls, rows: Sequence[Mapping[str, float]]) -> RewardTerms:
-        """Return the terms of rows whose terms may have different names."""
+        """Return the terms of one or more rows, whose terms may have different names.
+
+        rows: terms by name, for each row; a term that a row lacks is 0 in `terms`
+
+        Raises:
+            ValueError: there are no rows.
+        """
         names = list(dict.fromkeys(name for row in rows for name in row))
         found = cls(names, np.array([[row.get(name, 0.0) for row in rows] for name in names]).reshape(-1, len(rows)))
         found._rows = [dict(row) for row in rows]
@@ -66,13 +72,15 @@ class RewardTerms:
 class Outcome:
     """The outcome of one action in all worlds, which a task returns. Rows are those of `RewardTerms`.
 
+    The environment raises a ValueError if an array has another shape, a term is not finite, or a world does not exist.
+
     terms: terms of the reward
     terminated: True if the task ends the episode, (row,) bool
     success: True if the task is accomplished, (row,) bool
-    failure: the worlds that could not continue, each with the reason; their episodes end
+    failure: the worlds that could not continue, by index, each with the reason; their episodes end
     over: True if a world's episode ends although no row is terminated, for example because of an animal that does not
         learn, (world,) bool; None: False in all worlds
-    changed: worlds in which the task moved bodies after the action
+    changed: indices of the worlds in which the task moved bodies after the action, (k,) int
     info: additional entries of each row's `info`; None: no additions
     proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, value);
         a world whose values are NaN keeps its previous values. None: the task's method `all_proprioception` is

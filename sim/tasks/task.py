@@ -30,9 +30,9 @@ class Task(TaskSettings):
     If eyes evolve for this task (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the mounts that
     `place` returns. The class must then have no required arguments.
 
-    If a method raises an exception or returns an invalid value, the episode of its world ends. In contrast, an error in
-    `reset`, or in `proprioception` during a reset, ends the simulation of all worlds with a RuntimeError, because no
-    episode can start.
+    If a method raises an exception or returns an invalid value, the episode of its world ends, and `info["failure"]` is
+    the reason. In contrast, an error in `reset`, or in `proprioception` during a reset, ends the simulation of all
+    worlds with a RuntimeError, because no episode can start.
 
     Methods are called for one world at a time, with its mjData after mj_forward. One task object is used for
     all worlds. Variables of an episode must therefore be stored in mjData (for example in `userdata`), not in the task.
@@ -50,7 +50,7 @@ class Task(TaskSettings):
         """
 
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
-        """Apply an action in [-1, 1], (n_actions,).
+        """Apply an action, (n_actions,), with values in [-1, 1].
 
         The default maps each value to the full range of one control of the actuators; a control without limits gets
         the value itself.
@@ -61,19 +61,22 @@ class Task(TaskSettings):
         data.ctrl[mine] = low + (high - low) * (action + 1) / 2
 
     def rewards(self, data: mujoco.MjData) -> Mapping[str, float]:
-        """Return the terms of the reward for the last action, by name. The reward is their sum."""
+        """Return the terms of the reward for the last action, finite numbers by name. The reward is their sum."""
         raise NotImplementedError
 
     def terminated(self, data: mujoco.MjData) -> bool:
-        """Return whether the episode ends after this action."""
+        """Return whether the episode ends after this action; None counts as False."""
         return False
 
     def succeeded(self, data: mujoco.MjData) -> bool:
-        """Return whether the task is accomplished. This is `info["is_success"]`."""
+        """Return whether the task is accomplished; None counts as False. This is `info["is_success"]`."""
         return False
 
     def proprioception(self, data: mujoco.MjData) -> np.ndarray:
-        """Return the part of the animal's observation that does not come from eyes, (k,); by default, no values."""
+        """Return the part of the animal's observation that does not come from eyes; by default, no values.
+
+        The part consists of finite numbers, (k,), and k is the same at every call.
+        """
         return np.zeros(0)
 
 

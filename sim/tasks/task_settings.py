@@ -29,21 +29,24 @@ MOST_STEPS = 10**9
 class TaskSettings:
     """Settings that a subclass defines as class attributes. It must define `model` and `mounts`.
 
+    Environments raise a ValueError if a setting is missing or invalid.
+
     model: an MjModel, or a source from which `sim.mirror` can compile one
     eye: an `optics.Eye`, the optics and retina of every eye, or a `sim.CompoundEye`
-    mounts: places of the eyes. If an animal has several kinds of eyes, `eye` and `mounts` are dictionaries, such as
-        {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of "eyes".
+    mounts: places of the eyes, one or more `sim.Mount`. If an animal has several kinds of eyes, `eye` and `mounts` are
+        dictionaries, such as {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of
+        "eyes".
     fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
         from a few scenes of the task's episodes. Several kinds of eyes have a common value or a dictionary.
-    substeps: physics steps per action
-    episode_steps: number of actions after which an episode is truncated
+    substeps: physics steps per action, 1 to 10⁹
+    episode_steps: number of actions after which an episode is truncated, 1 to 10⁹
     spectra: spectra of materials and lights, by name, which replace their colours
     medium: water or air between surfaces and eyes, see `sim.build_world`
     vary: ranges (low, high) of quantities, by name. Values are drawn for each episode and world before `reset`:
         "light": factor of all lights, with a uniformly distributed logarithm.
         "color_temperature": colour temperature of white [K], with a uniformly distributed reciprocal.
         "GEOM.size": factor of a geom's size, with a uniformly distributed logarithm. MuJoCo's compiler recomputes mass
-        and inertia.
+        and inertia, so `model` must not be an MjModel or an MJB file.
         "GEOM.color": colour of a geom. Red, green and blue are each drawn between their values in two colours. The
         colour multiplies a texture.
         "GEOM.material": one of two or more materials of the model, given by their names, with its texture, colour and
@@ -93,6 +96,9 @@ class TaskSettings:
         """Return the number of values in an action.
 
         The default is the number of controls of the task's actuators. Most actuators have one control.
+
+        Raises:
+            KeyError: the model lacks an actuator of the task.
         """
         return len(controls_of(model, self.actuators))
 
@@ -100,7 +106,7 @@ class TaskSettings:
         """Return the mounts of the eyes of an evolving animal.
 
         The default spreads the eyes in a fan around the first of `mounts`, see `sim.fan`. A run with this default
-        needs a single mount.
+        needs a single mount and a single kind of eyes.
 
         n_eyes: number of eyes
         placement_range_deg, elevation_deg: angles that evolve [degrees], see `sim.fan`

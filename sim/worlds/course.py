@@ -32,13 +32,15 @@ class Course:
     """Walls and starting positions, given as a drawing. Each line is a row of cells of 2 m, with north at the top.
 
     drawing: "#": wall; ".": free cell; "S": free cell in which episodes may start; "s": free cell in which episodes may
-        start in training only
-    episode_steps: number of actions after which an episode is truncated; None: the task's default
+        start in training only. The free cells in the last three columns before the outer wall are the goal
+    episode_steps: number of actions after which an episode is truncated, 1 to 10⁹; None: the task's default
+
+    Attributes and methods count the rows of cells from the south.
 
     Raises:
         ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
-            start; a start lies in the goal or has no suitable path to it; or episode_steps is not a whole number above
-            0. On a suitable path, the distance from the start never decreases by more than MOST_FALL, 1.5 m.
+            "S"; a start lies in the goal or has no suitable path to it; or an argument has a wrong type or range. On a
+            suitable path, the distance from the start never decreases by more than MOST_FALL, 1.5 m.
     """
 
     drawing: str
@@ -90,12 +92,12 @@ class Course:
 
     @property
     def starts(self) -> list[Cell]:
-        """Cells in which evaluation episodes may start."""
+        """Cells (row, column) in which evaluation episodes may start."""
         return _cells(self.signs == _START)
 
     @property
     def training_starts(self) -> list[Cell]:
-        """Cells in which training episodes may start."""
+        """Cells (row, column) in which training episodes may start."""
         return _cells(np.isin(self.signs, (_START, _TRAINING_START)))
 
     @cached_property
@@ -107,7 +109,7 @@ class Course:
 
     @cached_property
     def way(self) -> np.ndarray:
-        """Length of the shortest path to the goal from every cell [m], (row, column); infinite without a path."""
+        """Length of the shortest path from every cell to the goal [m], (row, column); infinite without a path."""
         way = np.where(self.goal, 0.0, np.inf)
         queue = [(0.0, cell) for cell in _cells(self.goal)]
         while queue:
@@ -120,7 +122,11 @@ class Course:
         return read_only(way)
 
     def heading(self, cell: Cell) -> float:
-        """Return the direction of the shortest path to the goal from a cell [rad], counterclockwise from east."""
+        """Return the direction of the shortest path from a cell to the goal [rad], counterclockwise from east.
+
+        It points to the cell that is 3 steps (LOOK_AHEAD) further along the path, or to the first cell of the goal. In
+        the goal, the direction is 0.
+        """
         ahead = cell
         for _ in range(LOOK_AHEAD):
             ahead = min([ahead, *self._next_to(ahead)], key=lambda other: float(self.way[other]))
@@ -129,8 +135,9 @@ class Course:
     def fall(self, start: Cell) -> tuple[float, Cell]:
         """Return the largest necessary decrease of the distance from a start [m], and the cell before this decrease.
 
-        Every cell ahead of the start is considered. From each, the agent takes the path to the goal on which the
-        distance from the start decreases least. The result is the largest of these decreases.
+        The method considers the cells of all paths on which every step from the start shortens the remaining path. From
+        each of these cells, the agent takes the path to the goal on which the distance from the start decreases least.
+        The result is the largest of these decreases.
         """
         ease = self._ease(start)
         return max((_apart(start, cell) - float(ease[cell]), cell) for cell in self._ahead(start))
@@ -188,7 +195,7 @@ class Course:
         return {}
 
     def places(self, cells: list[Cell]) -> np.ndarray:
-        """Return the centres of cells [m], (n, 2)."""
+        """Return the centres (x, y) of one or more cells [m], (n, 2). The origin is the centre of the course."""
         rows, columns = np.array(cells).T
         return cell_centers(columns, rows, (self.walls.shape[0], self.walls.shape[1]))
 

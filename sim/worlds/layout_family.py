@@ -38,15 +38,15 @@ class LayoutFamily:
 
     Courses fulfil the conditions of `sim.Course`: the distance from the start never has to fall by more than 1.5 m.
 
-    seed: seed of all layouts and of the stripes on their walls
+    seed: seed of all layouts and of the stripes on their walls, 0 to 2¹²⁸
     n_training, n_selection, n_test: number of layouts in each set, 1 to 100
-    rows, columns: number of cells of a layout along y (7 to 31) and x (15 to 99), including the outer wall; odd,
-        because mazes have rooms in every second row and column. A cell is 2 m wide.
+    rows, columns: number of cells of a layout along y (7 to 31) and x (15 to 99), including the outer wall. Both are
+        odd, because mazes have rooms in every second row and column. A cell is 2 m wide.
     path_width: width of the paths of courses [cells], 1 or 3; corridors of mazes are always one cell wide
-    episode_steps: number of actions after which an episode is truncated; None: the task's default
+    episode_steps: number of actions after which an episode is truncated, 1 to 10⁹; None: the task's default
 
     Raises:
-        ValueError: a number is out of range, or `rows`, `columns` or `path_width` is even.
+        ValueError: a value is not a whole number in its range, or `rows`, `columns` or `path_width` is even.
     """
 
     seed: int = 0
@@ -85,11 +85,22 @@ class LayoutFamily:
         return LayoutSet(self, "test")
 
     def number(self, name: str) -> int:
-        """Return the number of layouts in the set of this name."""
+        """Return the number of layouts in the set of this name, "training", "selection" or "test".
+
+        Raises:
+            AttributeError: there is no such set.
+        """
         return int(getattr(self, f"n_{name}"))
 
     def random(self, name: str, index: int, purpose: int) -> np.random.Generator:
-        """Return the random number generator of one layout, for its walls (purpose 0) or its stripes (purpose 1)."""
+        """Return the random number generator of one layout, for its walls (purpose 0) or its stripes (purpose 1).
+
+        name: name of the layout's set, "training", "selection" or "test"
+        index: index of the layout in the set
+
+        Raises:
+            ValueError: there is no such set, or a number is negative.
+        """
         return np.random.default_rng(
             np.random.SeedSequence(self.seed, spawn_key=(SETS.index(name), index, purpose)),
         )

@@ -53,17 +53,17 @@ class World(ReadOnlyArrays):
     model: MuJoCo model. It contains static geoms and mocap bodies for the objects. The body "agent" has the slide
         joints agent_x and agent_y and the hinge agent_heading. The actuators agent_x and agent_y command its velocity
         [m/s] along the world's axes. The sensor agent_touch is above 0 in contact with a wall. If the world was built
-        with eyes, the agent has a camera for each, with the name that `Eyes.names()` states
+        with eyes, the agent has a camera for each eye, with the name that `Eyes.names()` returns
     objects: names of the objects' bodies: ("goal", "adversary_0", "adversary_1"), or () in navigation and mazes
-    starts: starting positions of the agent, at the centres of cells
-    object_spawn: possible positions of objects, at the centres of cells, (m, 2) [m]
+    starts: starting positions of the agent, at the centres of cells (`sim.worlds.layout.Starts`)
+    object_spawn: possible positions of objects, at the centres of cells [m], (n, 2)
     goal_region: goal region in navigation and mazes, (x_min, y_min, x_max, y_max) [m]; None in other tasks
-    spectra: measured spectra of materials and lights, by name, which the renderers use instead of their colours
-    alone: model of the agent without the rest of the world, for fast simulation near walls; None: agents near walls are
-        simulated in the whole model
+    spectra: measured spectra of materials and lights, by name. Renderers use them instead of the model's colours
+    alone: model of the agent without the rest of the world, with which agents near walls are simulated faster; None:
+        they are simulated in the whole model
     training_starts: starting positions of the agent in training; None: `starts`
     episode_steps: number of actions after which an episode is truncated; None: the task's default
-    mazes: number of mazes, or of courses, which are arranged from south to north; 1 in other tasks
+    mazes: number of mazes or courses, which are arranged from south to north; 1 in other tasks
     medium: water or air that fills the world; None: clear air
     """
 
@@ -82,7 +82,7 @@ class World(ReadOnlyArrays):
 
     @property
     def agent_spawn(self) -> np.ndarray:
-        """All possible starting positions of the agent, in training or evaluation, (n, 2) [m]."""
+        """All possible starting positions of the agent, in training or evaluation [m], (n, 2)."""
         if self.training_starts is None:
             return self.starts.position
         return np.unique(np.concatenate([self.starts.position, self.training_starts.position]), axis=0)
@@ -103,9 +103,9 @@ def build_world(
     """Build the world of a task.
 
     task: one of `sim.TASKS`
-    seed: seed of the mazes and of the stripes on walls in mazes and courses; the worlds of other tasks do not depend on
-        it
-    mazes: number of different mazes in the task "maze", 1 to 100,000; an episode starts in any of them
+    seed: seed of the mazes and of the stripes on walls in mazes and courses, 0 to 2¹²⁸; the worlds of other tasks do
+        not depend on it
+    mazes: number of mazes in the task "maze", 1 to 100,000; an episode starts in any of them
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
     layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
         episode starts in any of its layouts
@@ -119,9 +119,10 @@ def build_world(
         clear air
 
     Raises:
-        ValueError: the task, the course or the medium is unknown, a number is out of range, or `spectra` contains a
-            name that does not exist. Other causes are that `mazes`, `course` or `layouts` is given for a
-            task without it, or that `layouts` is combined with `seed`, `mazes` or `course`.
+        ValueError: an argument has the wrong type or is out of range; the task, the course, the medium or a spectrum is
+            unknown; or `spectra` names neither a material nor a light, or has a reflectance above 1. Other causes are
+            that `mazes`, `course` or `layouts` is given for a task without it, that `layouts` is combined with `seed`,
+            `mazes` or `course`, or that two layouts of the family are equal or some cannot be drawn.
     """
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
