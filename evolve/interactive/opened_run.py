@@ -142,8 +142,8 @@ class OpenedRun(Run):
             LockedError: another process is working on the run.
             RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, its
                 format is too old, or the search proposes candidates that differ from those on record.
-            ConfigError: the user task was not named when the run was opened, or fails at its start; or callbacks are
-                not functions.
+            ConfigError: config.toml is invalid, the optimizer is unknown or cannot be used here, the user task was not
+                named when the run was opened or fails at its start, or `callbacks` is not a list of functions.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             ExecutorError: no worker can evaluate candidates.
             OSError: a file of the run cannot be read or written.

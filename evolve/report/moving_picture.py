@@ -100,7 +100,10 @@ def _frames(episode: Episode, stride: int) -> Iterator[Image.Image]:
 
 
 def _palette(samples: list[Image.Image]) -> Image.Image:
-    """Return the palette of the GIF: the colours of the drawing, and the most frequent colours of sample frames."""
+    """Return the palette of the GIF: the colours of the drawing, and representative colours of sample frames.
+
+    The representative colours are selected by median cut.
+    """
     own = [int(name[i : i + 2], 16) for name in OWN for i in (1, 3, 5)]
     strip = Image.fromarray(np.concatenate([np.asarray(picture) for picture in samples], axis=1))
     frequent = strip.quantize(COLOURS - len(OWN), method=Image.Quantize.MEDIANCUT).getpalette() or []

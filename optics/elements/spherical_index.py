@@ -67,7 +67,10 @@ class SphericalIndex:
         return np.asarray(2 * np.arcsin(end) - 2 * h * end * (bend @ gauss_legendre(NODES)[1]))
 
     def path(self, h: np.ndarray) -> np.ndarray:
-        """Return the optical paths inside the sphere of rays at heights h, in units of R times the medium's index."""
+        """Return the optical path lengths of rays inside the sphere, in units of R times the medium's index.
+
+        h: heights of the rays relative to R, an array of any shape. The result has the same shape.
+        """
         y, end, n, _, radial = self._along(h)
         return np.asarray(2 * end * ((n * n * y / radial) @ gauss_legendre(NODES)[1]))
 

@@ -79,7 +79,7 @@ class GridSampling(SpectrumSampling):
 
 
 def whole_spectrum(problem: Problem) -> list[GridSampling]:
-    """Return samplings with which the whole spectrum meets the problem's tolerance."""
+    """Return samplings for which propagation of the spectrum as a whole meets the problem's tolerance."""
     return _samplings(problem, "angular_spectrum")
 
 

@@ -65,7 +65,7 @@ def all_nodes(count: int, half_angle: float) -> WindowNodes:
 
 
 def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> WindowNodes:
-    """Return `WindowNodes` with a few kept nodes, of which the values at all nodes are linear combinations.
+    """Return `WindowNodes` with a few kept nodes. Their values, linearly combined, approximate those at all nodes.
 
     For each node, the root mean square error over the points of the pupil is less than `error`.
 

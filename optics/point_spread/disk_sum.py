@@ -48,7 +48,8 @@ class DiskSum:
 
         Raises:
             ValueError: the disk extends beyond the window.
-            AccuracyError: suitable samples cannot be computed. The message states which samples are sufficient.
+            AccuracyError: suitable samples cannot be computed. If too many are needed, the message states a sufficient
+                pitch and shape.
         """
         positive("radius", without_derivative("radius", radius))
         middle = light.centre if centre is None else point_2d("centre", centre)
@@ -88,7 +89,7 @@ class DiskSum:
 
 
 def _room(light: VectorFocus, middle: tuple[float, float]) -> float:
-    """Return the distance from a point to the outermost samples [m]."""
+    """Return the distance [m] from a point to the nearest edge of the samples, negative if the point lies outside."""
     x, y = light.grid.x - middle[0], light.grid.y - middle[1]
     return float(min(-x[0], x[-1], -y[0], y[-1]))
 

@@ -68,7 +68,10 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
 
 
 def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return the contrast of the lost light, (fy, fx), if it is spread like light in the outer parts of the window."""
+    """Return an estimate of the contrast of the lost light, (fy, fx).
+
+    The estimate assumes that this light is distributed like the light in the outer parts of the window.
+    """
     squares, parts = np.zeros((max(image.shape),) * 2), 0
     for part in INNER:
         inner = tuple(slice(n // 2 - round(part * n / 2), n // 2 + round(part * n / 2) + 1) for n in image.shape)

@@ -1,4 +1,7 @@
-"""A mirror (`sim.mirror`) with fewer shapes: all static geoms of one material form one mesh.
+"""A mirror (`sim.mirror`) with fewer shapes: triangle meshes of static geoms with the same appearance are merged.
+
+Meshes with and without normals are merged separately, and so are meshes with and without texture coordinates. Geoms
+that emit light, and shapes that are not meshes, such as most spheres, are not merged.
 
 Every shape slows down each launch of a kernel, and every geom slows down each `sync`. In merged meshes, single static
 geoms cannot be identified in the image.

@@ -97,7 +97,7 @@ class PreparedScene:
     def white(self) -> np.ndarray:
         """Radiance (band,) of a white surface that faces all directional lights, or of veiling light.
 
-        The larger of the two counts in each band.
+        In each band, it is the larger of these two radiances.
         """
         levels = [light.level for light in self.scene.lights.found if light.kind == "directional"]
         surface: np.ndarray = sum(levels, np.zeros(self.eye.bands)) / np.pi

@@ -130,7 +130,10 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 
 def _halved(pieces: np.ndarray) -> np.ndarray:
-    """Return the triangles, halved along their longest edge until their texture coordinates are nearly linear."""
+    """Return triangles within which texture coordinates are nearly linear.
+
+    Other triangles are bisected at the midpoint of their longest edge, repeatedly but at most _HALVINGS times.
+    """
     done = []
     for _ in range(_HALVINGS):
         bent = _bend(pieces) > TOLERANCE
