@@ -85,7 +85,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         return found
 
     def mtf(self, tolerance: float = 0.02) -> MTF:
-        """Return |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx). It includes the blur that shifts between colours cause.
+        """Return |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx). Shifts between colours add to the blur.
 
         See `optics.mtf`.
 
@@ -106,6 +106,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         See `optics.strehl_ratio`.
 
         Raises:
+            ValueError: `with_error` is not a bool.
             AccuracyError: see `optics.strehl_ratio`.
         """
         import drjit as dr

@@ -25,7 +25,9 @@ from sim.scene.variant import variant as in_variant
 
 
 class MergedMirror(Mirror):
-    """A Mitsuba scene that mirrors all of a model; moving shapes are "geom_<geom id>_<part>", others "still_<n>".
+    """A Mitsuba scene that mirrors all of a model.
+
+    Merged meshes are called "still_<n>", all other shapes "geom_<geom id>_<part>".
 
     model, spectra: see `sim.mirror`
     closed: names of the shapes that are invisible to a camera inside them
