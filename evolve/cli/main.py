@@ -27,7 +27,7 @@ __all__ = ["main"]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one subcommand and return the exit code.
 
-    arguments: arguments of the command line without the command's name; None: those of this process
+    arguments: arguments of the command line without the command's name; None: the arguments of this process
 
     Raises:
         SystemExit: help or the version was requested, or an argument is invalid; see `evolve.cli.arguments.parse`.

@@ -1,4 +1,4 @@
-"""Numbering of candidates. Ids are consecutive over all generations, each of which has `population` candidates."""
+"""Numbering of candidates. Ids are consecutive over all generations."""
 
 from __future__ import annotations
 

@@ -12,9 +12,9 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """Return the source, with settings of height and width converted to those of square eyes' single gene.
+    """Return the source, with the settings of height and width moved to the single gene of square eyes.
 
-    If eyes are not square, the source is returned unchanged. Equal settings of height and width become those of the
+    If eyes are not square, the source is returned unchanged. Equal settings of height and width become settings of the
     single gene. Unequal settings are kept, and `no_such_side` explains the error that follows from them.
 
     A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes, the task's

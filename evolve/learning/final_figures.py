@@ -19,7 +19,7 @@ __all__ = ["UnfitPolicy", "final_episodes", "require_fit", "require_test_set"]
 
 
 class UnfitPolicy(ValueError):
-    """A policy belongs to an animal whose eyes differ from those of the animal that should use the policy."""
+    """A policy was trained for an animal with other eyes."""
 
 
 def final_episodes(
@@ -59,7 +59,7 @@ def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
 
 
 def require_test_set(config: RunConfig) -> None:
-    """Check that the worlds of the mode "test" differ from those of the evaluation.
+    """Check that the mode "test" has other worlds than the evaluation.
 
     User tasks pass the check, because they may define such a mode.
 

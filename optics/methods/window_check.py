@@ -54,7 +54,8 @@ def window_errors(
     bright = np.minimum(total, np.mean(np.square(exact) / chance, (1, 2)))
     total = np.where(total > 0, np.where(squared > 0.01 * total, bright, total), np.nan)
     rounding = float(np.finfo(field.real.dtype).eps)
-    unlike = np.where(apart > tolerance, apart, 0)  # if the factors of the sums do not fit the kernel
+    # Below the goal of the interpolation, the difference may be its own error, which both sums do not share.
+    unlike = np.where(apart > INTERPOLATED * tolerance, apart, 0)
     return np.asarray(CAUTION * (np.sqrt(squared / total) + unlike) + UNSEEN * tolerance + rounding)
 
 

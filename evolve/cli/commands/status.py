@@ -146,7 +146,7 @@ def _generations(run: Run) -> list[dict[str, Any]]:
 
 
 def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
-    """Return the state of a generation as JSON values. Task fitness and costs are those of its best candidate."""
+    """Return the state of a generation as JSON values, with task fitness and costs of its best candidate."""
     done = [candidate for candidate in members if candidate.failure is None]
     best = max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
     return {

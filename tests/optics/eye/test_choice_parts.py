@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -145,7 +146,7 @@ def test_numbers_of_nodes_to_try(monkeypatch):
         return NodeChoice(stage, lambda at: np.ones((1, 1, 1)), candidates, mean)
 
     monkeypatch.setattr(kernel_bank, "NodeChoice", made)
-    given = lambda z, right, down: np.ones((1, 1, 1))  # noqa: E731
+    given = Mock(return_value=np.ones((1, 1, 1)))
     kernel_bank.prepare(given, (8, 16), 3, np.array([1.0, 2.0]), ("auto", "auto"), 0.1)
     assert tried["depth"] == ([(1,), (3,), (5,), (9,), (17,), (33,)], 3, 1.0)
     assert tried["field"] == ([(1, 1), (2, 3), (3, 5), (5, 9)], 3, 1.0)
@@ -181,7 +182,11 @@ def test_advice_on_the_time_limit():
 def test_cells_on_which_a_density_is_evaluated(resolution, counts):
     """Angles are those of the cells' middles. The field is 2 · 0.5 high and 2 · 0.75 wide around (0.25, -0.5)."""
     asked = []
-    density = lambda right, up: asked.append((right, up)) or 2 + 0 * right  # noqa: E731
+
+    def density(right, up):
+        asked.append((right, up))
+        return 2 + 0 * right
+
     found = receptor_density.density_on(density, resolution, (0.5, 0.75), (0.25, -0.5))
     assert found.shape == counts
     (right, up) = asked[0]

@@ -189,7 +189,11 @@ def test_polarisation_that_does_not_exist(given):
 def test_rays_behind_the_pupil(sine, good):
     """The sine in the medium is at most 0.98; its index is 1.5."""
     asked = []
-    slopes = lambda *given: asked.append(given) or SimpleNamespace(steepest_inside=sine)  # noqa: E731
+
+    def slopes(*given):
+        asked.append(given)
+        return SimpleNamespace(steepest_inside=sine)
+
     beam = SimpleNamespace(pupil=SimpleNamespace(slopes=slopes), wavelength=5e-7, source="source", index=1.5)
     if good:
         vector_focus._check_rays(beam)
