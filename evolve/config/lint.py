@@ -79,7 +79,7 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
 
     If the spectral genes determine the receptors, each open gene in turn takes values over its range, while the others
     keep their start values. Other combinations of the genes may cause a larger error. In the preset `ultraviolet`,
-    whose peaks lie far apart, it is a third larger.
+    whose peaks lie far apart, the largest error of all combinations is a third larger.
     """
     if config.eye.receptors != INHERITED:
         return [config.eye.receptors]

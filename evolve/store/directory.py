@@ -269,8 +269,8 @@ class Run:
 def _require_no_run(path: Path) -> None:
     """Check that a run can be created in a directory.
 
-    It must be empty, or contain only files of a process that was killed while it created a run. Such a directory has no
-    config.toml, which is written last.
+    The directory must be empty, or contain only files of a process that was killed while it created a run. It then has
+    no config.toml, which is written last.
     """
     begun = {RunLock.NAME, VERSIONS, CANDIDATES, POLICIES}
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(UNFINISHED)}
