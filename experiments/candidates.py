@@ -193,6 +193,6 @@ def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
 
 @cache
 def parameters(shape: PolicyConfig) -> int:
-    """Return the number of parameters of a policy of this shape, without loading a trained policy."""
+    """Return the number of values that learning changes in a policy of this shape."""
     with torch.device("meta"):  # no values: drawing the weights would take a hundred times longer
         return sum(tensor.numel() for tensor in learnt(build_policy(shape)).values())
