@@ -87,7 +87,7 @@ def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator
 
 
 def quickest(rounds: Sequence[Sequence[Point]]) -> list[Point]:
-    """Return one point of each method and setting: the smallest of its medians, since other load only adds time."""
+    """Return one point of each method and setting: that with the smallest median, since other load only adds time."""
     best: dict[tuple[object, ...], Point] = {}
     for point in (point for points in rounds for point in points):
         key = (*point.series, point.samples, point.pitch)
