@@ -193,7 +193,7 @@ class Run:
         return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
-        """Remove the checkpoints of candidates whose training will not continue; OSError if that is impossible."""
+        """Remove the checkpoints of candidates whose training will not continue; OSError if one cannot be removed."""
         for candidate_id in candidate_ids:
             for path in (self.path / TRAININGS).glob(f"{candidate_id:06d}-*.safetensors"):
                 path.unlink(missing_ok=True)
