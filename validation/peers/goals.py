@@ -89,9 +89,9 @@ def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -
 
 
 def own_best(peers: Iterable[Point]) -> list[Point]:
-    """Return the point of the smallest error of each peer, among methods that solve the same problem.
+    """Return the point with the smallest error of each peer, without paraxial methods.
 
-    Paraxial methods are excluded, because by chance they are most accurate with a handful of samples.
+    Paraxial methods solve another problem, and by chance they are most accurate with a handful of samples.
     """
     found: dict[str, Point] = {}
     for point in peers:

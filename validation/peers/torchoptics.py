@@ -40,7 +40,7 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
 def _target(case: Case, grid: SampleGrid) -> SampleGrid:
     """Return a grid with an odd number of samples that covers the window, with the pitch of `grid`.
 
-    The sum of this number and the number of samples of `grid.odd` is one with a fast Fourier transform.
+    The number is chosen so that the convolution with the samples of `grid.odd` has a fast Fourier transform.
     """
     least = 2 * math.ceil(case.half_window / grid.dx) + 1
     if grid.dx > case.window.dx:
