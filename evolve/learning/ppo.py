@@ -78,7 +78,7 @@ class Episodes:
 
 
 class AdaptingPPO(PPO):
-    """PPO with normalised signals and rewards. Training raises TrainingDiverged if its numbers are not finite.
+    """PPO with normalised signals and rewards. Training ends with an error if its numbers are not finite.
 
     Rewards are divided by their unit, which follows the spread of the discounted returns. At the start of training,
     agents often touch walls, and the costs of contact are about a hundred times larger than all later rewards. Without
