@@ -70,7 +70,7 @@ class Auxiliary:
         Points are followed from their present positions back to the previous poses. The flow is the negative of this
         motion.
 
-        depth, ids: what the centre of each receptor sees, see `flow_between`
+        depth, ids: depth and geom id of the point that is visible at the centre of each receptor, see `flow_between`
         """
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)

@@ -105,7 +105,10 @@ class EyesOfKind:
         return signals if self._shot is None else self._shot(signals, self._normals.launch(worlds).wait())
 
     def _normals_of(self, worlds: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return normal numbers of this shape for the noise of these worlds; motion detectors add no noise."""
+        """Return normally distributed numbers of this shape for the noise; zeros for motion detectors, without noise.
+
+        worlds: indices of the worlds, which determine the random generators
+        """
         drawn = self._normals.launch(worlds).wait()
         return np.concatenate([drawn, np.zeros_like(drawn)], axis=2) if drawn.shape != shape else drawn
 

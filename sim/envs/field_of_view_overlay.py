@@ -57,8 +57,8 @@ class _Field:
     pixels, depth: as in _Level, (n,)
     opacity: opacity of the overlay, (n,)
     distance: distance of the pixel's point from the eye [m], (n,)
-    ray: index of the nearest of the fan's rays to the right of the pixel's point, (n,)
-    share: angular position of the point between this ray, at 0, and the next ray, at 1, (n,)
+    ray: index of the fan's ray that is next to the pixel's point on its right, (n,)
+    share: angular position of the point between this ray (0) and the next ray to the left (1), (n,)
     """
 
     pixels: np.ndarray

@@ -35,7 +35,9 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     Raises:
         ValueError: an argument is invalid, or is `seed` or `n_envs`.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
-        RuntimeError: a method of a user task fails at the start of the first episode.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        RuntimeError: a method of a `sim.Task` fails at the start of the first episode. An exception of a
+            `sim.BatchTask` is raised unchanged.
     """
 
     metadata = {  # noqa: RUF012 (Gymnasium's own declaration)
