@@ -35,8 +35,9 @@ class CompoundEye:
     directions: viewing directions in the frame of the mount: unit vectors (ahead, left, up), (n, 3), or (azimuth to the
         left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The field is always
         converted to unit vectors.
-    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. An object that
-        occurs several times has its acceptance function computed once; equal objects are computed separately.
+    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. If the same object
+        occurs several times, its acceptance function is computed once. Distinct objects are computed separately, even
+        if they are equal.
     receptors: receptor types, see `optics.Eye`. Mosaics are not supported here; use `types`.
     types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). With one column, each
         ommatidium has a single receptor, as in a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7
@@ -124,7 +125,7 @@ class CompoundEye:
 
     @property
     def resolution(self) -> tuple[int, int]:
-        """Number of rows, and of ommatidia in a row; a single row if the directions are in no order."""
+        """Number of rows, and number of ommatidia in a row; a single row if `rows` is None."""
         return self.rows or 1, len(self) // (self.rows or 1)
 
     @property

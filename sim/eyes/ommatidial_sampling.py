@@ -107,7 +107,10 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
 
 
 def _tests(places: np.ndarray, spread: float) -> np.ndarray:
-    """Return the light of two scenes at places (place, 2): uniform, and a Gaussian of variance `spread` on the axis."""
+    """Return the light of two test scenes at places (place, 2), as an array (place, scene).
+
+    The light is uniform in the first scene, and a Gaussian of variance `spread` around the axis in the second.
+    """
     return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
 
 
