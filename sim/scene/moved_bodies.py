@@ -17,7 +17,7 @@ class ReferencePose:
 
     bodies: ids of the moving bodies. Geoms, sites and cameras move rigidly with them; no other body may be attached to
         them
-    turning: number of the first bodies that may also turn. The others keep their rotation
+    turning: number of bodies that may also rotate, which come first in `bodies`. The others keep their rotation
     """
 
     def __init__(self, model: mujoco.MjModel, bodies: Sequence[int], turning: int) -> None:
