@@ -50,9 +50,10 @@ class ModelLight:
 def model_lights(
     model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray
 ) -> tuple[list[ModelLight], list[str]]:
-    """Return a model's lights, except for the sky, at wavelengths [m], and messages about properties without a mirror.
+    """Return a model's lights, except for the sky, at wavelengths [m], and messages about properties left out.
 
-    The scene's Mitsuba variant must be active.
+    The messages describe properties of lights that have no counterpart in Mitsuba. The scene's Mitsuba variant must be
+    active.
     """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

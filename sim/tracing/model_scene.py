@@ -60,7 +60,7 @@ class ModelScene:
     as_built: snapshot of the model, with which worlds are compared
 
     Raises:
-        ValueError: the model has no visible geoms, or lacks a part that has spectra or is varied.
+        ValueError: the model has no visible geoms, or lacks an element that `spectra` or `varied` names.
     """
 
     def __init__(

@@ -52,7 +52,7 @@ class AreaTables:
 class FrameState:
     """Inputs of area sampling for one frame.
 
-    bodies: centres of the moving spheres; the agent is the last one
+    bodies: centres of the moving spheres; the body that carries the eyes is the last one, if it is a sphere
     inputs: tables that are the same in all worlds
     world: index of the world of each area
     body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is neglected
