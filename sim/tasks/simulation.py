@@ -28,6 +28,7 @@ LEAST_RETURN = "least return"
 
 class Simulation:
     """Independent worlds of one task. An exception in a method of a `sim.BatchTask` is raised unchanged.
+
     task: rules of the task
     n: number of worlds
     seed: seed of all random number generators; None: a random seed

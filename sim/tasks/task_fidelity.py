@@ -79,7 +79,7 @@ def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
 
     Raises:
         ValueError: see `fidelities_of`.
-        RuntimeError: a method of the task fails at the start of an episode.
+        RuntimeError: see `fidelities_of`.
     """
     if not isinstance(task, PerWorld):
         return fidelities_of(task)
