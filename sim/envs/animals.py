@@ -20,7 +20,11 @@ Pending = list[dict[str, PendingFrame]]  # for each agent with eyes: frames by k
 
 @dataclass(frozen=True)
 class Advanced:
-    """The outcome of an action, and frames that are still being rendered."""
+    """The outcome of an action, and frames that are still being rendered.
+
+    step: outcome of the action
+    pending: frames after the action, for each agent in `Animals.seeing`
+    """
 
     step: Step
     pending: Pending

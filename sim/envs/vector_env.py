@@ -34,6 +34,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
 
     Raises:
         ValueError: an argument is invalid, or is `seed` or `n_envs`.
+        TypeError: `sim.make_vec_env` has no argument of this name.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
         RuntimeError: a method of a `sim.Task` fails at the start of the first episode. An exception of a
