@@ -47,7 +47,7 @@ class CompoundEye:
     photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised. A
         wide facet therefore has less shot noise than a narrow one with the same field. None: no shot noise
     rows: number of rows, if the directions are those of `sim.hexagonal_rows`. Observations then have the axes of an
-        `optics.Eye`, (memory, eye, channel, row, column). None: the directions are in no order
+        `optics.Eye`, (memory, eye, channel, row, column). None: the directions form no rows
     radius: radius [m] of the eye's surface, a sphere around the mount on which the facets lie. Facets must not overlap.
         None: all facets are at the mount, and may overlap
     spectral_bands: attribute, the bands and the weights of the receptor types in them (`optics.SpectralBands`)

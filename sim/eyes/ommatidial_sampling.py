@@ -28,8 +28,8 @@ class OmmatidialSampling:
 
     An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
     weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. Equal
-    ommatidia share PATTERNS arrangements of rays, one of which is drawn for each ommatidium, so that the errors of
-    neighbours are nearly independent.
+    ommatidia share PATTERNS arrangements of rays. One of them is chosen at random for each ommatidium, so that the
+    errors of neighbours are nearly independent.
 
     depth: a single layer, because facets have a large depth of field
     """
