@@ -99,7 +99,7 @@ def varied_geoms(
     If `varied` lists no materials for a geom, its tuple of ids is empty.
 
     seen: ids of the visible geoms
-    varied: names of the geoms, or names of the materials of each geom by its name
+    varied: names of the geoms; or a mapping from each of these names to the names of the geom's materials
 
     Raises:
         ValueError: `varied` contains a name that no visible geom has, or the name of a material that the model lacks;

@@ -46,7 +46,7 @@ class Divisor:
 
     Processors have no instruction that divides several whole numbers at once. A kernel would divide lane by lane, which
     takes as long as a seventh of the rendering of the built-in worlds. `quotient` therefore multiplies and shifts (fig.
-    4.1 in Granlund and Montgomery 1994). The number is an input, so kernels for other numbers are the same.
+    4.1 in Granlund and Montgomery 1994). The number is an input of kernels, so one kernel serves all numbers.
 
     number: the divisor
     factor, first_shift, second_shift: numbers from which quotients are computed

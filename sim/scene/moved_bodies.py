@@ -1,4 +1,4 @@
-"""Poses of models in which only a few bodies move. Other arrays are built only when they are read."""
+"""Poses of models in which only a few bodies move. Arrays with all elements are built only when they are read."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ class WorldModels:
         """Set a world's sizes, colours and materials, and reset all other fields of its model to the compiled values.
 
         Raises:
-            ValueError: a drawn material is not one of the materials that may be drawn for the geom.
+            ValueError: a material in `drawn` is not one of the materials that `variation` lists for the geom.
         """
         mine = self.models[world]
         if self.own and self.get_state(world) != self._compiled:
@@ -129,7 +129,7 @@ class WorldModels:
             getattr(data, where)[address] = drawn[name]
 
     def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
-        """Return the ids of the materials that may be drawn for a geom, by the names of the materials.
+        """Return the ids of the materials that episodes may choose for a geom, by the names of the materials.
 
         Raises:
             ValueError: the geom's colour is also varied or replaces that of its materials, or a material is unknown.
