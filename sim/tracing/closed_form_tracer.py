@@ -87,7 +87,8 @@ class ClosedForm:
     world, walls, footprints, lights, components: the parts of the scene
     medium: water or air between surfaces and eyes; None: clear air
     faces: textures of walls and floor, see `face_rows`
-    sphere_textures: for each visible sphere, the map from texture coordinates to texels, and the place of its texture
+    sphere_textures: for each sphere that rays can hit, the map from texture coordinates to texels, and the place of its
+        texture in the atlas
 
     Raises:
         NoClosedForm: there are many walls, and they lie on no grid. There are further reasons if light is reflected
