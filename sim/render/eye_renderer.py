@@ -169,7 +169,7 @@ class EyeRenderer:
 
         `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to FEW worlds
         are rendered in separate buffers, so that a frame of all worlds may be pending at the same time. The errors are
-        those of `signals`, and an IndexError for an unknown world.
+        those of `signals`, and an IndexError, which `wait` may raise, for an unknown world.
         """
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
