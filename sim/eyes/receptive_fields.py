@@ -48,9 +48,9 @@ class Draw:
 class ReceptiveFields:
     """Tabulated receptive fields of an eye.
 
-    field: power per cell of one receptor's field, (plane, y, x), with one plane for each band of each depth layer. It
-        is the PSF, rotated by 180° and convolved with the receptor's square. If receptors are waveguides, it is a
-        waveguide's acceptance of light from each cell.
+    field: power per cell of one receptor's field, (plane, y, x), with one plane for each band of each depth layer. A
+        plane is the PSF, rotated by 180° and convolved with the receptor's square. If receptors are waveguides, a plane
+        is a waveguide's acceptance of light from each cell.
     density: probability per cell of the mixture, which is the mean of the fields of all receptors and planes, (Y, X)
     resolution: receptors (height, width)
     cells: cells along a receptor's side
