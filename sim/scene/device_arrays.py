@@ -1,7 +1,8 @@
 """NumPy arrays in aligned memory that kernels can read.
 
 Dr.Jit compiles a kernel again for every alignment of its inputs. It also records a frozen kernel again if the arrays of
-any Mitsuba shape in memory, even in another scene, have another alignment than when the kernel was recorded.
+a Mitsuba shape have another alignment than when the kernel was recorded. This applies to all shapes in memory, even in
+other scenes.
 """
 
 from __future__ import annotations
