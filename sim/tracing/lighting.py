@@ -67,7 +67,7 @@ def clear_of(point: Array, normal: Array, clearance: float = 1) -> Array:
     """Return a point in front of the surface.
 
     clearance: distance of this point from the surface, relative to the distance at which Mitsuba's own shadow rays
-        start. The latter is 9e-5 times the sum of 1 m and the largest absolute coordinate of the point
+        start. Mitsuba's distance is 9e-5 times the sum of 1 m and the largest absolute coordinate of the point
     """
     offset = (1 + dr.max(dr.abs(point))) * (mi.math.RayEpsilon * clearance)
     return mi.Point3f(dr.fma(normal, offset, point))
