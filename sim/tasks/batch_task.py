@@ -215,7 +215,7 @@ class BatchTask(TaskSettings):
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 
     def in_mode(self, mode: str) -> Self:
-        """Return a copy of the task in the mode "training", "evaluation" or "test"; itself if it is in this mode."""
+        """Return the task in the mode "training", "evaluation" or "test": a copy, unless it already has this mode."""
         if self.mode == mode:
             return self
         found = copy.copy(self)
