@@ -31,7 +31,7 @@ class ReferencePose:
         self._kept: dict[tuple[int, ...], np.ndarray | None] = {}
 
     def moved(self, kind: str) -> list[int]:
-        """Return the ids of the elements of a kind that are fixed to the bodies."""
+        """Return the ids of the elements of a kind ("geom", "site" or "camera") that are fixed to moving bodies."""
         return [int(i) for i in np.flatnonzero(np.isin(self.body_of[kind], self.bodies))]
 
     def local(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
