@@ -112,7 +112,7 @@ class Lights:
     def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
         """Return the unit vector from a point to a light, the distance [m], and a factor of the light's level.
 
-        The factor is the fraction of the level that arrives on a surface that faces the light.
+        The level times this factor is the irradiance of a surface at the point that faces the light.
 
         axis: axis of the observing eye
         """
