@@ -26,7 +26,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         episode_steps, spectra, medium, vary, auxiliary, render_mode: see `sim.make_vec_env`
 
     Raises:
-        ValueError: an argument is invalid, or is `seed` or `n_envs`.
+        ValueError: an argument is invalid, or `seed` or `n_envs` was given.
         TypeError: `sim.make_vec_env` has no argument of this name.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.

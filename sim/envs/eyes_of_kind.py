@@ -141,7 +141,7 @@ class EyesOfKind:
     def _brightest(self) -> float:
         """Return the signal of a white surface that faces all directional lights at once.
 
-        If light varies, the surface is in the brightest light that can be drawn.
+        If light varies, this is the largest signal at the ends of its ranges (`Variation.extremes`).
         """
         variation = self._simulation.variation
         if variation is None or not variation.of_light:

@@ -111,8 +111,9 @@ class FieldsOfView:
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """Return the image (y, x, 3) uint8 with the visible part of every eye's field of view drawn into it.
 
+        picture: image from the camera, (y, x, 3) uint8; it is not changed
         nearness: function that returns 1 / depth of the surfaces in the image, see `Nearness`
-        data: MuJoCo's data with the current poses
+        model, data: MuJoCo's model of the world, and its data with the current poses
         """
         shown = picture.reshape(-1, 3).copy()
         heading = float(data.joint("agent_heading").qpos[0])

@@ -250,7 +250,7 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
     """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
 
-    field: field of every receptor, (plane, y, x) [cells]
+    field: field that all receptors share, as its power in each cell, (plane, y, x)
     resolution: rows and columns of receptors
     cells: number of cells along a receptor's side
     receptors: indices of the receptors, counted row by row

@@ -146,7 +146,7 @@ class AreaTracer:
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
-        """Return the rows `place` of a world's table of illuminated bodies, given the centres of its bodies."""
+        """Return the rows `place` of a world's table (`IlluminatedBodies`); bodies: centres of the world's bodies."""
         assert self._reflected
         assert inputs.reflected
         reflected = partial(self._reflected.on_body, tables=inputs.reflected)
