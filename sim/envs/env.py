@@ -88,8 +88,8 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         `sim.BatchTask` is raised unchanged.
 
         Raises:
-            ValueError: the action is not real, finite numbers of the right shape, or it is masked; or a `sim.BatchTask`
-                returns an invalid array.
+            ValueError: the action has another shape, is masked, or does not consist of real, finite numbers; or a
+                `sim.BatchTask` returns an invalid array.
             RuntimeError: there has been no reset yet, or `close` has been called.
         """
         observation, reward, terminated, truncated, info = self._batch.step_once(action)

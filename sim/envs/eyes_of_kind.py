@@ -105,7 +105,9 @@ class EyesOfKind:
         return signals if self._shot is None else self._shot(signals, self._normals.launch(worlds).wait())
 
     def _normals_of(self, worlds: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return normally distributed numbers of this shape for the noise; zeros for motion detectors, without noise.
+        """Return normally distributed numbers of this shape for the noise.
+
+        They are 0 for the outputs of motion detectors, to which no noise is added.
 
         worlds: indices of the worlds, which determine the random generators
         """

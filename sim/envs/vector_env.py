@@ -25,8 +25,8 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     The returned observation and info are then those of the start of the new episode. info["final_obs"] and
     info["final_info"] contain the last observation and info of the old episode.
 
-    `reset` accepts one seed or, as Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, world i
-    has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.
+    `reset` accepts one seed or, like Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, world
+    i has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.
 
     num_envs: number of worlds
     task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its `alone`
@@ -89,7 +89,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`; None without a mode.
 
         Raises:
-            RuntimeError: there has been no reset yet.
+            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
         """
         return None if self.render_mode is None else tuple(self._batch.get_images())
 

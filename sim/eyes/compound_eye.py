@@ -28,9 +28,9 @@ class CompoundEye:
     """A compound eye, used like `optics.Eye` in a task. Each ommatidium is a facet lens in front of a rhabdom.
 
     Every ommatidium collects light with its acceptance function, which wave optics computes for each band
-    (`optics.acceptance_function`). Signals are normalised: a white surface in full daylight that fills the field of an
-    ommatidium gives 1. Observations have the axes (memory, ommatidium, channel). If an eye has several mounts, the
-    ommatidia of the first mount come first.
+    (`optics.acceptance_function`). Signals are normalised: if a white surface in full daylight fills the field of an
+    ommatidium, the signal is 1. Observations have the axes (memory, ommatidium, channel). If an eye has several mounts,
+    the ommatidia of the first mount come first.
 
     directions: viewing directions in the frame of the mount: unit vectors (ahead, left, up), (n, 3), or (azimuth to the
         left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The field is always

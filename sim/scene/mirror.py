@@ -126,7 +126,7 @@ class Mirror:
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
-        """Return the BSDF of a geom in or outside the scene. KeyError: unknown name. IndexError: unknown id."""
+        """Return the BSDF of a geom, which need not be in the scene. KeyError: unknown name. IndexError: unknown id."""
         index = self.model.geom(geom).id
         with in_variant(self.variant):
             return self._bsdf(index)

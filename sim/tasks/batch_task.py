@@ -50,11 +50,11 @@ class Agent:
 class BatchTask(TaskSettings):
     """A task whose methods receive all worlds at once.
 
-    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task`, except for `others`,
-    and those listed below. Arrays have one row for each world. The argument `worlds` of the methods is the object that
-    `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`,
-    `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a
-    task follows this description.
+    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task` without `others`,
+    together with those listed below. Arrays have one row for each world. The argument `worlds` of the methods is the
+    object that `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays
+    (`worlds.qpos`, `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task`
+    tests whether a task follows this description.
 
     An exception in a method ends the simulation of all worlds, and reaches the caller of the environment unchanged.
     The environment raises a ValueError if a method returns an invalid array.

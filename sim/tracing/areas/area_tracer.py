@@ -49,7 +49,7 @@ class AreaTracer:
 
     Raises:
         NoClosedForm: the walls have several heights or lie on no grid, a texture changes along two axes, a shadow is
-            longer than a cell, or the tables of reflected light need walls or fewer cells.
+            longer than a cell, or light is reflected more than once and there are no walls or too many cells.
     """
 
     name = "areas"
