@@ -35,9 +35,9 @@ class ConvergingWave:
     on_plane: rim [m] of the pupil on its plane, which lies `distance` in front of the image.
     distance: radius of the sphere [m].
     wavelength: vacuum wavelength [m].
-    position: the point (x, y) [m] on the image plane; None if the object does not contain it.
-    height: position [m] of the image plane relative to the origin, along the light and perpendicular to the plane; None
-        if the object does not contain it.
+    position: the point (x, y) [m] on the image plane; None if the other program's object does not contain it.
+    height: distance [m] from the origin of the object's coordinates to the image plane, perpendicular to the plane and
+        positive in the direction of the light; None if the object does not contain it.
     """
 
     sines: np.ndarray
@@ -101,8 +101,13 @@ def is_of_samples(system: Any) -> bool:
 def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave:
     """Return the wave of an object with pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves].
 
+    wavelength: vacuum wavelength [m].
     image_normal: normal of the image plane in the object's coordinates. None: the z axis. The x axis of the image plane
         is the projection of the object's x axis.
+
+    Raises:
+        ValueError: a number of the object or the normal is invalid, no ray has light, or the pupil is obscured or not
+            convex.
     """
     normal = _unit(ON_Z if image_normal is None else image_normal)
     x, y, z, opd, intensity = _alike(system)
@@ -186,7 +191,7 @@ def _centre(places: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
-    """Return the phase [rad], unwrapped first along the brightest column and then along every row."""
+    """Return the phase [rad], unwrapped along the column with the most illuminated samples, then along every row."""
     phase, middle = np.where(lit, np.angle(data), 0.0), int(lit.sum(axis=0).argmax())
     phase[:, middle] = np.unwrap(phase[:, middle])
     right, left = np.unwrap(phase[:, middle:], axis=1), np.unwrap(phase[:, middle::-1], axis=1)[:, ::-1]

@@ -98,7 +98,8 @@ class ExitPupil:
         along the plane, which `optics.psf` at another sensor distance would ignore.
 
         origin: point (x, y) [m] of the image plane that becomes the origin of the PSF. Exit pupils of several
-            wavelengths with a common origin include lateral colour. None: the ray through the pupil's centre.
+            wavelengths with a common origin include lateral colour. None: the point that the ray through the pupil's
+            centre hits.
 
         Raises:
             ValueError: an argument is not finite, the shift is longer than half the distance to the pupil, or an origin

@@ -77,9 +77,10 @@ def rim_around(lit: np.ndarray, dark: np.ndarray | None = None) -> Rim:
 
     Circle and oval are least-squares fits to all corners of the convex hull. On a grid with an even number of samples,
     a single sample can lie on the rim, so it must not determine the fit. If neither fits, the rim is the hull. If there
-    are dark samples, the hull is extended half way to them, and otherwise up to the circle or oval around all samples.
+    are also dark samples, each edge of the hull is moved outwards: half way to the nearest dark sample or, if none is
+    near, to the circle or oval around all samples.
 
-    dark: positions (2, m) of samples without light.
+    dark: positions (2, m) of samples without light. None: unknown.
 
     Raises:
         ValueError: the samples lie on a line, or the hull is needed and its samples are too far apart.

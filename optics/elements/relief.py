@@ -167,7 +167,7 @@ class HeightMap(Relief):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: the array is not two-dimensional, empty, of half precision, or not all finite real numbers.
+        ValueError: the array has another number of axes, is empty, of half precision, or not of finite real numbers.
     """
 
     samples: np.ndarray | Array

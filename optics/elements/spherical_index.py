@@ -70,6 +70,9 @@ class SphericalIndex:
         """Return the optical path lengths of rays inside the sphere, in units of R times the medium's index.
 
         h: heights of the rays relative to R, an array of any shape. The result has the same shape.
+
+        Raises:
+            ValueError: see `turning`.
         """
         y, end, n, _, radial = self._along(h)
         return np.asarray(2 * end * ((n * n * y / radial) @ gauss_legendre(NODES)[1]))

@@ -102,7 +102,7 @@ class TurbidMedium:
         return BandMedium(c, bands.band_values(_in_daylight(self.veil), receptors, nonnegative=True))
 
     def band_error(self, bands: int, receptors: Any) -> float:
-        """Return the largest error of a signal due to this number of bands, relative to a white surface in daylight.
+        """Return the largest error of a signal due to this number of bands, relative to that of white in daylight.
 
         The maximum is taken over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
         The reference is the integral over the spectrum in steps of 1 nm. Without attenuation the error is 0.

@@ -135,9 +135,9 @@ class Zernike(Aberration):
 
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
 
-        Fringe polynomials are 1 at the rim, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ. Their coefficients are therefore
-        divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use them. A row that is a
-        Dr.Jit array is not accepted.
+        Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. Their
+        coefficients are therefore divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use
+        Fringe polynomials. A row that is a Dr.Jit array is not accepted.
 
         Raises:
             ValueError: a number is outside 1 to 36, or a coefficient is invalid, see `Zernike`.
