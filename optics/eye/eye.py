@@ -128,17 +128,17 @@ class Eye(EyeSpec):
 
         The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
         enough to lose less than the tolerance (limits: see `visual_kernel`). Light of a steep relief may count as
-        blocked if it lands farther from the image than the longer side of the retina. A perfect lens has the kernel 1.
-
-        The kernel treats the light of each scene cell as coming from its centre. Signals are then a² Σ_b weights[c, b]
-        (kernel_b ⊗ radiance_b), averaged over each receptor's cells. By default, `see` assumes light from all over each
-        cell instead (see `light_from` of `sight`).
+        blocked if it lands farther from the image than the longer side of the retina. A perfect lens has the kernel 1,
+        a single cell. The kernel treats the light of each scene cell as coming from the cell's centre. Signals are then
+        a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b), averaged over each receptor's cells. By default, `see` assumes
+        light from all over each cell instead (see `light_from` of `sight`).
 
         With waveguides, the kernel is the fraction of each scene cell's light that a receptor accepts, averaged over
         the cell. The cells lie around the receptor's direction. Signals are not averaged over the receptor. ky and kx
         are even if samples_per_receptor is even. The kernel's sum is relative to a square that absorbs all light.
 
         Raises:
+            ValueError: an argument is invalid, the waveguide has no mode, or it is combined with derivatives.
             AccuracyError: see `optics.psf`.
         """
         positive("z", z, infinite=True, carried=True)
@@ -178,8 +178,8 @@ class Eye(EyeSpec):
         depth_layers: number of kernels between the nearest and the farthest distance, evenly spaced in 1/z. "auto": the
             smallest number that meets the tolerance. "distinct": one kernel for each different distance in z, at most
             64.
-        field_zones: number of kernels across the width of the field; or "auto". With 1, the kernel on the axis is used
-            for the whole retina.
+        field_zones: number of kernels along the longer side of the field; or "auto". With 1, the kernel in the middle
+            of the field is used for the whole retina.
         tolerance: largest error of a receptor's signal, relative to the signal of a white surface, for any scene at
             most as bright as white (None: the eye's tolerance).
         light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" treats all light
@@ -259,7 +259,7 @@ class Eye(EyeSpec):
     def _last_sight(self, samples_per_receptor: int, z: Any) -> KernelBank:
         """Return `sight` for these samples and distances, from the preceding call of `see` if possible.
 
-        Kernels that depend on Dr.Jit arrays are computed again, because these may carry derivatives.
+        Kernels that depend on Dr.Jit arrays are computed again, because the arrays may carry derivatives.
         """
         layers, distances = layers_for(z)
         if holds_arrays(z) or holds_arrays(self):

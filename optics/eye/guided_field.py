@@ -118,7 +118,10 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Number of cells in a row, their side, and the sampling distance that resolves a receptor's field, as tangents."""
+    """Cells in a row: their number, their side, and the sampling distance that resolves a receptor's field.
+
+    Lengths are tangents of angles.
+    """
 
     count: int
     side: float
@@ -149,7 +152,7 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return integrals over cells of E (row, column), and their sum relative to the integral over all directions.
+    """Return integrals of E over cells, (row, column), and the share of E's integral over all directions there.
 
     E is the accepted fraction of a source's light. Areas of cells are in squared tangents.
     """

@@ -56,6 +56,8 @@ class KernelBank:
     def shares(self, inverse_distance: np.ndarray) -> list[Any]:
         """Return the interpolation weight (Y, X) of each node in every cell of a scene, one array per node.
 
+        For a single node, the only weight is the number 1.
+
         inverse_distance: 1/z [1/m] of the cells, (Y, X).
         """
         if len(self.kernels) == 1:
@@ -104,6 +106,10 @@ def prepare(
     mean: number of cells along the side of the square over which errors are averaged, as in a receptor's signal (None:
         samples_per_receptor).
     white: function that returns the fraction of the signal of a white surface that the kernels transmit.
+
+    Raises:
+        ValueError: a number or a distance is invalid, or there are too many distances for "distinct" layers.
+        AccuracyError: the tolerance requires more kernels than the limit.
     """
     s, depths = samples_per_receptor, DepthRange.from_distances(z)
     exactly = isinstance(counts[0], str) and counts[0] == DISTINCT
