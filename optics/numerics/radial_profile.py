@@ -116,7 +116,7 @@ class DistinctRadii:
 
     They are used if a window has few samples for the structure that it contains.
 
-    The number of distinct radii of a square about the axis is less than an eighth of the number of its samples.
+    A square of 33 x 33 or more samples about the axis has fewer distinct radii than an eighth of that number.
     """
 
     window: Grid

@@ -5,8 +5,9 @@ Rayleigh-Sommerfeld integral over the pupil, and the order of the two integrals 
 
     c(s) = ∫ ψ(x) U_s(x) dx = ∫ P(ξ) e^{ik n₀ s·ξ} Ψ(ξ) dξ,   Ψ(ξ) = ∫ ψ(x) z/(2πD²) (1/D - ik) e^{ikD} dx.
 
-Each mode is therefore propagated back to the pupil once. The amplitudes for all directions s (sines) then follow from
-one Fourier sum. A waveguide off the pupil's axis points at the pupil's centre. The module `radiation` computes Ψ.
+P is the amplitude that the pupil transmits, D the distance from x to ξ, and z the distance from the pupil to the end of
+the waveguide. Each mode is propagated back to the pupil once. The amplitudes for all directions s (sines) then follow
+from one Fourier sum. A waveguide off the pupil's axis points at the pupil's centre. The module `radiation` computes Ψ.
 """
 
 from __future__ import annotations
@@ -69,6 +70,7 @@ class ModesAtPupil:
 
         sines: grid of sines of the light's directions.
         taken: weight of each mode, for example the fraction of its light that is absorbed.
+        digits: digits of the Fourier sum.
         """
         per_sample = self.wavenumber / (2 * math.pi) * sines.dx
         sums = ScatteredSum(self.x * per_sample, self.y * per_sample, sines.shape, digits)

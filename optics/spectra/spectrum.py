@@ -126,6 +126,9 @@ def cie_1931(wavelengths: np.ndarray) -> np.ndarray:
     """Return the CIE 1931 2° colour matching functions x̄, ȳ, z̄, (wavelength, 3).
 
     wavelengths: wavelengths [m] in 300-780 nm. The functions are 0 below 360 nm.
+
+    Raises:
+        ValueError: a wavelength is outside its range.
     """
     table = _table("colour_tables.csv")[1]
     nm = _nanometres(wavelengths)
