@@ -2,8 +2,8 @@
 
 Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
 width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
-diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. The softer edge only
-changes light far from the geometrical rays of the edge, where there is little light.
+diffracted at the edge of the pupil spreads further. A soft edge keeps this light out of the window. Softening the edge
+changes light only far from the geometrical rays of the edge, where there is little light.
 
 If most light of a strongly curved wave misses the window, the wave itself is smoothed with the edge (`curved_disk`).
 This removes light in directions far from the window. The number of samples is then almost independent of the
