@@ -41,6 +41,8 @@ SINGLE = 1e-4  # choice: smallest tolerance for which float32 is sufficient
 class Converging(ReadOnlyArrays):
     """Light behind a pupil.
 
+    beam: light in front of the pupil and through it, to the plane of the image.
+    aplanatic: True for a corrected objective, see `vector_focus`.
     jones: Jones vectors of the parts of the light that do not interfere with each other, (part, 2).
     stokes: Stokes parameters of all light, divided by the first.
     tolerance: relative L2 error of the intensity over a window.

@@ -34,7 +34,7 @@ class LensMTF(ReadOnlyArrays):
     frequencies: spatial frequencies [1/m] on the image plane, (frequency,).
     tangential: contrast of patterns that vary along the direction from the axis to the image, (field, shift,
         frequency). On the axis, this is the direction y.
-    sagittal: contrast of patterns that vary along the direction perpendicular to it.
+    sagittal: contrast of patterns that vary perpendicular to this direction.
     predicted_error: predicted error of any contrast, (field, shift).
     """
 

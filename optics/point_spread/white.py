@@ -162,8 +162,7 @@ def white_psf(
     light: name of an illuminant, a Spectrum, or spectral power as a function of wavelengths [m].
     receptors: receptor types, see `optics.receptors_of`. Results are in the order of the types.
     waves: number of wavelengths over the receptors' range: odd, 5 to 513, or "auto" for the fewest that meet the
-        tolerance. Cubic splines interpolate PSFs between the wavelengths. The plan of the first wavelength is used for
-        all, provided that it is accurate enough.
+        tolerance. Cubic splines interpolate PSFs between the wavelengths.
     tolerance: relative L2 error over the window, for PSFs and spectrum together.
     asked: further arguments of `optics.psf`, apart from wavelengths.
 

@@ -86,7 +86,7 @@ class SeparableSampling:
         return max(self.source.shape)
 
     def seconds(self, real: str, planes: int = 1) -> float:
-        """Return the predicted time of the propagation of planes, including the matrices.
+        """Return the predicted time [s] of the propagation of planes, including the matrices.
 
         real: type of real and imaginary parts, "float32" or "float64".
         """

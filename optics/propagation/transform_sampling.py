@@ -77,7 +77,7 @@ class TransformSampling:
         return self.period, self.period
 
     def seconds(self, real: str, planes: int = 1) -> float:
-        """Return the predicted time of the propagation of planes, including the transfer function.
+        """Return the predicted time [s] of the propagation of planes, including the transfer function.
 
         real: type of real and imaginary parts, "float32" or "float64".
         """
