@@ -224,7 +224,7 @@ def _operation(compute: Callable[[Any], Any], element: Any, device: Any) -> torc
 
 
 def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
-    """Return the pupil of a call that passes heights and arguments of `Pupil`."""
+    """Return the pupil of a call that passes heights and arguments of `Pupil`; ValueError without a radius."""
     if heights is None and given.keys() == {"pupil"}:
         return given["pupil"]
     heights = of_kind("heights", given.get("heights", heights), torch.Tensor, "torch.zeros(4, 4)")

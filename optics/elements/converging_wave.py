@@ -171,7 +171,11 @@ def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWav
 
 
 def _alike(system: Any) -> list[np.ndarray]:
-    """Return pupil_x, pupil_y, pupil_z, opd and intensity (1 if missing) of all rays, one flat array each."""
+    """Return pupil_x, pupil_y, pupil_z, opd and intensity (1 if missing) of all rays, one flat array each.
+
+    Raises:
+        ValueError: the attributes have different lengths, or contain something other than real numbers.
+    """
     found = {name: _flat(name, getattr(system, name)) for name in ("pupil_x", "pupil_y", "pupil_z", "opd")}
     rays = len(found["pupil_x"])
     found["intensity"] = _flat("intensity", getattr(system, "intensity", np.ones(rays)))
@@ -182,7 +186,7 @@ def _alike(system: Any) -> list[np.ndarray]:
 
 
 def _centre(places: np.ndarray, radius: float) -> np.ndarray:
-    """Return the centre of the sphere through the points (3, n)."""
+    """Return the centre of the sphere through the points (3, n); ValueError if its radius is not about `radius`."""
     matrix = np.concatenate([2 * places, np.ones((1, places.shape[1]))]).T
     found = np.linalg.lstsq(matrix, np.sum(places**2, axis=0), rcond=None)[0][:3]
     if not np.isclose(np.linalg.norm(places - found[:, None], axis=0).mean(), radius, rtol=0.05):
@@ -199,7 +203,7 @@ def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
 
 
 def _flat(name: str, values: Any) -> np.ndarray:
-    """Convert a NumPy array, or a tensor that can become one, to a flat float64 array."""
+    """Convert an array of NumPy, or a tensor, to a flat float64 array; ValueError unless it contains real numbers."""
     values = full_precision(name, values)
     plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
     try:
@@ -209,7 +213,7 @@ def _flat(name: str, values: Any) -> np.ndarray:
 
 
 def _one(name: str, value: Any) -> float:
-    """Return a number, or the first number of an array, in the other program's unit."""
+    """Return a number, or the first of an array, in the other program's unit; ValueError if it is 0 or not finite."""
     found = _flat(name, value)
     if value is None or found.size == 0 or not abs(found[0]) > 0 or not np.isfinite(found[0]):
         raise ValueError(f"{name} = {shown(value)}: must be a finite number that is not 0")

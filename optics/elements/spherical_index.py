@@ -87,7 +87,11 @@ class SphericalIndex:
         return float(2 - 2 / self.index(1.0) - 4 * bend @ weights)
 
     def _turning_point(self, h: np.ndarray) -> np.ndarray:
-        """Return (r/R)² at the turning points of rays of relative height h, where n r/R = h."""
+        """Return (r/R)² at the turning points of rays of relative height h, where n r/R = h.
+
+        Raises:
+            ValueError: the index just inside the surface is so low that a ray is totally reflected there.
+        """
         edge = float(self.index(1.0))
         if not (h < edge).all():
             raise ValueError(f"surface_n is {edge:.4g} of medium_n: must be larger, or rays at the rim are reflected")

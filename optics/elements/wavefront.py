@@ -276,7 +276,7 @@ def _check_mode(key: Any) -> None:
 
 
 def _of_vector(given: Any) -> dict[tuple[int, int], float]:
-    """Convert a vector, ordered by the index of OSA, to a dictionary of modes."""
+    """Convert a vector, ordered by the index of OSA, to a dictionary of modes; ValueError if it is invalid."""
     vector = plain_reals("coefficients_um", given)
     most = (HIGHEST + 1) * (HIGHEST + 2) // 2
     if vector.ndim != 1 or not 0 < vector.size <= most:

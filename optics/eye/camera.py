@@ -168,7 +168,11 @@ def _camera_eye(pupil: Pupil, sensor: Sensor, distance: float, tolerance: float)
 
 
 def _radiance(scene: Any, eye: Eye, samples_per_pixel: int) -> np.ndarray:
-    """Return the radiance (band, Y, X) of an sRGB image, or of a scene that is spectral already."""
+    """Return the radiance (band, Y, X) of an sRGB image, or of a scene that is spectral already.
+
+    Raises:
+        ValueError: the scene has another shape, or values that are invalid.
+    """
     values = reals("scene", scene)
     if values.ndim != 3 or (values.shape[2] != 3 and len(values) != eye.bands):
         raise ValueError(
@@ -192,7 +196,7 @@ def _radiance(scene: Any, eye: Eye, samples_per_pixel: int) -> np.ndarray:
 
 
 def _distances(depth: Any, shape: tuple[int, ...]) -> Any:
-    """Return the distance, or the map of distances, after checks."""
+    """Return the distance, or the map of distances; ValueError unless they are positive and fit the scene's `shape`."""
     if is_differentiable(depth) or np.ndim(found := reals("depth", depth)) == 0:
         positive("depth", depth, infinite=True, carried=True)
         return depth

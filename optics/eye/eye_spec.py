@@ -270,5 +270,5 @@ class EyeSpec:
         return self.spectral_bands.band_values(radiance, self.receptors)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the spectral bands for `bands="auto"`. The choice needs kernels, so only `Eye` implements it."""
+        """Return the spectral bands for `bands="auto"`. Only `Eye` can choose them; others raise a ValueError."""
         raise ValueError("bands = 'auto': must be a number of bands, except in an Eye")

@@ -144,7 +144,7 @@ class _Cells:
 
 
 def _radius(waveguide: Waveguide, beam: Beam) -> float:
-    """Return the radius [m] that contains the field of the best confined mode."""
+    """Return the radius [m] that contains the field of the best confined mode; ValueError if there is no mode."""
     modes = waveguide.modes(beam.wavelength)
     if not modes:
         raise ValueError(f"waveguide: has no guided mode at {beam.wavelength:g} m; must be wider, or of a higher index")
@@ -180,7 +180,11 @@ def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cell
 
 
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
-    """Return a grid of sines that covers the sines x and y, with the margin that a spline needs."""
+    """Return a grid of sines that covers the sines x and y, with the margin that a spline needs.
+
+    Raises:
+        AccuracyError: the grid needs more samples than the limit.
+    """
     centre = tuple(float(axis.min() + axis.max()) / 2 for axis in (x, y))
     sides = [math.ceil(float(np.ptp(axis)) / (2 * step)) for axis in (y, x)]
     shape = tuple(2 * (side + MARGIN) + 1 for side in sides)

@@ -207,7 +207,11 @@ def _weighed(result: PSFResult, catches: np.ndarray, ends: tuple[float, float]) 
 
 
 def _quantum_catch(light: Any, kinds: Any) -> np.ndarray:
-    """Return the normalised quantum catch of each type at steps of 1 nm, (type, nm)."""
+    """Return the normalised quantum catch of each type at steps of 1 nm, (type, nm).
+
+    Raises:
+        ValueError: the light is invalid, or a type does not absorb it.
+    """
     source = illuminant(light) if isinstance(light, str) else light
     if not isinstance(source, Spectrum) and not callable(source):
         raise ValueError(f"light = {shown(light)}: must be an illuminant's name, a Spectrum or a function of λ [m]")
