@@ -140,7 +140,7 @@ def _images(
 def _stacked(
     light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
 ) -> dict[int, torch.Tensor]:
-    """Return the PSFs that stacks compute within the tolerance, (wavelength, y, x), by the index of the member."""
+    """Return {index of a member: its PSFs (wavelength, y, x)} for members that stacks compute within the tolerance."""
     found: dict[int, torch.Tensor] = {}
     fixed = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()})
     asked = wavelengths, Grid(view["shape"], view["dx"], view["centre"]), view["dtype"]

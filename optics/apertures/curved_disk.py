@@ -50,7 +50,7 @@ def curved_ring(edge: SoftEdge, inner: float, curvature: float, levels: int) -> 
 
 
 def _rule(first: float, last: float, cycles: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes and weights between two radii or frequencies."""
+    """Return nodes and weights between two radii or frequencies for functions with `cycles` cycles between them."""
     at, weight = gauss_legendre(gauss_legendre_count(stepped_up(cycles), DIGITS))
     return first + (last - first) * at, (last - first) * weight
 

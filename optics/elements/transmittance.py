@@ -44,7 +44,7 @@ class Mask(ABC):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True if the mask depends only on the distance from the axis, also under all requested derivatives."""
+        """True if the mask and its requested derivatives depend only on the distance from the axis."""
         return False
 
     @property

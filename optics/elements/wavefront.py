@@ -68,7 +68,7 @@ class Aberration(ABC):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True if the wavefront depends only on the distance from the axis, also under all requested derivatives."""
+        """True if the wavefront and its requested derivatives depend only on the distance from the axis."""
         return False
 
     def _check_radius(self) -> None:

@@ -184,7 +184,7 @@ class Eye(EyeSpec):
             most as bright as white (None: the eye's tolerance).
         light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" treats all light
             of a cell as coming from its centre. It suits cells whose radiance is the mean of finer detail, as in
-            rendered images. Its error is then less than half that of "cells", which is O(samples_per_receptor^-2).
+            rendered images. Its error is then less than half the error of "cells", which is O(samples_per_receptor^-2).
 
         Raises:
             ValueError: an argument is outside its valid range, which the message states.

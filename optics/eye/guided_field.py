@@ -129,7 +129,7 @@ class _Cells:
     tolerance: float
 
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return tangents (cell, node) along an axis from its middle, and weights that sum to a cell's side."""
+        """Return tangents (cell, node) along the row, from its middle, and weights that sum to a cell's side."""
         middle = (np.arange(self.count) - (self.count - 1) / 2) * self.side
         if not from_cell:
             return middle[:, None], np.array([self.side])
@@ -152,7 +152,7 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return integrals of E over cells, (row, column), and the share of E's integral over all directions there.
+    """Return integrals of E over cells, (row, column), and their share of E's integral over all directions.
 
     E is the accepted fraction of a source's light. Areas of cells are in squared tangents.
     """

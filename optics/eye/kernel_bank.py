@@ -41,9 +41,9 @@ class KernelBank:
     kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
     choices: the chosen numbers of nodes, for depth and for the field.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
-    parallax: shift of the image [cells] between opposite edges of the pupil, per difference of 1/distance [1/m]. Within
-        this shift, near surfaces hide far ones. 0: no surface hides another, as in renderers whose rays all pass the
-        middle of the pupil.
+    parallax: shift of the image [cells] between opposite edges of the pupil, per difference of 1/distance [1/m]. It
+        determines where near surfaces hide far ones. 0: no surface hides another, as in renderers whose rays all
+        pass the middle of the pupil.
     """
 
     inverse_distances: tuple[float, ...]

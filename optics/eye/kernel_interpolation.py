@@ -77,7 +77,7 @@ class NodeChoice:
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
     white: function that returns the fraction of the signal of a white surface that the kernels transmit. It is less
-        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, its computation requires a
+        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, the function computes a
         kernel.
     """
 

@@ -37,7 +37,7 @@ class SineGeometry:
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the outermost samples with light, (pupil,).
-    elsewhere: sines at which factors along the other axis are evaluated, see `slow_factor.axis_factor`, (pupil,).
+    elsewhere: sine along the other axis at which `slow_factor.axis_factor` evaluates the factor of an axis, (pupil,).
     """
 
     distance: np.ndarray
@@ -228,8 +228,8 @@ def rim_sines(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the largest sine of points on the rims, relative to the pupils' centres and along either axis, (pupil,).
 
-    The second result is the largest sine itself. The third one states for which pupils samples that are evenly spaced
-    in sines are even enough in the pupil.
+    The second result is the largest sine of all points on each rim, not relative to the centre. The third result is
+    True for pupils in which samples that are evenly spaced in sines are even enough.
 
     outermost: radii [m] of the rims.
     """

@@ -84,7 +84,7 @@ def _at_points(
 def _interpolated_kernel(
     path: Path, samples: SineStack, axis: int, place: np.ndarray, weight: np.ndarray
 ) -> np.ndarray:
-    """Return L_a A e^{-ik u s}, (stack, place · a, sine)."""
+    """Return the kernel L_a A e^{-ik u s} of `_at_points` along one axis, (stack, place · a, sine)."""
     kernel = axis_kernel(path, samples, axis, place, str(weight.dtype))
     return np.asarray((kernel[:, :, None, :] * weight).reshape(len(place), -1, weight.shape[1]))
 

@@ -104,13 +104,13 @@ class WindowEdges:
         return self._unless_mapped(wide, narrow)
 
     def _unless_mapped(self, wide: list[SoftAperture], narrow: list[SoftAperture]) -> list[SoftAperture]:
-        """Return wide soft edges, and narrow ones for maps: their fine detail sends light from the edge anywhere."""
+        """Return narrow soft edges for maps, whose fine detail sends light from the edge anywhere, else wide ones."""
         choices = zip(self.stack.mapped.tolist(), narrow, wide, strict=True)
         return [one if mapped else other for mapped, one, other in choices]
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, _Bands]:
-        """Curvatures, and the bands of the light."""
+        """Curvatures of the smoothed waves, and the bands of the light."""
         none = np.zeros(len(self.tolerance))
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
@@ -214,7 +214,7 @@ class WindowEdges:
         return (slopes.along_x + x * scale) * cycles, (slopes.along_y + y * scale) * cycles
 
     def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return ripples of the soft edges of the samples and of the finer samples, which fall in steps, (beam,)."""
+        """Return ripples of the soft edges of samples and of finer samples, (beam,), rounded down to steps."""
         share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0) ** RIPPLE_EXPONENT
         share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
         return RIPPLES[0] * share, RIPPLES[1] * share
@@ -258,7 +258,7 @@ class _Bands:
 def _transitions(ripples: np.ndarray) -> np.ndarray:
     """Return the smallest widths of the transition from passband to stopband, in cycles per radius.
 
-    The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to this one.
+    A narrower transition needs a wider soft edge, and the soft edge must not extend beyond EDGE_REACH.
     """
     return np.array([_transition(ripple) for ripple in ripples.tolist()])
 

@@ -84,7 +84,7 @@ def _on_torch(tensor: Array, place: str) -> torch.Tensor:
 
 
 def torch_place() -> str:
-    """Return the torch name of the device on which optics computes.
+    """Return PyTorch's name of the device on which optics computes.
 
     Raises:
         BackendError: Dr.Jit or this build of torch cannot compute on this device.

@@ -38,7 +38,7 @@ class ModesAtPupil:
     """Modes of a waveguide, propagated back to the nodes of a pupil.
 
     x, y: positions of the nodes [m].
-    weights: amplitude P of the pupil, times the mode's field Ψ at the node, times its area dξ, (mode, node).
+    weights: amplitude P of the pupil, times the mode's field Ψ at the node, times the node's area dξ, (mode, node).
     area_of: dξ of each node [m²].
     wavenumber: k n₀ [1/m] in front of the pupil.
     area: open area of the pupil [m²].
@@ -54,7 +54,7 @@ class ModesAtPupil:
     def power(self, sine_x: np.ndarray, sine_y: np.ndarray) -> np.ndarray:
         """Return the fraction of the light on the pupil that enters each mode, (mode, direction).
 
-        sine_x, sine_y: sines of the light's directions, relative to the sines of the source's direction.
+        sine_x, sine_y: sines of the light's directions, relative to the sines of the direction of the beam's source.
         """
         sx, sy = np.ravel(sine_x), np.ravel(sine_y)
         found = np.empty((len(self.weights), sx.size))

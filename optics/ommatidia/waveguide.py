@@ -80,7 +80,7 @@ class Mode:
         return here * here / (below * above)
 
     def _square(self) -> float:
-        """Return the integral of the squared field, scaled to 1 at the core's edge, in closed form."""
+        """Return the integral of the square of a field whose maximum along the core's edge is 1, in closed form."""
         azimuth = math.pi * (2 if self.l == 0 else 1)
         outside = self.radius**2 / 2 * (1 / self._kappa() - 1)
         return azimuth * outside / (1 - self.core_share)
@@ -213,7 +213,7 @@ class Waveguide:
 def _core_share(l: int, m: int, v: float) -> float:
     """Return `Mode.core_share` of the mode LP_lm at V.
 
-    Too near the cut-off for a computation, the result is the limit at the cut-off: 1 - 1/l, and 0 for l = 0.
+    If V is too near the cut-off for a computation, the result is the limit at the cut-off: 1 - 1/l, and 0 for l = 0.
     """
     u = _root(l, *_brackets(l, m)[m - 1], v)
     share = math.nan if u is None else Mode(l, m, u, math.sqrt(v * v - u * u), 1.0).core_share

@@ -229,8 +229,8 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of the power |U|² at the Nyquist frequency along one axis that comes back into the window.
 
-    There is one weight per frequency along the other axis, (frequency,). It follows from the fraction of eq. (2) above.
-    The sum over samples U = Σ u e^{-2πi...} equals S/dx, so this fraction times dx² |U|² is the power ∫|b|² dx.
+    There is one weight per frequency along the other axis, (frequency,). It follows from the fraction of eq. (2) of the
+    module. The sum over samples U = Σ u e^{-2πi...} equals S/dx, so this fraction times dx² |U|² is the power ∫|b|² dx.
     Division by dx gives the sum over samples along the axis. By Parseval's theorem, the factor 1/period gives the sum
     along the other axis. The two ends ±f_N of the spectrum contribute a factor of 2.
     """
