@@ -155,7 +155,10 @@ def _round(hull: Any) -> tuple[np.ndarray, float, np.ndarray | None, float]:
 
 
 def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Return centre, radius and relative residual of a fitted circle (Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976)."""
+    """Return the centre of a fitted circle, the radius that includes all corners, and the relative residual of the fit.
+
+    Source: Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976.
+    """
     matrix = np.concatenate([2 * corners, np.ones((len(corners), 1))], axis=1)
     middle: np.ndarray = np.linalg.lstsq(matrix, np.sum(corners**2, axis=1), rcond=None)[0][:2]
     r = np.linalg.norm(corners - middle, axis=1)

@@ -66,8 +66,8 @@ class TurbidMedium:
     """A uniform medium that fills a world.
 
     attenuation: beam attenuation coefficient c, the sum of absorption and scattering [1/m]
-    veil: radiance of the veiling light along a path of infinite length. At each wavelength, it is
-        relative to the radiance of a white surface in daylight. It does not depend on direction or depth
+    veil: radiance of the veiling light along a path of infinite length. At each wavelength, it is relative to the
+        radiance of a white surface in daylight. It does not depend on direction or depth
     refractive_index: refractive index of the medium, such as `optics.medium("water")`; None: air
 
     Raises:

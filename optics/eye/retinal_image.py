@@ -80,7 +80,7 @@ def _flat(array: np.ndarray, types: Precision) -> Array:
 
 
 def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:
-    """Return the size of the part of the scene that affects the middle part of the image, whose size is `shape`.
+    """Return the size of the part of the scene that affects the middle part, of size `shape`, of the image.
 
     It is at most the scene's size and has the same parity.
     """

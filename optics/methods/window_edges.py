@@ -61,7 +61,7 @@ class WindowEdges:
 
     half: distance [m] from the middle of the window within which interpolation points lie.
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: needs of derivatives; None if none are requested.
+    derivatives: additional needs of the PSFs if derivatives are requested, else None.
     smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
     """
 

@@ -88,7 +88,7 @@ def plan(
 ) -> Plan:
     """Return the plan of `psf` at one wavelength without computing the PSF. Arguments and errors: see `psf`.
 
-    `psf` compares its result with the direct sum. Its plan can therefore state another error or method.
+    `psf` compares its result with the direct sum. The plan of the result can therefore state another error or method.
     """
     source = PointSource(source_distance, source_angle)
     at = sensor_place(of_kind("pupil", pupil, Pupil, "Pupil(25e-6)"), sensor_distance, source.distance)
