@@ -60,6 +60,7 @@ class ConvergingWave:
         """Return the wave relative to a sphere around another point.
 
         shift: distance [m] by which the image plane is moved along the light.
+        medium_n: refractive index behind the pupil.
         position: the point (x, y) [m] on the image plane. None: the point on the ray through the pupil's centre.
 
         Raises:

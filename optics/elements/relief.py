@@ -219,7 +219,7 @@ class HeightMap(Relief):
         return band_of(self._heights, level)
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return `Relief.detail` of a central square with the half side `part`, in cycles per half of this side."""
+        """Return `Relief.detail` of a central square with the half side `part`, in cycles per length `part`."""
         return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
     @property

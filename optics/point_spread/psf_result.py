@@ -248,7 +248,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
         """Return a PSF for sums, whose samples are at most `coarsest` [m] apart.
 
-        It is `of_all_light` if its samples are fine enough. Otherwise each sample is divided into several equal ones.
+        It is `of_all_light` if samples are fine enough or means over cells. Otherwise, each sample is divided.
 
         Raises:
             AccuracyError: see `recompute_on`.

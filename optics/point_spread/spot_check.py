@@ -182,7 +182,8 @@ def exact_psf(
 ) -> tuple[np.ndarray, float] | None:
     """Return the PSF at points (x, y) [m] by the direct sum, and its relative error at the value `bright` [1/m²].
 
-    The result is None if the sum would take longer than a check of a PSF that takes `seconds`.
+    The result is None if the problem has a `reach`, or if the sum would take longer than a check of a PSF that takes
+    `seconds`.
     """
     darkness = _darkness(beam, problem, bright)
     reference = _affordable(beam, problem, darkness, seconds)
