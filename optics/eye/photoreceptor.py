@@ -1,6 +1,6 @@
 """Signal of a photoreceptor from the light on it: throughput, spectral weighting, noise.
 
-This is the noise of `optics.Eye.see`. In worlds, `sim.render.receptor_noise` draws the noise.
+`optics.Eye.see` draws its noise here. In worlds, `sim.render.receptor_noise` draws the noise.
 """
 
 from __future__ import annotations
