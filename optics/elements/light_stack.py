@@ -108,7 +108,10 @@ class LightStack:
 
     @cached_property
     def _spheres(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Spherical waves: their indices (negative for waves that converge) and the distances of their centres [m]."""
+        """Spherical waves of the lenses and of the sources: index and distance [m] of the centre, (beam,) each.
+
+        The index of a wave that converges is negative.
+        """
         focal = [beam.pupil.thin_lens_focal_length for beam in self.beams]
         lenses = np.array([math.inf if f is None else number(f) for f in focal])
         before = self._indices[1]

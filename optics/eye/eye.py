@@ -156,7 +156,7 @@ class Eye(EyeSpec):
         return Retina(self.retina_distance, wavelengths, cell, self.tolerance, *settings)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the fewest bands that keep a receptor's predicted error within the tolerance; errors as in `psf`."""
+        """Return the fewest bands that keep a receptor's predicted error within the tolerance. Errors: see `psf`."""
         retina = self._retina_of(np.empty(0), self.smallest_receptor, CELLS_FOR_BANDS)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
 
@@ -231,7 +231,7 @@ class Eye(EyeSpec):
             hide far ones at jumps of depth (see `optics.eye.occlusion`). Behind them, far surfaces continue with their
             nearest visible cell. Up to 17 different distances have one kernel each. If there are more, distances share
             kernels within the tolerance.
-        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its
+        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside their
             range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
             last call are kept. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
         polarization: (degree, angle_deg) of the light, for an eye with microvilli. These are the degree of linear

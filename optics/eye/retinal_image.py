@@ -112,7 +112,7 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def receptor_average(image: Array, samples_per_receptor: int, types: Precision) -> Array:
-    """Return the mean over each receptor's square aperture, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
+    """Return the mean over the s x s cells of each receptor, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
     return _of_receptors(image, np.full(samples_per_receptor, 1 / samples_per_receptor), types)
 
 
