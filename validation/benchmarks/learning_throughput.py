@@ -3,9 +3,10 @@
     python -m validation.benchmarks.learning_throughput [--steps 24576] [--json]
 
 Rates are agent-steps per second of the whole machine. As in an evolutionary run, one training per core runs in
-parallel, each in a process with one thread (after a warm-up training; rollouts and updates, without evaluations). In
-the same run `mujoco.Renderer` renders the same eyes of one world without shadows. Settings of learning are the defaults
-of the task. The bound on training applies to one frame of memory and a perfect lens.
+parallel, each in a process with one thread. The measured time covers rollouts and updates, but no evaluations, and
+starts after a warm-up training. In the same run, `mujoco.Renderer` renders the same eyes of one world without shadows.
+Settings of learning are the defaults of the task. The bound on training applies to one frame of memory and a perfect
+lens.
 """
 
 from __future__ import annotations
