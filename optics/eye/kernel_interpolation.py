@@ -56,7 +56,7 @@ def checks(counts: tuple[int, ...]) -> list[Place]:
     """Return the places with the largest error for these numbers of nodes along each axis.
 
     With a single node, these are the ends of the range. With more, they are the points halfway between nodes along
-    every axis. If there are many such points, only a few are used, including the corners.
+    every axis. If there are many such points, only a few are used, including those next to two opposite corners.
     """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
@@ -77,7 +77,7 @@ class NodeChoice:
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
     white: function that returns the fraction of the signal of a white surface that the kernels transmit. It is less
-        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, its computation requires a
+        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, the function computes a
         kernel.
     """
 
