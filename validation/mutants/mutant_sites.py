@@ -156,7 +156,7 @@ class _Finder:
             ast.Assign: self._targets,
         }
         if type(node) in looks:
-            yield from looks[type(node)](node)  # type: ignore[operator]
+            yield from looks[type(node)](node)
 
     # --- kinds of mistakes
 
