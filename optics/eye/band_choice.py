@@ -74,7 +74,8 @@ def choose_bands(
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
     """Return the largest error for the coloured surfaces of `choose_bands`, over all phases φ and all channels.
 
-    It is half the modulus of the error of Σ w d e^{2πiλ/Λ}, with the bands' weights w and daylight d.
+    It is half the modulus of the error of Σ w d e^{2πiλ/Λ}, with the bands' weights w, daylight d, and the width Λ of
+    `range_nm`.
     """
     period = (range_nm[1] - range_nm[0]) * 1e-9
 

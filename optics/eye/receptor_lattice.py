@@ -24,7 +24,9 @@ NARROWEST = 0.01  # choice: smallest side of a receptor, relative to the average
 
 @dataclass(frozen=True, eq=False)
 class ReceptorLattice(ReadOnlyArrays):
-    """Rectangles of receptors, in the coordinates of this module.
+    """Rectangles of receptors: x to the right and y down, from the middle of the retina.
+
+    The units are the width and the height of an average receptor.
 
     rows: edges of the rows, from the top, (h + 1,).
     columns: edges of the receptors in each row, from the left, (h, w + 1).

@@ -20,7 +20,7 @@ __all__ = ["at_receptors", "blur", "centred", "mean_over", "receptor_average", "
 def blur(
     scenes: Sequence[np.ndarray], kernels: Sequence[np.ndarray | Array], shape: tuple[int, int], types: Precision
 ) -> Array:
-    """Return the middle part of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], Dr.Jit (band, *shape).
+    """Return the middle part of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u] at cells v, Dr.Jit (band b, *shape).
 
     scenes: arrays (band, Y, X). Scenes are dark outside.
     kernels: one tensor or array (band, ky, kx) per scene, with odd ky and kx.
