@@ -53,7 +53,10 @@ class SoftCircles:
 
     @classmethod
     def around(cls, distance: np.ndarray, radii: np.ndarray, kernel: SoftEdge) -> SoftCircles:
-        """Return the sums over samples at these distances (sample,) for circles of these radii (radius,)."""
+        """Return the sums over samples at these distances (sample,) for circles of these radii (radius,).
+
+        Distances and radii are in units of 1/cutoff, where the cutoff is the intensity's highest frequency.
+        """
         from scipy.special import j0, j1
 
         error, end = PART * kernel.ripple, kernel.stopband
