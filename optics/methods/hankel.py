@@ -145,7 +145,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
 
 
 def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return quadrature nodes and weights over the open rings, in units of R."""
+    """Return quadrature nodes and weights over the open rings, in units of the pupil's radius."""
     parts = [
         (inner + (outer - inner) * nodes, (outer - inner) * weights)
         for (inner, outer), (nodes, weights) in zip(rings, map(gauss_legendre, counts), strict=True)

@@ -35,8 +35,8 @@ class LowRankSampling:
 
     rank: number of Chebyshev points per axis of the window.
     half_width: distance [m] from the window's centre within which these points lie.
-    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c}, with u the position in the window. It is 1 if samples are
-        sines.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. It is 1
+        if samples are sines.
     """
 
     pupil: PupilSamples

@@ -203,7 +203,7 @@ class Problem:
 
     @property
     def _beyond_rim(self) -> float:
-        """Distance [R] beyond the rim up to which nodes may lie: the diagonal of the largest cell."""
+        """Distance [radii] beyond the rim up to which nodes may lie: the diagonal of the largest cell."""
         assert self.knots is not None
         return math.sqrt(2) * max(after - before for before, after in pairwise(self.knots.borders))
 

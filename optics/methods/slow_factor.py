@@ -128,7 +128,7 @@ def slow_factor(
 ) -> np.ndarray:
     """Return the slow factor (z/D)² (1 + i/(kD)) e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
 
-    D is the distance from ξ to u, and ρ the distance from the pupil's centre to u. All arrays are broadcast.
+    D is the distance from ξ to u, ρ that from the pupil's centre to u, and z that of the window. k is the wave number.
 
     pupil: points ξ (x, y) [m].
     directions: directions s of these points in the Fourier kernel e^{-ik s·u}.
@@ -161,8 +161,8 @@ def remaining_factor(
 ) -> np.ndarray:
     """Return the slow factor, relative to the middle of the window, divided by both axis factors.
 
-    It varies even more slowly over the window. Arguments: see `slow_factor`. With dtype="float32", short paths are
-    computed in float32, too.
+    It varies even more slowly over the window. The arguments are those of `slow_factor`, but the samples determine the
+    points. With dtype="float32", short paths are computed in float32, too.
     """
     none, points = np.zeros((1,) * directions[0].ndim), samples.points_at(*directions)
     if dtype == "float32" and path.short(samples.steepest):

@@ -33,7 +33,7 @@ class WindowPlan:
 
     tolerance: tolerances of the PSFs, (beam,).
     derivatives: additional needs of the PSFs if derivatives are requested, else None.
-    smoothed: see `WindowEdges`.
+    smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
     """
 
     stack: LightStack
