@@ -47,7 +47,9 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Slow part A exp(ike) of a kernel as a sum of products of polynomials.
+    """Slow part A exp(ike) of a kernel as a sum of products of polynomials of the offsets ρx and ρy between points.
+
+    A is the amplitude of the kernel, k the wave number, and e the part of the distance that couples ρx and ρy.
 
     along_x, along_y: Chebyshev coefficients (degree, term) over the ranges of ρx and ρy [m].
     error: largest error relative to the slow part.
