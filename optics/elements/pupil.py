@@ -148,10 +148,7 @@ class Pupil:
         return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
     def amplitude(self, x: Array, y: Array) -> Array:
-        """Return the amplitude that the mask transmits at points in units of the radius; 1 without a mask.
-
-        x, y: arrays as in `Relief.height`.
-        """
+        """Return the mask's amplitude at points [radii], arrays as in `Relief.height`; 1 without a mask."""
         if self.mask is None:
             return like(x, 1.0)
         radius = like(x, self.aperture_radius)
@@ -254,7 +251,10 @@ class Pupil:
         return all_slopes(level, same, number(source.distance), source.plain.angle, self.pieces(same))
 
     def pieces(self, wavelength: float) -> int:
-        """Return the number of polynomial pieces of relief and wavefront across the pupil."""
+        """Return the larger number of polynomial pieces across the pupil, of the relief or of the wavefront.
+
+        An absent wavefront counts 0, and so does a relief that does not bend light of this wavelength.
+        """
         pieces = [self.height.knots if self.bends(wavelength) else 0]
         pieces += [0 if self.wavefront is None else self.wavefront.knots]
         return max(pieces)
