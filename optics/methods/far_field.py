@@ -44,8 +44,9 @@ POINTS = 150  # choice: points of the pupil at which the slow factors of nodes a
 class FarFieldSampling:
     """Samples of the pupil and of direction cosines, and nodes over the window.
 
-    The pitch of the direction cosines is the wavelength, divided by period x pitch of the pupil. The nodes are Chebyshev points in the angle
-    atan(x/z), because the kernel as a function of x has poles at ±iz, with z the distance of the window.
+    The pitch of the direction cosines is the wavelength, divided by period x pitch of the pupil. The nodes are
+    Chebyshev points in the angle atan(x/z), because the kernel as a function of x has poles at ±iz, with z the distance
+    of the window.
     """
 
     edge: PupilEdge

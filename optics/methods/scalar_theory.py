@@ -71,8 +71,8 @@ def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
 def light_spread(pupil: Pupil) -> float:
     """Return the mean square distance between the axis and the points of the pupil, weighted by the amplitude there.
 
-    Its unit is the squared radius. Distances are measured along one direction, the one with the largest result. The result is a quarter for a disk, a
-    half for a thin ring, and 1 for two pinholes on opposite sides of the rim.
+    Its unit is the squared radius. Distances are measured along one direction, the one with the largest result. The
+    result is a quarter for a disk, a half for a thin ring, and 1 for two pinholes on opposite sides of the rim.
     """
     if pupil.mask is None:
         return _open_spread(pupil.aperture)

@@ -129,6 +129,7 @@ def slow_factor(
     """Return the slow factor (z/D)² (1 + i/(kD)) e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
 
     D is the distance from ξ to u, ρ that from the pupil's centre to u, and z that of the window. k is the wave number.
+    All arrays are broadcast.
 
     pupil: points ξ (x, y) [m].
     directions: directions s of these points in the Fourier kernel e^{-ik s·u}.
