@@ -45,8 +45,9 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
 
     the first Rayleigh-Sommerfeld integral of exp(-ikL(r)) over the points ξ of the pupil at the distance r from the
     axis, with the wave number k and the sensor's distance z. For a circle without a mask, its modulus is |1 - z/L - ikz
-    ln(L/z)|, with L at the rim. The maximum is searched near the brightest sample. If the samples are too coarse, finer samples are computed there. The
-    maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the maxima without aberration.
+    ln(L/z)|, with L at the rim. The maximum is searched near the brightest sample. If the samples are too coarse, finer
+    samples are computed there. The maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the
+    maxima without aberration.
 
     with_error: True to return (value, predicted error), each (wavelength,).
 
