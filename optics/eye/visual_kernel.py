@@ -115,7 +115,7 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
     types, kernels = precision(retina.dtype), []
     for request, picture in zip(requests, found, strict=True):
         window = request.problem.window
-        # Samples and cells both run backwards, so a symmetric pupil has the same sums in the same order as a turned one.
+        # Samples and cells run backwards, so a symmetric pupil has the same sums in the same order as a turned one.
         down, across = (
             types.Tensor(padded_for_packets(sums), sums.shape)
             for samples, tiles in zip(window.shape, (rows, columns), strict=True)
