@@ -72,7 +72,10 @@ class Polygon(Aperture):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return a mask of the points inside: those from which a ray towards +x crosses an odd number of edges.
 
-        Arguments and errors: see `Aperture.contains`.
+        x, y: positions in pupil radii, in arrays whose shapes broadcast.
+
+        Raises:
+            ValueError: a position is not a real number.
         """
         x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
         inside = np.zeros(x.shape, dtype=bool)
