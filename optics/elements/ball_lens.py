@@ -28,7 +28,7 @@ Shape: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 def parabola(u: np.ndarray) -> np.ndarray:
-    """Return Matthiessen's profile 1 - u² at u = r/R."""
+    """Return Matthiessen's profile 1 - u² at distances u from the centre, relative to the radius."""
     return 1 - u * u
 
 

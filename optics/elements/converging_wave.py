@@ -206,7 +206,7 @@ def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
 
 
 def _flat(name: str, values: Any) -> np.ndarray:
-    """Convert an array of NumPy, or a tensor, to a flat float64 array; ValueError unless it contains real numbers."""
+    """Convert an array or a tensor to a flat float64 array; ValueError about `name` unless it contains real numbers."""
     values = full_precision(name, values)
     plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
     try:
@@ -216,7 +216,7 @@ def _flat(name: str, values: Any) -> np.ndarray:
 
 
 def _one(name: str, value: Any) -> float:
-    """Return a number, or the first of an array, in the other program's unit; ValueError if it is 0 or not finite."""
+    """Return a number, or the first of an array, in its own unit; ValueError about `name` if it is 0 or not finite."""
     found = _flat(name, value)
     if value is None or found.size == 0 or not abs(found[0]) > 0 or not np.isfinite(found[0]):
         raise ValueError(f"{name} = {shown(value)}: must be a finite number that is not 0")

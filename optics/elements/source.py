@@ -58,7 +58,7 @@ class PointSource:
     def path(self, x: Array, y: Array) -> Array:
         """Return the optical path [m] in vacuum at points (x, y) [m] of the pupil, relative to the centre.
 
-        x, y: see `Relief.height`.
+        x, y: arrays of NumPy or PyTorch whose shapes broadcast, or flat Float64 arrays of Dr.Jit.
         """
         carried = any(map(is_differentiable, self.angle))
         own, angle = (library(x), [like(x, part) for part in self.angle]) if carried else (math, self.angle)

@@ -41,7 +41,7 @@ class SphericalIndex:
 
     @classmethod
     def from_function(cls, relative: Callable[[np.ndarray], np.ndarray]) -> SphericalIndex:
-        """Interpolate a relative index, given as a function of r/R, at Chebyshev points in (r/R)².
+        """Interpolate a relative index, a function of the relative distance r/R from the centre, at Chebyshev points in (r/R)².
 
         Raises:
             ValueError: n r decreases somewhere, at values below 1. Just outside the sphere it is 1, so light could stay

@@ -87,7 +87,9 @@ class GaussianMask(Mask):
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """Return the frequency f [1/m] beyond which the mask sends at most `light`, see `Mask.detail`.
+        """Return the frequency f [1/m] beyond which the mask sends at most a given amount of light.
+
+        light: this amount, averaged over the disk of the pupil, in units of the incident light.
 
         The fraction exp(-2π²w²f²) of the transmitted light lies beyond f, for the waist w.
         """

@@ -107,7 +107,7 @@ class TurbidMedium:
         The maximum is taken over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
         The reference is the integral over the spectrum in steps of 1 nm. Without attenuation the error is 0.
 
-        receptors: as in `optics.receptors_of`
+        receptors: `Receptors`, or a name or peak wavelengths for `optics.receptors_of`
 
         Raises:
             ValueError: bands is outside 1 to 64, or the receptors are unknown.
