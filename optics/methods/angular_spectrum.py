@@ -62,11 +62,11 @@ class GridSampling(SpectrumSampling):
         return Grid.square(min(self.pupil_period, across), pitch)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz} of a plane wave."""
         return self.whole_phase(_angular_spectrum(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
 
     @property

@@ -60,7 +60,7 @@ class FarFieldSampling:
     model_error: float = 0.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:

@@ -65,7 +65,7 @@ class NodeSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)
@@ -74,7 +74,7 @@ class NodeSampling:
         return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz} of a plane wave."""
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)

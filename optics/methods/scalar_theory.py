@@ -63,7 +63,7 @@ def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
     The bound is valid for light of any polarisation. The window must contain the brightest point of the light and a few
     samples around it.
 
-    spread: see `light_spread`.
+    spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
     """
     return MARGIN * spread / ROUND * float(np.interp(sine, *_TABLE)) * min(sine, 1.0) ** 2
 

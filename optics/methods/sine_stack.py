@@ -75,7 +75,8 @@ class SineStack(SineGeometry):
     at: sines along either axis minus those of the pupil's centre, (pupil, sample), evenly spaced.
     edges: soft apertures, (pupil,).
     radius: radii [m], (pupil,).
-    curvature: curvatures of waves that are smoothed with the edges, see `curved_ring`, (pupil,).
+    curvature: local frequencies at the rim [cycles per radius] of waves that are smoothed with the edges; 0 for others,
+        (pupil,).
     """
 
     at: np.ndarray
