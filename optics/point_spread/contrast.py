@@ -71,6 +71,7 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
     """Return the MTF of weighted sums over the PSF's wavelengths, see `mtf`.
 
     weights: (sum, wavelength). They may be negative.
+    tolerance: largest error of any contrast.
 
     Raises:
         ValueError: the tolerance is not positive.
@@ -165,7 +166,7 @@ def image_quality(
     throughput: T in [0, 1], such as a² for a pupil of the relative radius a. It may carry a derivative, and the result
         is 0 if T is 0.
     noise_sigma: σ, in units of the signal, 0 to 1e6.
-    tolerance: see `optics.mtf`. A known MTF has its own tolerance.
+    tolerance: largest error of any contrast of the MTF. A known MTF has its own tolerance.
     with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
