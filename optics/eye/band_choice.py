@@ -39,7 +39,7 @@ def choose_bands(
         with 2n bands.
 
     tolerance: largest error, 1e-6 to 0.5.
-    receptors: see `optics.receptors_of`.
+    receptors: `Receptors`, or a name or peak wavelengths for `optics.receptors_of`.
     kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
         side of a receptor. None: the kernel is the same for all wavelengths.
     white: fraction of a white surface's signal that kernels transmit if they are wide enough to contain all light.

@@ -46,7 +46,7 @@ class Description:
     acuity_vertical_cpd: vertical acuity, with the Nyquist frequency of the receptors' rows.
     binding: name of the smallest known limit: "diffraction", "sampling" or "noise".
     strehl_ratio: Strehl ratio of the band nearest `wavelength`.
-    image_quality: see `optics.image_quality`.
+    image_quality: mean of the contrast above the noise, up to the Nyquist frequency, times `white_signal`.
     noise: standard deviation of the signal of a receptor that sees white, from all sources of noise.
     photons: photons that such a receptor absorbs per integration time, averaged over channels (None: no photon budget).
     acceptance_angle_deg: full width at half maximum of a receptor's angular sensitivity, horizontally.
