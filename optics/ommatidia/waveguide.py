@@ -238,7 +238,7 @@ def _brackets(l: int, count: int) -> list[tuple[float, float]]:
 
 @lru_cache(maxsize=4096)
 def _roots(l: int, v: float) -> tuple[float, ...]:
-    """Return U of all guided modes of azimuthal order l at V = v."""
+    """Return the mode parameters U of all guided modes of azimuthal order l at the waveguide parameter V = v."""
     found = (_root(l, low, high, v) for low, high in _brackets(l, int(v / math.pi) + 2) if low < v)
     return tuple(u for u in found if u is not None)
 
