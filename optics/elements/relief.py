@@ -185,7 +185,7 @@ class HeightMap(Relief):
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbours if above half the span (wrapped lens); otherwise, or below 16 rows, 0."""
+        """Largest step [m] between neighbours if it exceeds half the span of at least 16 x 16 samples; else 0."""
         many = min(self._heights.shape) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0

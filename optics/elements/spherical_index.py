@@ -41,7 +41,7 @@ class SphericalIndex:
 
     @classmethod
     def from_function(cls, relative: Callable[[np.ndarray], np.ndarray]) -> SphericalIndex:
-        """Interpolate a relative index, a function of the relative distance r/R from the centre, at Chebyshev points in (r/R)².
+        """Interpolate a relative index, a function of the relative distance r/R, at Chebyshev points in (r/R)².
 
         Raises:
             ValueError: n r decreases somewhere, at values below 1. Just outside the sphere it is 1, so light could stay
@@ -80,9 +80,8 @@ class SphericalIndex:
     def power(self) -> float:
         """Return R/f of rays near the axis, with the sphere's radius R and the focal length f.
 
-        It is the limit of a ray's deviation, divided by its height relative to R.
-
-        It is 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n² d(r/R) with t = (r/R)².
+        It is the limit of a ray's deviation, divided by its height relative to R: 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n²
+        d(r/R), with the index n at the distance r and t = (r/R)².
         """
         u, weights = gauss_legendre(NODES)
         bend = self.index.deriv()(u * u) / self.index(u * u) ** 2

@@ -89,9 +89,9 @@ class GaussianMask(Mask):
     def detail(self, light: float, radius: float) -> float:
         """Return the frequency f [1/m] beyond which the mask sends at most a given amount of light.
 
-        light: this amount, averaged over the disk of the pupil, in units of the incident light.
-
         The fraction exp(-2π²w²f²) of the transmitted light lies beyond f, for the waist w.
+
+        light: this amount, averaged over the disk of the pupil, in units of the incident light.
         """
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)

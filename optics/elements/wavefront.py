@@ -120,7 +120,6 @@ class Zernike(Aberration):
         """Return the wavefront whose coefficients are numbered after Noll.
 
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
-
         radius: radius [m] of the circle. None: the pupil's radius.
 
         Noll's polynomials have the normalisation of OSA, a variance of 1. They are used in astronomy and by poppy.
@@ -136,7 +135,6 @@ class Zernike(Aberration):
         """Return the wavefront whose coefficients have Fringe numbers.
 
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
-
         radius: radius [m] of the circle. None: the pupil's radius.
 
         Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. Their
