@@ -81,9 +81,8 @@ def taken_by(
 ) -> list[tuple[np.ndarray, Any]]:
     """Return the radiance (band, Y, X) and, if it is polarised, Stokes parameters Q and U, each with its weight.
 
-    The signals are the sum of the three, times their weights.
-
-    A weight is a number, or an array (h, w) with one entry per receptor.
+    The weighted sum of the three gives the signals. A weight is a number, or an array (h, w) with one entry per
+    receptor.
 
     polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
 

@@ -144,7 +144,7 @@ def mean_over(lattice: ReceptorLattice, image: Array, types: Precision) -> Array
 def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> Array:
     """Return the value at each receptor's middle, or in the next cell if the middle lies between two cells.
 
-    Such kernels are shifted by half a cell, see `with_centre`.
+    In the second case, `with_centre` has shifted the kernels by half a cell.
     """
     return _of_receptors(image, np.arange(samples_per_receptor) == samples_per_receptor // 2, types)
 
