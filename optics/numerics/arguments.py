@@ -79,8 +79,9 @@ def flag(name: str, value: Any) -> bool:
 
 
 def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False) -> float:
-    """Return `value` as a float; ValueError about `name` unless it is in [1e-15, 1e15], as a positive quantity is.
+    """Return `value` as a float; ValueError about `name` unless it is in [1e-15, 1e15], where squares are accurate.
 
+    unit: unit of `value`, for the message.
     infinite: True if infinity is allowed.
     carried: True if `value` may carry a derivative, which is otherwise refused.
     """
@@ -193,13 +194,13 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
-    """Return (x, y) as floats; ValueError that `name` must be two `what`, unless both are numbers within ±1e15."""
+    """Return (x, y) as floats; ValueError about `name` (two `what`) unless both are numbers within ±1e15."""
     x, y = pair(name, without_derivative(name, value), what)
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 
 def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
-    """Return the two entries of `value`, with derivatives; ValueError that `name` must be two `what` otherwise."""
+    """Return both entries of `value`, with any derivatives. Otherwise, a ValueError says `name` must be two `what`."""
     try:
         x, y = value
     except (TypeError, ValueError):
