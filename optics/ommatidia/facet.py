@@ -70,7 +70,7 @@ class FacetLens:
         return front + back - self.thickness / n * front * back
 
     def focal_length(self, wavelength: float = MIDDLE) -> float:
-        """Return the focal length [m] in the cone, measured from the second principal plane: cone's index / power."""
+        """Return the focal length [m] from the second principal plane: the index of the cone, divided by the power."""
         return self._index("medium_n", wavelength) / self.power(wavelength)
 
     def object_focal_length(self, wavelength: float = MIDDLE) -> float:
