@@ -123,7 +123,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def cutoff(self) -> np.ndarray:
-        """Highest frequency [1/m] of the intensity, 2n sin θ/λ with tan θ = radius/sensor_distance, (wavelength,)."""
+        """Highest frequency [1/m] of the intensity, 2 NA/λ with the pupil's numerical aperture NA, (wavelength,)."""
         radius, distance = self.pupil.radius, number(self.sensor_distance)
         index = np.array([self.pupil.index_behind(float(wavelength)) for wavelength in self.wavelengths])
         found: np.ndarray = 2 * radius / math.hypot(radius, distance) * index / self.wavelengths
