@@ -60,7 +60,7 @@ def _guide(diameter: float, length: float, proximal: float | None = None) -> Wav
 
 
 def _by_angle(diameter: float, focal_length: float, angle_deg: float, length: float) -> Facet:
-    """Return a facet whose rhabdom has the width f · angle, so that it subtends `angle_deg` in the visual field."""
+    """Return a facet whose rhabdom has the width focal length · angle: it subtends `angle_deg` in the visual field."""
     return Facet(diameter, focal_length, focal_length * math.radians(angle_deg), length)
 
 

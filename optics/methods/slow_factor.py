@@ -230,10 +230,12 @@ def cross_term(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return factors a and b, so that the slow factor divided by both axis factors is about 1 + a b.
 
-    The product a b is the term -ik us vt/D of the exponent, with the mean of 1/D over the pupil. Because a depends on u
-    and s, and b on v and t, the term costs as much as a second Fourier kernel along either axis.
+    The product a b is the term -ik us vt/D of the exponent, where k = 2π/λ, and 1/D is the mean inverse distance over
+    the pupil. Because a depends on u and s, and b on v and t, the term costs as much as a second Fourier kernel along
+    either axis.
 
-    directions: s and t. window: u and v. Their last two axes broadcast.
+    directions: s and t, sines of samples along x and y. window: u and v, positions in the window [m]. The last two axes
+        of all four broadcast.
     """
     (s, t), (u, v) = directions, window
     wavelength, z = path.numbers(s.ndim)
