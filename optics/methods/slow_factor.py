@@ -234,8 +234,9 @@ def cross_term(
     the pupil. Because a depends on u and s, and b on v and t, the term costs as much as a second Fourier kernel along
     either axis.
 
-    directions: s and t, sines of samples along x and y. window: u and v, positions in the window [m]. The last two axes
-        of all four broadcast.
+    directions: s and t, sines of samples along x and y minus those of the pupil's centre. Their last two axes, and
+        those of `window`, broadcast.
+    window: u and v, positions along x and y relative to the middle of the window [m].
     """
     (s, t), (u, v) = directions, window
     wavelength, z = path.numbers(s.ndim)
