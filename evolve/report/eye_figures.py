@@ -168,7 +168,10 @@ def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
 
 
 def _cuts(light: WhiteLight) -> Html:
-    """Return the figure of the PSF in several bands, along the line y = 0 through the optical axis."""
+    """Return the figure of the PSF along the line y = 0 through the optical axis.
+
+    It shows all bands, or six evenly spaced ones if there are more.
+    """
     psf = light.psf
     _, half = middle_of_psf(light)
     inside = np.abs(psf.x) <= half
@@ -184,8 +187,8 @@ def _cuts(light: WhiteLight) -> Html:
         axes.set(xlabel="x on the retina [µm]", ylabel="PSF [1/µm²]")
         axes.legend(frameon=False, loc="best", handlelength=1.2, labelcolor=MUTED)
         _degrees(axes, light.eye, 1e6 * half)
-        svg = inline(drawn, "psf-bands", "Cuts through the point spread function, one per spectral band.")
-    caption = html("<b>PSF per band</b>: cuts along x through the optical axis.")
+        svg = inline(drawn, "psf-bands", "Cuts through the point spread function in up to six spectral bands.")
+    caption = html("<b>PSF in up to six bands</b>: cuts along x through the optical axis.")
     return figure(svg, caption)
 
 

@@ -33,7 +33,7 @@ class _Trial:
     """A submitted job.
 
     counter: variable of the scheduler that counts the attempts
-    order: the job as text
+    order: the job in the form that is sent to a worker
     """
 
     job: Job

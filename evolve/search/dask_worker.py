@@ -46,7 +46,7 @@ class _Unwanted(Exception):
 
 @dataclass(frozen=True)
 class Order:
-    """A job as text.
+    """A job in a form that can be sent to a worker.
 
     function: "module:name" of the function that evaluates the candidate
     id, seed: see `Job`
@@ -74,7 +74,7 @@ class Order:
 
 
 def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Order:
-    """Return a job as text.
+    """Return a job in a form that can be sent to a worker.
 
     toml: settings of the run
     function, counter, topic: see `Order`

@@ -125,7 +125,7 @@ class _Shown:
 
 
 def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
-    """Continue a locked run to its end.
+    """Continue a run, whose lock this process holds, to its end.
 
     After Ctrl-C, print how to continue. No file needs to be written then, because the record is always complete.
     """
