@@ -41,7 +41,7 @@ def with_frames(
 
     The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify the number.
     Otherwise it is the smallest number for which the errors of all signals are acceptable. If no eyes have receptors
-    with dynamics, the fidelities are returned unchanged.
+    with dynamics, or the fidelities of all such eyes specify the number, the fidelities are returned unchanged.
 
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
     scenes: see `renderers_for`

@@ -1,6 +1,7 @@
-"""Receptive fields of an eye behind a pupil, and random directions drawn from the mixture of all fields.
+"""Receptive fields of an eye behind a pupil, and low-discrepancy directions drawn from the mixture of all fields.
 
-Fields are tabulated on square cells of the visual field's tangent plane, in the coordinates of `sim.eyes.sensor`.
+Fields are tabulated on cells of the visual field's tangent plane, in the coordinates of `sim.eyes.sensor`. The same
+number of cells divides the width and the height of a receptor.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class NoRaysError(ValueError):
 
 @dataclass(frozen=True)
 class Draw:
-    """Random directions, drawn from the mixture of receptive fields.
+    """Low-discrepancy directions, drawn from the mixture of receptive fields.
 
     points: points on the tangent plane [receptor widths and heights], x right, y down, (ray, 2), in order of y
     rows, columns: indices of the mixture's cells that contain the points, (ray,)

@@ -183,8 +183,8 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
 
-    Rays are omitted until another ray would reduce a receptor's sum of weights by more than the fraction `share`. The
-    remaining weights are then scaled so that this sum is unchanged.
+    At each end of a row, rays are omitted until another one would reduce the sum of weights of some receptor by more
+    than the fraction `share` / 2 in some band. The remaining weights are then scaled so that the sums are unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]

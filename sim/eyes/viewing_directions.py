@@ -21,6 +21,7 @@ FINEST_DEG = 0.2302  # chosen: smallest angle between neighbours of a whole head
 def unit_directions(name: str, given: Any) -> np.ndarray:
     """Return viewing directions as unit vectors (n, 3).
 
+    name: name of the argument, for error messages
     given: unit vectors (ahead, left, up), (n, 3), or angles [degrees] (azimuth to the left, elevation upwards), (n, 2)
 
     Raises:
