@@ -132,7 +132,8 @@ def of_components(
 
     weights: sparse matrices (receptor, ray), one for each band
     resolution: rows and columns of receptors
-    mixing, basis: see `ReceptorSums`
+    mixing: weight of each band in each channel, (channel, band)
+    basis: contribution of each component of light to each band, (component, band)
     """
     products = [
         RowProduct.from_weights([_mixed(weights, channel * component) for channel in mixing], resolution)
@@ -154,7 +155,8 @@ def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarr
     This is cheaper than `of_components` if there are fewer bands than pairs of a component and a channel.
 
     products: sums over rays, one for each band
-    mixing, basis: see `ReceptorSums`
+    mixing: weight of each band in each channel, (channel, band)
+    basis: contribution of each component of light to each band, (component, band)
     """
     mixing, basis = mixing.astype(np.float32), basis.astype(np.float32)
     every = np.array_equal(basis, np.eye(len(basis)))
