@@ -143,7 +143,10 @@ class PreparedScene:
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals."""
+        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals.
+
+        It is False for a perfect lens, whose receptors share no areas.
+        """
         return isinstance(sampling, FieldSampling) and sampling.may_share(per_receptor, in_rows=self._in_rows)
 
     @property

@@ -77,7 +77,7 @@ def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Return views of agents with an object at a distance in NEAR, within the field of view of one eye."""
+    """Return views of agents with an object at 0.8 to 8 m (NEAR), within the field of view of one eye."""
     rng = np.random.default_rng(1)
     objects, cells = _objects(world, n, rng), _cells(world)
     position, heading, eye = np.empty((n, 2)), np.empty(n), rng.integers(eyes.n_eyes, size=n)
