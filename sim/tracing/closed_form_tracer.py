@@ -82,7 +82,7 @@ class ClosedForm:
 
     scene, wavelengths: the scene, and the centres of the eye's bands [m]
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: level of light, one of `lighting.LEVELS`
+    light: level of light: "direct", "bounce" or "all"
     basis: (component, band): contribution of each component to each band
     world, walls, footprints, lights, components: the parts of the scene
     medium: water or air between surfaces and eyes; None: clear air
@@ -200,7 +200,10 @@ class ClosedForm:
     def _irradiance(
         self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos θ over unobstructed lights."""
+        """Return the irradiance per component: the sum of level · cos(angle of incidence) over unobstructed lights.
+
+        radii: radii of the bodies that cast shadows [m]; None: those of the scene
+        """
         levels = self.components.levels
         start = lighting.clear_of(hit.point, hit.normal, CLEARANCE)
         radii = list(map(float, self._bodies.radii)) if radii is None else radii

@@ -254,7 +254,10 @@ def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> Non
 
 
 def _add_velocity_servo(spec: mujoco.MjSpec, joint: str) -> None:
-    """Add a servo with first-order lag, dv/dt = (SPEED_GAIN ctrl - v) / TIME_CONSTANT, for a body of 1 kg."""
+    """Add a servo that moves a body of 1 kg with a first-order lag.
+
+    Its speed v follows the command: dv/dt = (SPEED_GAIN command - v) / TIME_CONSTANT.
+    """
     spec.add_actuator(
         name=joint,
         target=joint,

@@ -128,7 +128,9 @@ class Baking:
         return light.reshape(-1, light.shape[-1])
 
     def _on_body(self, radius: float, height: float) -> np.ndarray:
-        """Return harmonics (place, FOURS * 4, component) of the light on a body's surface, ordered by cell, y and x.
+        """Return spherical harmonics of the light on a body's surface, (place, 16, component).
+
+        The places of the body are in order of cell, y and x.
 
         radius, height: radius of the body, and height of its centre [m]
         """
