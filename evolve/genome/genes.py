@@ -92,7 +92,7 @@ class Gene:
     """One gene, a quantity that evolution can change.
 
     name: name of the gene in settings, tables and records
-    cluster: one of CLUSTERS
+    cluster: "morphological", "optical", "neural" or "spectral"
     kind: "real" or "integer"
     range: valid values in any run
     default: settings of the gene in a run that does not mention it

@@ -58,7 +58,7 @@ class Phenotype:
     memory_frames: number of frames that the brain sees
     neurons: number of neurons in each hidden layer of actor and critic
     layers: number of hidden layers of actor and critic
-    aperture_shape: index into APERTURE_SHAPES
+    aperture_shape: index of the pupil's shape in APERTURE_SHAPES (circle, annulus, slit ...)
     dispersion: 1 / Abbe number of the relief's material; 0: no dispersion
     lambda_max_nm: wavelengths at which the pigments of the receptor types absorb most [nm]; None: the setting
         `eye.receptors` of the run determines the receptors
@@ -203,7 +203,7 @@ class Phenotype:
     def eye(self, eye: EyeConfig, medium: str = "air") -> optics.Eye | sim.CompoundEye:
         """Return one eye in the medium of a run's worlds: a camera eye or a compound eye.
 
-        medium: one of `MEDIA_OF_WORLDS`, in which a camera eye is immersed; it does not change a compound eye
+        medium: "air", "clear_ocean", "coastal_water" or "fog"; a camera eye is immersed in it; compound eyes ignore it
 
         Raises:
             ValueError: the medium is unknown, or a field is outside the range that `sim.Eyes` allows.
@@ -285,7 +285,7 @@ def repaired(genome: NDArray[np.float64], config: Settings) -> tuple[str, ...]:
 
 
 def _aperture(shape: str) -> Any:
-    """Return the aperture with a name in APERTURE_SHAPES, scaled to the radius 1."""
+    """Return the aperture with this name, such as "circle", scaled to the radius 1."""
     import optics
 
     if shape == "circle":

@@ -38,7 +38,7 @@ UNITS = nn.LeakyReLU  # units of all hidden layers; the gradient of a leaky unit
 class Felt(nn.Module):
     """Normalisation of proprioception: each element by its own running mean and standard deviation (Welford 1962).
 
-    Normalised elements are clipped to [-FARTHEST, FARTHEST].
+    Normalised elements are clipped to [-10, 10].
     """
 
     def __init__(self, size: int) -> None:

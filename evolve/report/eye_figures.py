@@ -36,7 +36,7 @@ def eye_figures(phenotype: Phenotype, config: EyeConfig, medium: str = "air") ->
     For compound eyes, see `facet_figures`. If the PSF cannot be computed accurately enough, a line of text with the
     reason replaces a figure.
 
-    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
+    medium: medium of the run's worlds: "air", "clear_ocean", "coastal_water" or "fog"
     """
     eye = phenotype.eye(config, medium)
     if not isinstance(eye, optics.Eye):
@@ -150,8 +150,8 @@ def _psf(light: WhiteLight) -> Html:
 def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
     """Return the central part of the PSF in white daylight [1/m²], (y, x), and half the width of this part [m].
 
-    It contains most of the light (SHOWN_POWER). The PSF is averaged over blocks, so that the part has at most PIXELS
-    along a side.
+    It contains at least 98 % of the light, up to rounding, and is at least 3 receptors wide if the PSF is. The PSF is
+    averaged over blocks, so that the part has at most 161 pixels along a side.
     """
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2

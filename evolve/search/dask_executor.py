@@ -170,7 +170,7 @@ class DaskExecutor:
             return True
 
     def _done(self, under_way: dict[Any, _Trial]) -> list[Any]:
-        """Wait up to LISTEN_S for a result, and return all futures that are no longer pending."""
+        """Wait up to 0.5 s for a result, and return all futures that are no longer pending."""
         from distributed import wait
 
         with contextlib.suppress(Exception):  # no result within LISTEN_S, or a lost connection, which `run` handles

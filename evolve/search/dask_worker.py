@@ -49,7 +49,7 @@ class Order:
     """A job in a form that can be sent to a worker.
 
     function: "module:name" of the function that evaluates the candidate
-    id, seed: see `Job`
+    id, seed: id of the candidate, and seed of its training and evaluation
     phenotype: the phenotype as JSON
     config: the settings of the run as TOML
     counter: name of the scheduler's variable that counts the attempts

@@ -163,7 +163,7 @@ def cores() -> int:
 
 
 def _end(worker: _Worker) -> None:
-    """Wait for a process to end; after STOPPING_S, kill it."""
+    """Wait for a process to end; after 5 s, kill it."""
     worker.process.join(STOPPING_S)
     if worker.process.is_alive():
         worker.process.kill()

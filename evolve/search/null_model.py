@@ -166,7 +166,7 @@ def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> 
 
 
 def last_generations(config: RunConfig, generations: int) -> list[range]:
-    """Return the final LAST generations of each phase, or all generations of a shorter phase.
+    """Return the final 3 generations of each phase, or all generations of a shorter phase.
 
     A phase consists of the generations between two changes of the set of genes that vary.
 

@@ -87,7 +87,7 @@ class Scheduler:
 
         Raises:
             ConfigError: the address requires certificates, but there are none.
-            ExecutorError: the scheduler does not answer within ANSWER_S, or Dask is not installed.
+            ExecutorError: the scheduler does not answer within 5 s, or Dask is not installed.
         """
         self.security()
         found = ADDRESS.fullmatch(self.address)

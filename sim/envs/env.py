@@ -109,7 +109,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
 
 def make_env(task: str | Task | BatchTask, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
-    """Return a single world as a Gymnasium environment; see `EyesEnv` for the arguments and errors."""
+    """Return a single world as a Gymnasium environment; see `EyesEnv` (errors) and `make_vec_env` (arguments)."""
     return EyesEnv(task, eyes, **options)
 
 

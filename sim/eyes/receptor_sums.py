@@ -94,8 +94,8 @@ class RowProduct:
 def _views_at_once(weights: int) -> int:
     """Return the largest number of views in a product with this number of weights that one thread computes.
 
-    The result is BLOCK if one thread cannot compute even BLOCK / 8 views. Such products are large enough for several
-    threads.
+    The result is one of 32, 16, 8 and 4. It is 32 if one thread cannot compute even 4 views, because such products are
+    large enough for several threads.
     """
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights <= ONE_THREAD), BLOCK)
 

@@ -224,7 +224,7 @@ class _Columns:
 
 
 def _slow(velocity: np.ndarray) -> np.ndarray:
-    """Return a mask of the components of velocities [m/s] below UNSTABLE_SPEED; False for NaN."""
+    """Return a mask of the components of velocities [m/s] below 100 m/s (UNSTABLE_SPEED); False for NaN."""
     slow: np.ndarray = np.abs(velocity) < UNSTABLE_SPEED
     return slow
 
@@ -234,7 +234,7 @@ def _without_detours(model: mujoco.MjModel) -> mujoco.MjModel:
 
     These steps save time only if there are many contacts or, for the midphase, many geoms. Without them, simulating an
     agent at a wall takes a tenth to a fifth less time, and the results are bit-identical. The midphase remains enabled
-    in models with more than FEW_GEOMS geoms.
+    in models with more than 200 geoms.
     """
     lean = copy.copy(model)
     lean.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND

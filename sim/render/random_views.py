@@ -132,7 +132,7 @@ def _stray(rng: np.random.Generator) -> np.ndarray:
 
 
 def _clear_of(objects: np.ndarray, draw: Callable[[], np.ndarray], clearance: float = CLEARANCE) -> np.ndarray:
-    """Return the first of TRIES random places (2,) that is clear of objects, or the last one if none is.
+    """Return the first of 100 random places (2,) that is clear of objects, or the last one if none is.
 
     objects: centres of the objects [m], (k, 2)
     draw: function that returns a random place [m], (2,)

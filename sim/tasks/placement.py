@@ -22,7 +22,7 @@ class SpawnPoints:
         """Return an agent's position (2,) and the objects' positions (n_objects, 2) [m].
 
         Raises:
-            ValueError: TRIES attempts found no positions that keep the distances SEPARATION (between objects) and
+            ValueError: 100 attempts found no positions that keep the distances SEPARATION (between objects) and
                 CLEARANCE (from the agent).
         """
         for _ in range(TRIES):

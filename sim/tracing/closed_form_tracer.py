@@ -269,7 +269,7 @@ def _check_tops(scene: UprightScene) -> None:
 
 
 def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
-    """Return a row of ROW numbers for each face, from which the texel at a point is computed.
+    """Return a row of 12 numbers for each face, from which the texel at a point is computed.
 
     A row contains two affine functions, from which the texel's column and row at a point (x, y, z, 1) follow. The
     texture's place in the atlas and a 0 come after them.

@@ -244,7 +244,7 @@ def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
     The result is the side of a cell [m], the lower corner (2,), and the numbers of rows and columns.
 
     Raises:
-        NoClosedForm: there is no such grid, or it has more than CELLS cells.
+        NoClosedForm: there is no such grid, or it has more than 10⁶ cells.
     """
     faces = [np.unique(np.round(np.concatenate([walls.lower[:, a], walls.upper[:, a]]), 6)) for a in range(2)]
     origin = np.array([f[0] for f in faces])

@@ -65,7 +65,7 @@ class Baking:
         """Return all tables by name, one for each component, float32, flat.
 
         With light of any number of reflections (`lighting.ALL`), each iteration adds one reflection. The iterations end
-        when the tables stop changing, at the latest after ORDERS reflections.
+        when the tables stop changing, at the latest after 16 reflections.
         """
         found = self._surfaces()
         for _ in range(self._orders - 1):
