@@ -33,9 +33,9 @@ class AreaTables:
     """Arrays of area sampling that are the same in all worlds.
 
     faces: walls' faces, eight numbers each, see `area_tracer`
-    face_ends: see `Columns`
-    cells: see `Footprints`
-    around: see `WallShadows`
+    face_ends: ends of all faces in the ground plan
+    cells: the grid in which walls stand; None: no grid, because walls are few
+    around: for each cell of the grid, which of its neighbours are walls; None without walls
     stripes: textures
     reflected: light that walls and floor reflect to each other; None: reflected light is neglected
     """
