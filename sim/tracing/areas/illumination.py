@@ -86,7 +86,7 @@ class Illumination:
         self.bodies = IlluminatedBodies(self._shadows, self._directions, self._radii)
 
     def irradiance(self, patch: Patch, now: FrameState) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos θ · visibility over the lights."""
+        """Return the irradiance per component: the sum of level · cos(angle of incidence) · visibility over lights."""
         return self.arriving(patch.normal, self.visibility(patch, now))
 
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
@@ -102,7 +102,7 @@ class Illumination:
         return self._for_bodies(past, self._shadows.visibility(patch, self._directions, now.inputs.around))
 
     def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos θ · fraction over the lights.
+        """Return the irradiance per component: the sum of level · cos(angle of incidence) · fraction over the lights.
 
         lit: fraction of each light that arrives
         """
