@@ -58,7 +58,7 @@ __all__ = [
 class RunConfig:
     """All settings that determine the outcome of a run, and the number of its processes.
 
-    task: one of TASKS, or FILE.py:CLASS of a user task
+    task: name of a built-in task, or FILE.py:CLASS of a user task
     seed: seed of search, training and evaluation
     workers: number of worker processes; 0: one per core
     task_sha256: SHA-256 of a user task's file; "" for a built-in task

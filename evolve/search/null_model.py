@@ -121,6 +121,8 @@ def _search(
     """Return, for each quantity, its mean in each generation, and the number of candidates that have it.
 
     The mean is NaN if no candidate has the quantity.
+
+    spread: standard deviation of task fitness in each generation, needed only if there are costs
     """
     found: dict[str, tuple[list[float], list[int]]] = {}
     for proposals in _proposals(config, generations, spread):
@@ -135,6 +137,9 @@ def _search(
 
 def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> Iterator[list[Proposal]]:
     """Yield the proposals of one generation after the other, and report a random fitness for each proposal.
+
+    If animals have costs, the fitness is a random task fitness, with the standard deviation `spread` of its generation,
+    minus the costs.
 
     With `search.steady_state`, a fitness is reported before each new proposal, as in a run.
     """

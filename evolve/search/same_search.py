@@ -32,7 +32,7 @@ class SameSearch:
 
     The first generation follows from the settings alone, so its tolerance is 10⁻⁹. Later generations have the wider
     tolerance 0.02, but only if the optimizer's libraries have the same versions as at the start of the
-    run. With other versions, the tolerance of all generations is ROUNDING.
+    run. With other versions, the tolerance of all generations is 10⁻⁹.
     """
 
     def __init__(self, run: Run) -> None:

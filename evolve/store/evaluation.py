@@ -47,7 +47,7 @@ class Evaluation:
 
 
 def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
-    """Return the KINDS most frequent messages with their numbers of episodes, the most frequent first.
+    """Return the 4 most frequent messages with their numbers of episodes, the most frequent first.
 
     If there are other messages, their total number of episodes follows under the name "others".
 

@@ -23,7 +23,7 @@ class Auxiliary:
     """Auxiliary observations of one kind of eyes in all worlds, at the centre of each receptor.
 
     renderer: renderer of depth and ids for these eyes.
-    names: the requested quantities, a subset of AUXILIARY.
+    names: the requested quantities, of "depth", "ids" and "flow".
     prefix: prefix of their names in an observation.
     spaces: spaces of the entries in one world's observation, by name:
         depth: distance of the visible point along the eye's axis [m], (eye, height, width) float32; 0 if nothing is

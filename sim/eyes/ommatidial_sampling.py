@@ -122,8 +122,8 @@ def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray,
     narrow.
 
     weights: weights before the correction, (ray, band)
-    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of the table, (place, scene)
-    powers: acceptance function of each band at the places of the table, (band, place)
+    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of `powers`, (place, scene)
+    powers: tabulated acceptance function of each band, (band, place)
     """
     found = weights.copy()
     for band, power in enumerate(powers):

@@ -92,7 +92,7 @@ class AgentPhysics:
         self.local_contacts = local_contacts_of(world, model, self.free_motion, threads)
 
     def step(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """Move all agents by one action: SUBSTEPS substeps.
+        """Move all agents by one action of 10 substeps.
 
         velocity: commanded velocity, which is constant during the action [m/s], (n, 2)
         """

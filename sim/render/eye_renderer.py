@@ -179,7 +179,7 @@ class EyeRenderer:
 
     @cached_property
     def _few(self) -> Self:
-        """Renderer of FEW worlds with the same eyes, for `launch_some`."""
+        """Renderer of 8 worlds with the same eyes, for `launch_some`."""
         return self.resized(FEW)
 
     def receptor_radiance(self, poses: Placed) -> np.ndarray:

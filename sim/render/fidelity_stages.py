@@ -31,7 +31,7 @@ def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = 
     """Return the smallest number of bands with an allowed error for surfaces of any colour, and its `Level`.
 
     If no number is accurate enough for the surfaces, return the eye's own number. If some numbers are, but none of
-    them is accurate enough for the medium, return FINEST (64).
+    them is accurate enough for the medium, return 64.
 
     allowed: allowed error of a signal
     medium: if it is given, the error for white and black in it must also be allowed

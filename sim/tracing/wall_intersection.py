@@ -259,7 +259,7 @@ def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
 
 
 def _common(a: float, b: float) -> float:
-    """Return the greatest common divisor of two lengths, with tolerance ALIGNED."""
+    """Return the greatest common divisor of two lengths, with a tolerance of 10⁻⁶ m."""
     while b > ALIGNED:
         a, b = b, a % b
         if a - b < ALIGNED:

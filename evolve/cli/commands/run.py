@@ -195,7 +195,10 @@ def _scheduler(arguments: Namespace) -> Scheduler | None:
 
 
 def _finish(run: Run, arguments: Namespace) -> int:
-    """Write the report and the EXR files, and print their paths. Return 1 if every candidate failed, else 0."""
+    """Write the report and the EXR files, print their paths and return 0.
+
+    If every candidate failed, only print the last failure, and return 1.
+    """
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
         print(f"evolve: every candidate failed; the last failure: {failures[-1].failure}", file=sys.stderr)

@@ -208,7 +208,7 @@ class Illumination:
 
 
 def _mean_colour(rays: ClosedForm, place: np.ndarray) -> np.ndarray:
-    """Return the mean reflectance of a texture, (component,), in the components of reflected light.
+    """Return the mean reflectance of a texture with one row, (component,), in the components of reflected light.
 
     place: place of the texture in the atlas, see `Atlas.places`
     """

@@ -176,7 +176,7 @@ class Baking:
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
-    """Return the positions of evenly spaced nodes along a length [m], at least MARGIN away from its ends, (nodes,)."""
+    """Return the positions of evenly spaced nodes along a length [m], at least 0.02 m away from its ends, (nodes,)."""
     return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
 
 
