@@ -65,7 +65,9 @@ class Auxiliary:
         self._before = poses
 
     def _flow(self, now: Poses, depth: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Return the optic flow of the points that are visible now, (world, eye, 2, height, width); 0 without a hit.
+        """Return the optic flow of the points that are visible now, (world, eye, 2, height, width).
+
+        It is 0 without a hit, and for points that were not in front of the eye.
 
         Points are followed from their present positions back to the previous poses. The flow is the negative of this
         motion.

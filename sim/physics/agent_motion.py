@@ -65,7 +65,7 @@ class AgentPhysics:
     """Batched physics of the agents in one world's model.
 
     world: the world, whose model all agents share
-    threads: number of threads for MuJoCo's batched step, see `sim.physics.mujoco_batch`
+    threads: number of threads for MuJoCo's batched step of 128 or more worlds
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
         obstacles are simulated in models of these obstacles alone (`local_contacts`). The attribute `free_motion` or
         `local_contacts` is None if the model does not support the method. If False, MuJoCo simulates all agents in the
@@ -116,7 +116,7 @@ class AgentPhysics:
         """Simulate agents that may touch something, each in a model of the geoms within its reach.
 
         An agent is simulated in the whole world instead if too many geoms are within reach, if a contact deflects it
-        towards other geoms, or if the simulation breaks down.
+        towards other geoms, if the simulation breaks down, or if `local_contacts` is None.
 
         in_reach: obstacles within reach of each agent, (n, obstacle) bool
         """

@@ -254,7 +254,10 @@ class ClosedForm:
 
 
 def _check_tops(scene: UprightScene) -> None:
-    """Refuse scenes in which a ray from a wall or body could hit the top of a wall, which the closed form lacks."""
+    """Refuse scenes whose reflected light has no closed form.
+
+    A ray from a wall or body could hit the top of a wall, a body may change its height, or the eyes' body has a texture.
+    """
     for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
         if not settled:
             raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")

@@ -24,8 +24,8 @@ NEVER_ZERO = 1e-9  # replaces smaller components of directions; this shifts no h
 class CellTables:
     """Tables of a grid's cells, row by row.
 
-    wall: index of the wall that fills the cell
-    top: height of this wall's top [m]
+    wall: index of the wall that fills the cell; 0 for an empty cell
+    top: height of this wall's top [m]; -inf for an empty cell
     stop: height [m] below which a ray stops in the cell
     """
 

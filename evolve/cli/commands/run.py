@@ -53,7 +53,7 @@ def start(arguments: Namespace) -> int:
 
 
 def resume(arguments: Namespace) -> int:
-    """Continue an interrupted run to its end."""
+    """Continue an interrupted run to its end; for a finished run, write missing files of its results."""
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
