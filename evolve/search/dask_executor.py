@@ -45,7 +45,7 @@ class _Trial:
 class DaskExecutor:
     """Executor with the workers of a Dask scheduler. Each worker evaluates one candidate at a time.
 
-    The executor is a context manager. A candidate whose worker dies is evaluated again, up to `ATTEMPTS` times in
+    The executor is a context manager. A candidate whose worker dies is evaluated again, up to 3 times in
     total. If the connection to the scheduler is lost, all unfinished jobs are submitted again after reconnecting.
 
     scheduler: the scheduler, or its address

@@ -186,8 +186,8 @@ def p_value(values: Sequence[float], ends: Floats) -> float:
 
     The value of a single run counts as an additional sample of the null model (Davison and Hinkley 1997, §4.2).
     Therefore, p is at least 2 / (searches + 1). For several runs, their mean is compared with the means of random
-    groups of searches. The number of searches in a group is the number of runs. Here, too, p is at least
-    2 / (searches + 1).
+    groups of searches, drawn with a fixed seed. The number of searches in a group is the number of runs. Here, too, p
+    is at least 2 / (searches + 1).
 
     values: final value of a quantity in each run
     ends: final values of the quantity in the searches, from `NullModel.ends`, (search,)

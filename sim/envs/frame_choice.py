@@ -129,7 +129,10 @@ def _chosen(
 
 
 def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.ndarray]:
-    """Return noise-free signals during random actions, (action, frame, world, ...) for each renderer."""
+    """Return noise-free signals during random actions (of a fixed seed), for each renderer.
+
+    They are (action, frame, world, ...). The actions stop when an episode ends.
+    """
     random = np.random.default_rng(0)
     worlds.reset()
     found: list[list[list[np.ndarray]]] = [[] for _ in renderers]

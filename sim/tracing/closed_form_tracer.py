@@ -256,7 +256,7 @@ class ClosedForm:
 def _check_tops(scene: UprightScene) -> None:
     """Refuse scenes whose reflected light has no closed form.
 
-    A ray from a wall or body could hit the top of a wall, a body may change its height, or the eyes' body has a texture.
+    A ray from a wall or body could hit a wall's top, a body may change its height, or the eyes' body has a texture.
     """
     for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
         if not settled:
