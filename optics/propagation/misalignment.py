@@ -91,8 +91,9 @@ class Alignment:
     def nodes(self, radius: float, sine: float, wavelength: float, allowed: float) -> tuple[np.ndarray, float]:
         """Return the depths [m] between which fields are interpolated, or just 0, and the error of the intensity.
 
-        Along a ray, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2. Interpolation between n
-        Chebyshev nodes has an error of at most φⁿ / (2ⁿ⁻¹ n!).
+        Along a ray at the angle θ to the axis, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2,
+        with the largest depth ζ and the wave number k. Interpolation between n Chebyshev nodes has an error of at most
+        φⁿ / (2ⁿ⁻¹ n!).
 
         radius: largest distance [m] from the centre.
         sine: largest sin θ of the light.
@@ -135,6 +136,8 @@ class Alignment:
     def leaving(self, u: np.ndarray, dx: float, wavelength: float) -> np.ndarray:
         """Return a field u (y, x) on the tilted plane times 1 - tan α sin θ, an approximation of the obliquity factor.
 
+        α is the tilt, and θ the angle of the light to the axis.
+
         wavelength: wavelength [m] in the medium.
         """
         if not self.steepness:
@@ -164,7 +167,7 @@ ALIGNED = Alignment()
 
 
 def slowness(sine: float) -> float:
-    """Return 1 - c = (1 - cos θ)/2 from sin θ. c belongs to the carrier exp(ikcζ), see the module."""
+    """Return 1 - c = (1 - cos θ)/2 from sin θ, where exp(ikcζ) is the carrier of light at the depth ζ."""
     return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 
