@@ -69,7 +69,7 @@ def assemble(
     file: TOML file with settings; None: no file
     assignments: settings such as "search.population=8"
     starts: start values of the genes, which `evolve.runs.start_from` reads from another run; None: the default values
-    scale: scale of a preset that has several, "laptop" or "paper"; None: "laptop"
+    scale: scale of a preset that has several, "laptop" or "paper"; None: "laptop". It needs such a preset.
 
     Raises:
         ConfigError: no source names a task; or a task, preset, scale or key is unknown; or a value has the wrong type

@@ -216,7 +216,7 @@ class WiringConfig:
     `evolve config schema` describes each field.
 
     `pool_side` has no effect along an axis with at most this number of receptors. `repeat_side` has no effect along an
-    axis on which at least this number of signals is left after averaging. Both must be 0 for compound eyes.
+    axis if averaging leaves at least as many signals there. Both must be 0 for compound eyes.
     """
 
     shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")

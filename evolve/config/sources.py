@@ -60,9 +60,12 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
     scale: name of the scale; None: "laptop", if the preset has several scales
 
     Raises:
-        ConfigError: the preset or the scale is unknown, or `scale` is given although the preset has only one scale.
+        ConfigError: the preset or the scale is unknown, or `scale` is given although there is no preset, or the preset
+            has only one scale.
     """
     if name is None:
+        if scale is not None:
+            raise ConfigError(f"scale {quoted(scale)}: has no effect without a preset; name a preset that has scales")
         return []
     if not isinstance(name, str) or name not in preset_names():
         raise ConfigError(f"unknown preset {quoted(name)}; {suggestion(name, preset_names())}")

@@ -258,7 +258,7 @@ def train(
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
-    """Return whether a learning curve has an earlier evaluation that none of its last `patience` ones exceeds."""
+    """Return whether none of the last `patience` evaluations exceeds the best evaluation before them."""
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 

@@ -81,7 +81,7 @@ def null_model(
 
     Raises:
         ValueError: there are costs, and `spread` has fewer values than generations.
-        ConfigError: the optimizer is unknown, or cannot be used here.
+        ConfigError: the optimizer is unknown, or cannot be built for this genome and population.
     """
     if not config.costs.free and len(spread) < generations:
         raise ValueError(f"spread has {len(spread)} values: must be {generations}, one for each generation")

@@ -42,8 +42,8 @@ class BallLens:
     radius: radius R [m] of the lens.
     core_n, surface_n: refractive indices at the centre and just inside the surface, constant or dispersive.
     medium_n: refractive index of the surrounding medium, on both sides.
-    shape: function of r/R in [0, 1], an array, that falls from 1 to 0. It must be smooth in (r/R)². Default: the
-        parabola 1 - (r/R)².
+    shape: function that maps an array of r/R in [0, 1] to values that fall from 1 at the centre to 0 at the surface.
+        It must be smooth in (r/R)². Default: the parabola 1 - (r/R)².
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states, or the profile traps light inside

@@ -61,6 +61,9 @@ class PixelRelief(Relief):
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
         """Return the frequency [cycles per radius] beyond which at most a fraction `share` of the light is scattered.
 
+        The result is 0 if all heights within the aperture are equal, and infinity if more than `share` / 2 of the light
+        may lie beyond 32 repetitions of the spectrum.
+
         The limit holds for frequencies along x and along y. The power spectrum behind the pupil is that of the samples
         (a discrete Fourier transform), repeated periodically and multiplied by sinc², the power spectrum of one pixel.
 

@@ -1,8 +1,8 @@
 """Number of kernels for a range of distances or directions: the fewest with an acceptable interpolation error.
 
 Kernels are computed at nodes that are evenly spaced over [-1, 1] along every axis, and interpolated linearly between
-them. The interpolation error falls with the square of the nodes' distance. It is measured by computing kernels between
-the nodes. Most of these kernels are reused, because the next larger set of nodes contains these points.
+them. The interpolation error is proportional to the square of the node spacing. It is measured by computing kernels
+between the nodes. Most of these kernels are reused, because the next larger set of nodes contains these points.
 """
 
 from __future__ import annotations

@@ -208,7 +208,8 @@ class SineStack(SineGeometry):
     def to_middle(self, wavelength: float | np.ndarray, dtype: str) -> np.ndarray:
         """Return the factor between the light of samples and their contribution to the middle, (pupil, y, x), complex.
 
-        It is the factor in `arriving`, for light whose amplitude includes the areas of the samples.
+        It is the `diffraction_kernel` [1/m²] up to a constant phase, for light whose amplitude includes the areas of
+        the samples.
 
         wavelength: wavelength [m] in the medium, a number.
         """

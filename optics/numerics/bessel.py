@@ -46,7 +46,7 @@ def bessel_j(order: np.ndarray | float, x: np.ndarray) -> np.ndarray:
 
 
 def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
-    """Return J₀(2π waves) for waves >= 0 in float64.
+    """Return J₀(2π waves) in the precision of `types`, for float64 `waves` >= 0.
 
     The error is about 1e-7 in float32. In float64, it is 1e-15 if `exactly` is True, else 1e-12.
     """

@@ -68,7 +68,7 @@ class ModesAtPupil:
     def power_on(self, sines: Grid, taken: np.ndarray, digits: float = DIGITS) -> np.ndarray:
         """Return the fraction of the light on the pupil that the modes accept, weighted and added up, (y, x).
 
-        sines: grid of sines of the light's directions.
+        sines: grid of sines of the light's directions, relative to the sines of the beam's source.
         taken: weight of each mode, for example the fraction of its light that is absorbed.
         digits: digits of the Fourier sum.
         """

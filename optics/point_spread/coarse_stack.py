@@ -47,7 +47,11 @@ def coarse_stack(
 
 
 def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method: str) -> WindowSampling | None:
-    """Return samples that are sufficient for the whole stack; None if another method is chosen for a part of it."""
+    """Return samples that are sufficient for the whole stack.
+
+    The result is None if another method is chosen for the nearest or the farthest source, or no method meets the
+    tolerance there.
+    """
     wavelength, found = min(without.wavelengths), list[WindowSampling]()
     distances = [source.distance for source in without.sources]
     for place in {int(np.argmin(distances)), int(np.argmax(distances))}:

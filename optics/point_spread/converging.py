@@ -103,7 +103,10 @@ class Converging(ReadOnlyArrays):
         return rule.components(), Plan(PLANE_WAVES, (nodes, 1), "float64", SUM_ERROR, why)
 
     def _plane_waves(self, window: Grid) -> tuple[np.ndarray, Plan] | None:
-        """Return the field as a sum of plane waves, or None if its error exceeds the tolerance or is unknown."""
+        """Return the field as a sum of plane waves, or None.
+
+        It is None if its error exceeds the tolerance or is unknown, or the window is too large for the sum.
+        """
         rule = VectorSum(self.beam, window)
         if window.own_half_diagonal > number(self.beam.distance) or (nodes := rule.nodes) > MOST_NODES:
             return None

@@ -109,7 +109,10 @@ def _wrapped(pupil: Pupil) -> str:
 
 
 def sensor_place(pupil: Pupil, sensor_distance: Scalar | None, source_distance: Scalar) -> Scalar:
-    """Return the distance [m] of the sensor. None: the distance at which the pupil's ideal lens images the source.
+    """Return the distance [m] of the sensor.
+
+    If `sensor_distance` is None, this is the distance at which the pupil's ideal lens images the source, or
+    240 µm if the pupil has no lens.
 
     Raises:
         ValueError: the distance is missing although it would depend on a number that carries a derivative, or the lens

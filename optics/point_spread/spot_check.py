@@ -253,7 +253,7 @@ def _in_order(window: Grid) -> np.ndarray:
 def _by_radius(window: Grid) -> np.ndarray:
     """Return flat indices in order of the distance from the axis.
 
-    Points at even steps in this order include every important ring.
+    Points at even steps of the cumulative probability in this order lie in all bright rings.
     """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
     # Squared radii are rounded, so that rounding errors do not change the order of equal radii.

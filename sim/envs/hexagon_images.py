@@ -36,7 +36,7 @@ def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
 
 
 def _palette(eye: CompoundEye) -> np.ndarray:
-    """Return the linear sRGB of each signal, (ommatidium, channel, 3)."""
+    """Return the linear sRGB colour of a signal of 1, for each signal of an eye, (ommatidium, channel, 3)."""
     hues = hues_of(eye.receptors)
     types = np.arange(eye.channels)[None] if eye.types is None else eye.types
     mine = hues[types]

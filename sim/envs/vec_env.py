@@ -141,7 +141,8 @@ class EyesVecEnv(OneEnvironment):
         Return the observation, reward, terminated, truncated and info, all as batches of one.
 
         Raises:
-            ValueError: the action is not finite, `step_async` would refuse it, or an array of the task is invalid.
+            ValueError: there are several worlds, the action is not finite or does not have the shape of the action
+                space, or an array of the task is invalid.
             RuntimeError: there has been no reset yet, `close` has been called, or an action is pending.
         """
         self._calls.require_begun()

@@ -62,7 +62,8 @@ class FidelityTrials:
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Return a function that maps rays per receptor to the root mean square error of signals.
 
-        The error is computed for both populations of receptors (`sim.render.populations`), and the larger one counts.
+        The result is the largest error of a population of receptors (`sim.render.populations`). Worlds without objects
+        have one population, and others two.
 
         Raises:
             NoRaysError: raised by the returned function if a receptor has no rays.

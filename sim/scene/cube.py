@@ -43,8 +43,8 @@ def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uni
 
     kind: type of the geom
     uniform: True if the material has `texuniform`
-    size: half sizes (3,) along x, y, z; for a capsule, those of its cylindrical side. On a capsule's caps, the distance
-        beyond the end of the side is divided by the radius.
+    size: half sizes (3,) along x, y, z; for a capsule, those of its cylindrical side. On a capsule's caps, z becomes
+        ±(1 + d / radius), where d [m] is the distance along z beyond the end of this side.
     """
     if kind in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_HFIELD):
         found = vertices.copy()

@@ -40,8 +40,8 @@ class AgentEvents:
     """Events during one action, per world.
 
     progress: progress as the task defines it [m], (n,)
-    goal: True if a goal was reached, (n,) bool
-    adversary: True if an adversary was reached, (n,) bool
+    goal: True if a goal was reached and counts, (n,) bool
+    adversary: True if an adversary was reached and counts, (n,) bool; in training, only the first object counts
     adversary_first: True if an adversary was reached before any goal, (n,) bool
     reached: True for objects that were reached, (n, k) bool
     terminated: True if the task ends the episode, (n,) bool

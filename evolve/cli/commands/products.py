@@ -41,7 +41,7 @@ class Products:
         return {"directory": str(run.path), "report": str(self.report), **replay, "exr": exr}
 
     def lines(self, run: Run) -> list[str]:
-        """Return the paths of the files as lines of text."""
+        """Return lines with the run directory, the paths of the pages, and the number, folder and first EXR file."""
         return [
             f"run directory: {run.path}",
             f"report: {self.report}",

@@ -184,6 +184,8 @@ def test_scales_that_do_not_exist_are_refused():
         assemble(preset="lens", scale="big")
     with pytest.raises(ConfigError, match="scale 'laptop': preset quick has only one scale"):
         assemble("detection", "quick", scale="laptop")
+    with pytest.raises(ConfigError, match="scale 'paper': has no effect without a preset; name a preset that has scales"):
+        assemble("detection", scale="paper")
 
 
 def test_contradiction_with_a_scale_names_it():
