@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optics.numerics.arguments import shown
+from optics.numerics.arguments import flag, shown
+from optics.numerics.number_types import is_boolean
 from optics.numerics.renamed import warn_renamed
 from optics.spectra.bands import FINEST
 from optics.spectra.photon_budget import PhotonBudget
@@ -88,14 +89,14 @@ class Eyes:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
             value = getattr(self, name)
             try:
-                fits = bool(valid(value))
+                fits = not is_boolean(value) and bool(valid(value))
             except (TypeError, ValueError, OverflowError):
                 fits = False
             if not fits:
                 raise ValueError(f"Eyes: {name} = {shown(value)}: must be {range_}")
 
         def counts(value: Any) -> bool:
-            return 1 <= value == int(value) <= MOST
+            return not is_boolean(value) and 1 <= value == int(value) <= MOST
 
         check("n_eyes", counts, f"a whole number, at least 1 and at most {MOST}")
         check(
@@ -121,7 +122,7 @@ class Eyes:
         if not isinstance(self.dynamics, ReceptorDynamics | None):
             raise ValueError(f"Eyes: dynamics = {shown(self.dynamics)}: must be an optics.ReceptorDynamics or None")
         self._check_density()
-        check("pupil_turned", lambda turned: isinstance(turned, bool | np.bool_), "True or False")
+        flag("Eyes: pupil_turned", self.pupil_turned)
         if self.pupil_turned and self.optics is None:
             raise ValueError(
                 "Eyes: pupil_turned = True and optics = None: must be False, or a Pupil that can be turned"

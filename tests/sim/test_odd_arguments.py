@@ -28,7 +28,7 @@ CALLS = {
         "ommatidium": None,
         "acute_zone": 1.0,
     },
-    "Fidelity": {"rays_per_receptor": 8, "bands": 4, "tolerance": None, "light": "direct", "samples": "rays"},
+    "Fidelity": {"rays_per_receptor": 8.0, "bands": 4, "tolerance": None, "light": "direct", "samples": "rays"},
     "Mount": {
         "on": "head",
         "azimuth_deg": 0.0,
