@@ -15,8 +15,8 @@ from optics.eye.eye import Eye
 from optics.eye.geometry import behind_pupil
 from optics.eye.photoreceptor import photon_noise
 from optics.numerics.arguments import in_range, of_kind, positive, reals, shape_2d, whole
-from optics.numerics.number_types import is_boolean
 from optics.numerics.autodiff import Array, Scalar, holds_arrays, is_differentiable, number, plain
+from optics.numerics.number_types import is_boolean
 from optics.point_spread.request import sensor_place
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of

@@ -78,8 +78,10 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
-def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False) -> float:
-    """Return `value` as a float; ValueError unless it is positive and its square is within double precision.
+def positive(
+    name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False, most: float = LARGEST
+) -> float:
+    """Return `value` as a float; ValueError unless it is positive, at most `most`, and squared in double precision.
 
     infinite: True if infinity is allowed.
     carried: see `without_derivative`.
@@ -87,9 +89,9 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
     number = _number(name, value, carried)
     if infinite and number == math.inf:
         return number
-    if not SMALLEST <= number <= LARGEST:
+    if not SMALLEST <= number <= most:
         size = f" (at least {SMALLEST:g})" if 0 < number < SMALLEST else ""
-        upper = ", or infinite" if infinite else f" and at most {LARGEST:g}"
+        upper = ", or infinite" if infinite else f" and at most {most:g}"
         raise ValueError(f"{name} = {shown(value)}: must be greater than 0{size}{upper}, in {unit}")
     return number
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optics import TurbidMedium
-from optics.numerics.arguments import shown, whole
+from optics.numerics.arguments import did_you_mean, shown, whole
 from optics.spectra.spectrum import Spectrum
 from sim.envs.calls import seed_of
 from sim.envs.follow_camera import check_render_mode
@@ -172,10 +172,18 @@ def make_parallel_env(
 
 
 def refuse(options: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
-    """Raise a ValueError if `options` contains a name that is in `reasons`, which states why it must be left out."""
-    for name, why in reasons.items():
-        if name in options:
-            raise ValueError(f"{name} = {shown(options[name])}: must be left out, {why}")
+    """Refuse options that `make_vec_env` does not have, and those in `reasons`, which states why.
+
+    Raises:
+        ValueError: an option must be left out.
+    """
+    known = inspect.signature(make_vec_env).parameters
+    for name, value in options.items():
+        if name in reasons:
+            raise ValueError(f"{name} = {shown(value)}: must be left out, {reasons[name]}")
+        if name not in known:
+            right = f"must be an argument of sim.make_vec_env{did_you_mean(name, known)}"
+            raise ValueError(f"{name} = {shown(value)}: unknown, {right}")
 
 
 def in_bands(eyes: Eyes | Mapping[str, Eyes], bands: int) -> Any:

@@ -165,14 +165,16 @@ class CompoundEye:
     def acceptance(self, kind: int) -> AcceptanceFunction:
         """Return the acceptance function of the ommatidium with this index in `kinds`, for the eye's bands.
 
-        The properties `solid_angles`, `white` and `photons` raise the same errors, except for the IndexError.
+        The properties `solid_angles`, `white` and `photons` raise the same errors.
 
         Raises:
-            IndexError: there is no ommatidium with this index.
-            ValueError: the rhabdom guides no light in a band.
+            ValueError: there is no ommatidium with this index, or the rhabdom guides no light in a band.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
         """
-        return acceptance_function(self.kinds[0][kind], self.spectral_bands.wavelengths)
+        different = self.kinds[0]
+        return acceptance_function(
+            different[whole("kind", kind, 0, len(different) - 1)], self.spectral_bands.wavelengths
+        )
 
     @cached_property
     def solid_angles(self) -> np.ndarray:

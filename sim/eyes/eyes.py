@@ -115,12 +115,8 @@ class Eyes:
         object.__setattr__(self, "resolution", tuple(map(int, self.resolution)))
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
         check("optics", _is_pupil, "an optics.Pupil or None, the perfect lens")
-        if not isinstance(self.photon_budget, PhotonBudget | None):
-            raise ValueError(
-                f"Eyes: photon_budget = {shown(self.photon_budget)}: must be an optics.PhotonBudget or None"
-            )
-        if not isinstance(self.dynamics, ReceptorDynamics | None):
-            raise ValueError(f"Eyes: dynamics = {shown(self.dynamics)}: must be an optics.ReceptorDynamics or None")
+        check("photon_budget", lambda x: isinstance(x, PhotonBudget | None), "an optics.PhotonBudget or None")
+        check("dynamics", lambda x: isinstance(x, ReceptorDynamics | None), "an optics.ReceptorDynamics or None")
         self._check_density()
         flag("Eyes: pupil_turned", self.pupil_turned)
         if self.pupil_turned and self.optics is None:

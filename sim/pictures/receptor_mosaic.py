@@ -13,7 +13,7 @@ from optics.numerics.read_only import read_only
 from sim.exr.files import write_exr
 from sim.exr.previews import preview_of_receptors
 from sim.exr.view import View
-from sim.scene.color import encode_srgb
+from sim.scene.color import encode_srgb, srgb_image
 
 __all__ = ["ReceptorMosaic"]
 
@@ -51,7 +51,8 @@ class ReceptorMosaic:
         height: height of the image in pixels, 16 to 8192.
 
         Raises:
-            ValueError: the height is no whole number in its range, or the photograph is no array (y, x, 3).
+            ValueError: the height is no whole number in its range, or the photograph has another shape or
+                values.
         """
         from PIL import Image
 
@@ -62,7 +63,7 @@ class ReceptorMosaic:
         drawn = self._hexagons(colors, tall) if self.hexagons else self._squares(colors, tall)
         if photograph is None:
             return drawn
-        left = Image.fromarray(np.rint(255 * np.asarray(photograph)).astype(np.uint8))
+        left = Image.fromarray(np.rint(255 * srgb_image("photograph", photograph)).astype(np.uint8))
         left = left.resize((max(1, round(tall * left.width / left.height)), tall), Image.Resampling.LANCZOS)
         between = np.full((tall, GAP, 3), 255, np.uint8)
         return np.concatenate([np.asarray(left), between, drawn], axis=1)

@@ -18,6 +18,7 @@ import numpy as np
 
 import optics
 from optics.elements.turbid_medium import medium_of
+from optics.numerics.arguments import shown
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
 from sim.eyes.compound_eye import WorldEye
@@ -82,12 +83,11 @@ def choose_model_fidelity(
 
     Raises:
         ValueError: the tolerance is not positive and finite, `light` is unknown, or ModelRenderer refuses an argument.
-        IndexError: `poses` is an empty list.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     if light not in (*FOLLOWED, AUTO):
-        raise ValueError(f"light = {light!r}: must be 'direct', 'bounce' or 'auto'")
+        raise ValueError(f"light = {shown(light)}: must be 'direct', 'bounce' or 'auto'")
     allowed = allowed_error(eye, tolerance)
     placed = poses if isinstance(poses, Poses) else Poses.from_data(poses)
     scene = PreparedScene(

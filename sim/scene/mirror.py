@@ -147,20 +147,20 @@ class Mirror:
         Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
 
         camera: name or id of a camera of the model, or a Viewpoint
-        width, height: size of the image [pixels], whole numbers
+        width, height: size of the image [pixels], whole numbers from 1 to 65,536
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}.
             "direct" shows only emitters behind a transparent geom; a MirrorWarning names such geoms once.
-        spp, seed: number of samples per pixel, and seed of the samples, whole numbers
+        spp: number of samples per pixel, 1 to 2³¹ - 1
+        seed: seed of the samples, 0 to 2¹²⁸
         sampler: "independent", or "multijitter", whose images have less noise
 
         Raises:
-            ValueError: the camera is unknown or no plain perspective, the integrator is unknown, there is less than one
-                pixel or sample, a wavelength is outside 300 to 780 nm, or Mitsuba would apply an argument incorrectly.
-            RuntimeError: Mitsuba has no such sampler, or `width` or `height` is not a whole number.
-            TypeError: `spp` or `seed` is not a whole number.
+            ValueError: the camera is unknown or no plain perspective, the integrator or the sampler is unknown, a
+                number is not whole or out of range, a wavelength is outside 300 to 780 nm, or Mitsuba would apply an
+                argument incorrectly.
         """
         view = self.viewpoint(camera)
-        rays.check_size(width, height, spp)
+        width, height = rays.checked_size(width, height)
         asked = rays.checked_wavelengths(wavelengths)
         if rays.described(integrator)["type"] == "direct":
             self._warn_of_glass()
@@ -195,7 +195,7 @@ class Mirror:
 
     def _first_hits(self, camera: str | int | Viewpoint, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         view = self.viewpoint(camera)
-        rays.check_size(width, height, 1)
+        width, height = rays.checked_size(width, height)
         with in_variant(self.variant):
             names, points = self._camera(view, width, height).first_hits()
         ids = np.array([int(name.split("_")[1]) if name else -1 for name in names], dtype=np.int32)
