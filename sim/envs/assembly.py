@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optics import TurbidMedium
-from optics.numerics.arguments import did_you_mean, shown, whole
+from optics.numerics.arguments import did_you_mean, of_kind, shown, whole
 from optics.spectra.spectrum import Spectrum
 from sim.envs.calls import seed_of
 from sim.envs.follow_camera import check_render_mode
@@ -133,6 +133,8 @@ def make_vec_env(
     _require_whole("world_seed", world_seed, 0)
     _check(n_envs, seed, memory, mode, render_mode)
     check_least_return(least_return, mode)
+    if vary is not None:
+        of_kind("vary", vary, Mapping, "{'light': (0.5, 2.0)}")
     if asked is not None:
         eyes = in_bands(eyes, asked.bands)
     where: dict[str, Any] = {"seed": world_seed, "mazes": mazes, "course": course, "wall_height": wall_height}
@@ -161,7 +163,7 @@ def make_parallel_env(
     """
     if not isinstance(encounter, Encounter):
         raise ValueError(
-            f"encounter = {encounter!r:.80}: must be a sim.Encounter, such as sim.Encounter(Prey(), Hunter())"
+            f"encounter = {shown(encounter)}: must be a sim.Encounter, such as sim.Encounter(Prey(), Hunter())"
         )
     _check(1, seed, memory, "training", render_mode)
     if find_spec("pettingzoo") is None:

@@ -6,7 +6,7 @@ import contextlib
 
 import numpy as np
 
-from optics.numerics.arguments import whole
+from optics.numerics.arguments import shown, whole
 from sim.physics.physics import MOST_WORLDS
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.simulation import Simulation
@@ -45,7 +45,7 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     An exception in a method of the task is raised unchanged.
     """
     if not isinstance(task, BatchTask):
-        raise ValueError(f"task = {task!r:.80}: must be a sim.BatchTask")
+        raise ValueError(f"task = {shown(task)}: must be a sim.BatchTask")
     n_envs, steps = whole("n_envs", n_envs, 2, MOST_WORLDS), whole("steps", steps, 1, MOST_STEPS)
     with (
         contextlib.closing(Simulation(task, n_envs, SEED)) as many,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from optics.numerics.arguments import shown
+from optics.numerics.number_types import is_number
 from sim.eyes.compound_eye import WorldEye
 
 # Independent errors add in quadrature. An error of half the noise increases the total to √(1 + 1/4) = 1.12 times the
@@ -25,6 +27,6 @@ def allowed_error(eye: WorldEye, tolerance: float | None) -> float:
     """
     if tolerance is None:
         return max(SHARE_OF_NOISE * float(eye.noise_sigma), LEAST_TOLERANCE * float(eye.throughput))
-    if not 0 < tolerance < math.inf:
-        raise ValueError(f"tolerance = {tolerance!r}: must be positive and finite")
+    if not (is_number(tolerance) and 0 < tolerance < math.inf):
+        raise ValueError(f"tolerance = {shown(tolerance)}: must be positive and finite")
     return tolerance

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean, finite, in_range, items, of_kind, reals, shown, whole
+from optics.numerics.arguments import did_you_mean, finite, in_range, items, of_kind, one_of, reals, shown, whole
 
 EXAMPLE = "sim.Mount('head')"
 MOST_EYES = 10_000  # chosen limit for the eyes of a fan or ring
@@ -71,8 +71,9 @@ class Mount:
         """Return the kind and id of the object that carries the eye.
 
         Raises:
-            ValueError: the model has no such object.
+            ValueError: the model has no such object, or is no MjModel.
         """
+        of_kind("model", model, mujoco.MjModel, "mujoco.MjModel.from_xml_path('robot.xml')")
         for kind in KINDS if self.kind is None else (self.kind,):
             index = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), self.on)
             if index >= 0:
@@ -90,9 +91,9 @@ class Mount:
         kind: kind of the object, "site", "camera" or "body"
 
         Raises:
-            KeyError: the kind is unknown.
+            ValueError: the kind is unknown.
         """
-        ahead, left, up = _AXES[kind]
+        ahead, left, up = _AXES[one_of("kind", kind, KINDS)]
         azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
         level = np.cos(azimuth) * ahead + np.sin(azimuth) * left
         beside = -np.sin(azimuth) * ahead + np.cos(azimuth) * left
@@ -113,7 +114,7 @@ def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
         ValueError: `said` is a single mount, or not a sequence of mounts.
     """
     if not isinstance(said, Sequence) or not all(isinstance(mount, Mount) for mount in said):
-        raise ValueError(f"{where} = {said!r:.80}: must be several of sim.Mount, such as (sim.Mount('head'),)")
+        raise ValueError(f"{where} = {shown(said)}: must be several of sim.Mount, such as (sim.Mount('head'),)")
     return tuple(said)
 
 

@@ -13,10 +13,11 @@ import numpy as np
 
 import optics
 from optics import animals
-from optics.numerics.arguments import in_range, one_of, reals
+from optics.numerics.arguments import in_range, one_of, reals, shown
 from optics.spectra.bands import SpectralBands
 from optics.spectra.receptors import receptors_of
 from optics.spectra.srgb import decode_srgb, ink_radiance
+from sim.exr.files import file_path
 from sim.pictures.receptor_mosaic import ReceptorMosaic
 from sim.scene.color import srgb_image
 
@@ -37,14 +38,14 @@ def read_photograph(path: str | Path) -> np.ndarray:
     """Read an image file as sRGB values (y, x, 3) in [0, 1], rotated according to its EXIF orientation.
 
     Raises:
-        ValueError: the file is no image, is damaged or too large, has transparency, or does not have three channels of
-            8 bits.
+        ValueError: `path` is no path; or the file is no image, is damaged or too large, has transparency, or does not
+            have three channels of 8 bits.
         OSError: the file cannot be read.
     """
     from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        with Image.open(file_path("path", path)) as image:
             mode, clear = image.mode, "transparency" in image.info
             upright = ImageOps.exif_transpose(image)
             pixels = np.asarray(upright.convert("RGB") if mode == "P" else upright)
@@ -123,6 +124,8 @@ def see_photograph(
     linear = decode_srgb(srgb_image("photograph", photograph, SMALLEST))
     z = _checked_depth(depth, linear.shape[:2], animal)
     in_range("uv", uv, 0.0, 1.0)
+    if progress is not None and not callable(progress):
+        raise ValueError(f"progress = {shown(progress)}: must be a function of the completed fraction, or None")
     report = progress or (lambda share: None)
     if animal in animals.COMPOUND:
         return _compound(linear, animal, width, uv, report)

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 
 from optics.numerics.arguments import one_of, shown, whole
-from optics.numerics.number_types import is_boolean
+from optics.numerics.number_types import is_number
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.tracing.lighting import ALL, DIRECT, LEVELS
@@ -76,11 +75,11 @@ class Fidelity:
 
     def __post_init__(self) -> None:
         rays = self.rays_per_receptor
-        if not (_is_number(rays) and 0 < rays <= MOST_RAYS):
+        if not (is_number(rays) and 0 < rays <= MOST_RAYS):
             most = f"{MOST_RAYS:g}"
             raise ValueError(f"rays_per_receptor = {shown(rays)}: must be positive and at most {most}, or 'auto'")
         whole("bands", self.bands, 1, MOST_BANDS)
-        if self.tolerance is not None and not (_is_number(self.tolerance) and 0 < self.tolerance < math.inf):
+        if self.tolerance is not None and not (is_number(self.tolerance) and 0 < self.tolerance < math.inf):
             raise ValueError(f"tolerance = {shown(self.tolerance)}: must be positive, or None")
         if self.frames is not None:
             whole("frames", self.frames, 1, MOST_FRAMES)
@@ -130,7 +129,3 @@ def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity |
     if rays_per_receptor != "auto":
         raise ValueError(f"rays_per_receptor = {shown(rays_per_receptor)}: must be positive, or 'auto'")
     return None
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not is_boolean(value)

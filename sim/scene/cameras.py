@@ -19,6 +19,7 @@ from sim.scene.pose_snapshot import PoseSnapshot
 from sim.scene.variant import MitsubaObject
 
 WIDEST_DEG = 179.0  # chosen: largest field of view
+FARTHEST = 1e15  # [m] chosen: largest coordinate of a point, whose square is within double precision
 
 
 @dataclass(frozen=True)
@@ -42,15 +43,15 @@ class Viewpoint:
         fovy_deg: vertical field of view [degrees], above 0 and at most 179
 
         Raises:
-            ValueError: `origin` or `target` does not consist of three finite numbers, the points are equal, or the
-                field of view is out of range.
+            ValueError: `origin` or `target` does not consist of three numbers of at most 10¹⁵, the points are equal, or
+                the field of view is out of range.
         """
         origin, target = _point("origin", origin), _point("target", target)
         fovy_deg = positive("fovy_deg", fovy_deg, "degrees", most=WIDEST_DEG)
         back = origin - target
         distance = np.linalg.norm(back)
-        if not 0 < distance < np.inf:
-            raise ValueError(f"target = {shown(target.tolist())}: must be away from the origin, by a finite distance")
+        if distance == 0:
+            raise ValueError(f"target = {shown(target.tolist())}: must differ from the origin")
         back /= distance
         right = np.cross([0, 1.0, 0] if abs(back[2]) > 1 - 1e-9 else [0, 0, 1.0], back)
         right /= np.linalg.norm(right)
@@ -107,10 +108,10 @@ def sensor(view: Viewpoint, width: int, height: int, near: float) -> MitsubaObje
 
 
 def _point(name: str, value: object) -> np.ndarray:
-    """Return a point [m], (3,); ValueError unless it consists of three finite numbers."""
+    """Return a point [m], (3,); ValueError unless it consists of three numbers of at most FARTHEST."""
     point = reals(name, value)
-    if point.shape != (3,) or not np.isfinite(point).all():
-        raise ValueError(f"{name} = {shown(value)}: must be a point, three finite numbers [m]")
+    if point.shape != (3,) or not (np.abs(point) <= FARTHEST).all():
+        raise ValueError(f"{name} = {shown(value)}: must be a point, three numbers [m] of at most {FARTHEST:g}")
     return point
 
 

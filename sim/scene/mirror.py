@@ -15,10 +15,11 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import items, shown
 from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, coincident, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
-from sim.scene.pose_snapshot import PoseSnapshot
+from sim.scene.pose_snapshot import PoseSnapshot, checked_data
 from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
@@ -59,7 +60,12 @@ def mirror(
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     return Mirror(
-        source.load(model), data, bodies=bodies, groups=groups, variant=variant or default_variant(), spectra=spectra
+        source.load(model),
+        data,
+        bodies=bodies,
+        groups=groups,
+        variant=default_variant() if variant is None else variant,
+        spectra=spectra,
     )
 
 
@@ -82,14 +88,14 @@ class Mirror:
         variant: str,
         spectra: Mapping[str, Spectrum | str] | None,
     ) -> None:
-        if not variant.endswith("spectral"):
-            raise ValueError(f"mirror: variant = {variant!r}: must be a spectral one such as {DEFAULT_VARIANT!r}")
+        if not (isinstance(variant, str) and variant.endswith("spectral")):
+            raise ValueError(f"mirror: variant = {shown(variant)}: must be a spectral one such as {DEFAULT_VARIANT!r}")
         self.model, self.variant = model, variant
         self.spectra = resolve(model, spectra)
         visible = _visible(model, bodies, groups)
         self.geoms = np.array([g for g in visible if shapes.has_shape(model, g)], dtype=int)
         surfaces.require_geoms(model, self.geoms.tolist(), "mirror: ")
-        data = _reference_pose(model) if data is None else _checked(model, data)
+        data = _reference_pose(model) if data is None else checked_data(model, data)
         self._places = PoseSnapshot.from_data(data)
         together = coincident.coincidences(data, self.geoms.tolist())
         self._parts = {int(g): shapes.parts(model, g, together.lift(g)) for g in self.geoms}
@@ -113,7 +119,7 @@ class Mirror:
         Raises:
             ValueError: the data belong to another model, contain no poses yet, or a pose is not finite.
         """
-        self._places = PoseSnapshot.from_data(_checked(self.model, data))
+        self._places = PoseSnapshot.from_data(checked_data(self.model, data))
         with in_variant(self.variant):
             for geom, parts in self._parts.items():
                 pose = shapes.pose(data, geom)
@@ -126,8 +132,11 @@ class Mirror:
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
-        """Return the BSDF of a geom, which need not be in the scene. KeyError: unknown name. IndexError: unknown id."""
-        index = self.model.geom(geom).id
+        """Return the BSDF of a geom, which need not be in the scene; ValueError for an unknown name or id."""
+        try:
+            index = self.model.geom(geom).id
+        except (KeyError, IndexError, TypeError):
+            raise ValueError(f"geom = {shown(geom)}: must be the name or the id of a geom of the model") from None
         with in_variant(self.variant):
             return self._bsdf(index)
 
@@ -271,7 +280,7 @@ def _visible(model: mujoco.MjModel, bodies: Sequence[str] | None, groups: Sequen
     wanted = list(range(model.nbody))
     if bodies is not None:
         names = [model.body(i).name for i in range(model.nbody)]
-        unknown = sorted(set(bodies) - set(names))
+        unknown = sorted(set(items("mirror: bodies", bodies, str, "'world'")) - set(names))
         if unknown:
             raise ValueError(f"mirror: no body {unknown[0]!r}; the model has {', '.join(map(repr, names))}")
         wanted = [names.index(name) for name in bodies]
@@ -281,20 +290,4 @@ def _visible(model: mujoco.MjModel, bodies: Sequence[str] | None, groups: Sequen
 def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    return data
-
-
-def _checked(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """Return the data if they belong to this model and all their poses are finite; otherwise raise a ValueError."""
-    if data.geom_xpos.shape != (model.ngeom, 3) or data.xpos.shape != (model.nbody, 3):
-        raise ValueError(
-            f"mirror: data has {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies, but the model has "
-            f"{model.ngeom} and {model.nbody}"
-        )
-    if not data.geom_xmat.any():
-        raise ValueError("mirror: data contains no poses yet; call mujoco.mj_forward(model, data) first")
-    lost = ~(np.isfinite(data.geom_xpos).all(axis=1) & np.isfinite(data.geom_xmat).all(axis=1))
-    if lost.any():
-        name = model.geom(int(np.argmax(lost))).name or str(int(np.argmax(lost)))
-        raise ValueError(f"mirror: geom {name!r} has no finite position; the simulation is unstable, reset its data")
     return data

@@ -14,9 +14,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optics.numerics.arguments import shown, whole
+from optics.numerics.arguments import reals, shown, whole
 from optics.numerics.autodiff import Array
-from optics.numerics.number_types import full_precision
 from optics.spectra.spectrum import LIMITS_NM
 from sim.scene.variant import Description, MitsubaObject
 
@@ -41,11 +40,10 @@ def checked_wavelengths(wavelengths: Any) -> np.ndarray:
         ValueError: there is no wavelength, or one is outside the range of the spectra, for example because it is in
             nanometres.
     """
-    found = np.asarray(full_precision("wavelengths", wavelengths), float)
+    found = reals("wavelengths", wavelengths)
     low, high = (1e-9 * limit for limit in LIMITS_NM)
     if found.ndim != 1 or not len(found) or not ((found > low - ROUNDING) & (found < high + ROUNDING)).all():
-        said = " ".join(repr(wavelengths).split())
-        raise ValueError(f"wavelengths = {said:.80}: must be in metres, from {low:.3g} to {high:.3g}")
+        raise ValueError(f"wavelengths = {shown(wavelengths)}: must be in metres, from {low:.3g} to {high:.3g}")
     return found
 
 

@@ -56,7 +56,7 @@ def mapping(where: str, returned: Any, right: str = "arrays by name, such as {'p
         ValueError: it is not a mapping.
     """
     if not isinstance(returned, Mapping):
-        raise ValueError(f"{where} returned {returned!r:.80}: must be {right}")
+        raise ValueError(f"{where} returned {shown(returned)}: must be {right}")
     return returned
 
 
@@ -117,4 +117,4 @@ def _array(where: str, returned: Any, kind: Any) -> np.ndarray:
             return given.astype(kind)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise ValueError(f"{where} returned {returned!r:.80}: must be an array of numbers")
+    raise ValueError(f"{where} returned {shown(returned)}: must be an array of numbers")

@@ -76,7 +76,7 @@ class RewardTerms:
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values of one term, (row,); ValueError if there is no term of this name."""
-        if name not in self.names:
+        if not isinstance(name, str) or name not in self.names:
             one_of("term", name, self.names)
         return np.asarray(self.terms[self.names.index(name)])
 
