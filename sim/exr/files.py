@@ -107,7 +107,8 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     (`T.450,0nm` ...). A view has the name of its part, or of the file if the part has none. An ExrWarning names
     contents that are not read, such as polarisation.
 
-    most_bytes: largest allowed size of the unpacked pixels [bytes], up to infinity; the header of a small file can state any size
+    most_bytes: largest allowed size of the unpacked pixels [bytes], also infinity; the header of a small file can state
+        any size
 
     Raises:
         ExrError: the file cannot be read, is truncated, damaged, altered or too large, or has no spectral channels.

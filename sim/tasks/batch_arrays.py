@@ -90,7 +90,7 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
         if array is None and name == "over":
             continue
         if getattr(array, "shape", None) != shape:
-            found = f"has shape {array.shape}" if hasattr(array, "shape") else f"is {shown(array)}"
+            found = f"has shape {array.shape}" if isinstance(array, np.ndarray) else f"is {shown(array)}"
             raise ValueError(f"judge: {name} {found}: must be an array {shape}, one entry for each row")
     if not all_finite(terms):
         place, row = (int(i) for i in np.argwhere(~np.isfinite(terms))[0])

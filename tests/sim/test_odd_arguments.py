@@ -86,6 +86,12 @@ PHOTO = np.ones((9, 9, 3))
 class Lazy(sim.BatchTask):
     model, eye, mounts, fidelity = MODEL, EYE, ON_BALL, FEW_RAYS
 
+    def n_actions(self, model):
+        return 1
+
+    def act(self, worlds, actions):
+        return None
+
     def rewards(self, worlds):
         return {"nothing": np.zeros(worlds.n)}
 
@@ -243,7 +249,7 @@ def test_any_argument(name):
     assert complaints(getattr(sim, name), CALLS[name]) == {}
 
 
-@pytest.mark.filterwarnings("ignore::sim.MirrorWarning")
+@pytest.mark.filterwarnings("ignore::sim.MirrorWarning", "ignore::sim.FidelityWarning")
 @pytest.mark.parametrize("name", [*METHODS, *map(slow, SLOW)])
 def test_any_argument_of_methods(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
