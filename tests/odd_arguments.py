@@ -6,6 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+# Values of ODD that are no numbers, and those that are no whole numbers.
+NO_NUMBERS = {"bytes", "nan", "true", "complex", "empty", "ragged", "no number in it", "three numbers", "empty array"}
+NO_NUMBERS |= {"square", "dictionary", "object", "function"}
+NO_COUNTS = NO_NUMBERS | {"infinite", "minute"}
+
 OURS = tuple(str(Path(__file__).parents[1] / package) for package in ("optics", "sim", "evolve"))
 ODD = {
     "none": None,
@@ -33,8 +38,11 @@ ODD = {
 }
 
 
-def complaint(call, arguments):
-    """Return None if the call succeeds or raises a one-line error of this project; otherwise describe the problem."""
+def complaint(call, arguments, must_fail=False):
+    """Return None if the call succeeds or raises a one-line error of this project; otherwise describe the problem.
+
+    must_fail: True if success is a problem, too
+    """
     try:
         call(**arguments)
     except (ValueError, OSError) as error:
@@ -46,16 +54,20 @@ def complaint(call, arguments):
         return None if ours or isinstance(error, OSError) else f"{error} ({last.filename}:{last.lineno})"
     except Exception as error:
         return repr(error)
-    return None
+    return "accepted" if must_fail else None
 
 
 def complaints(call, valid):
-    """Return the complaints about calls in which an odd value replaces one argument; the valid call must succeed."""
+    """Return the complaints about calls in which an odd value replaces one argument; the valid call must succeed.
+
+    A number must not be replaced by something else, nor a whole number by a fraction.
+    """
     call(**valid)
     found = {}
-    for argument in valid:
+    for argument, usual in valid.items():
+        wrong = NO_COUNTS if type(usual) is int else NO_NUMBERS if type(usual) is float else ()
         for what, odd in ODD.items():
-            if (said := complaint(call, valid | {argument: odd})) is not None:
+            if (said := complaint(call, valid | {argument: odd}, what in wrong)) is not None:
                 found[argument, what] = said
     return found
 

@@ -16,6 +16,7 @@ from optics.eye.geometry import behind_pupil
 from optics.eye.photoreceptor import photon_noise
 from optics.numerics.arguments import in_range, of_kind, positive, reals, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, holds_arrays, is_differentiable, number, plain
+from optics.numerics.number_types import is_boolean
 from optics.point_spread.request import sensor_place
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of
@@ -119,7 +120,7 @@ def camera_image(
         raise ValueError("lens is an Eye, and sensor or sensor_distance is given: must be None, an Eye has its own")
     radiance = _radiance(scene, eye, samples_per_pixel)
     z = _distances(depth, radiance.shape[1:])
-    on_axis = isinstance(field_zones, int) and field_zones == 1
+    on_axis = isinstance(field_zones, int) and not is_boolean(field_zones) and field_zones == 1
     sight = None if on_axis else eye.sight(samples_per_pixel, z, layers_for(z)[0], field_zones)
     if sensor is None:
         return eye.see(radiance, samples_per_pixel, rng, z, sight)

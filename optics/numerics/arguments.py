@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.autodiff import carries_derivative, is_differentiable, number, plain
-from optics.numerics.number_types import as_array, full_precision, readable
+from optics.numerics.number_types import as_array, full_precision, is_boolean, readable
 
 __all__ = [
     "close_match",
@@ -73,24 +73,25 @@ def finite(name: str, value: float, *, carried: bool = False) -> float:
 
 def flag(name: str, value: Any) -> bool:
     """Return `value` as a bool; ValueError about `name` unless it is True or False."""
-    if not isinstance(value, (bool, np.bool_)):
+    if not is_boolean(value):
         raise ValueError(f"{name} = {shown(value)}: must be True or False")
     return bool(value)
 
 
-def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False) -> float:
-    """Return `value` as a float; ValueError about `name` unless it is in [1e-15, 1e15], where squares are accurate.
+def positive(
+    name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False, most: float = LARGEST
+) -> float:
+    """Return `value` as a float; ValueError about `name` unless it is in [1e-15, `most`], where squares are accurate.
 
-    unit: unit of `value`, for the message.
-    infinite: True if infinity is allowed.
+    unit: unit of `value`, for the message. infinite: True if infinity is allowed.
     carried: True if `value` may carry a derivative, which is otherwise refused.
     """
     number = _number(name, value, carried)
     if infinite and number == math.inf:
         return number
-    if not SMALLEST <= number <= LARGEST:
+    if not SMALLEST <= number <= most:
         size = f" (at least {SMALLEST:g})" if 0 < number < SMALLEST else ""
-        upper = ", or infinite" if infinite else f" and at most {LARGEST:g}"
+        upper = ", or infinite" if infinite else f" and at most {most:g}"
         raise ValueError(f"{name} = {shown(value)}: must be greater than 0{size}{upper}, in {unit}")
     return number
 
@@ -156,7 +157,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
     without_derivative(name, value)
     try:
         height, width = (int(n) for n in value)
-        whole = all(bool(n == int(n)) for n in value)
+        whole = all(bool(n == int(n)) and not is_boolean(n) for n in value)
     except (TypeError, ValueError, OverflowError):
         height = width = 0
         whole = False
@@ -211,7 +212,7 @@ def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
 def reals(name: str, values: Any) -> np.ndarray:
     """Return `values` as a float64 array; ValueError about `name` unless they are real numbers without derivatives."""
     given = as_array(name, without_derivative(name, values))
-    if given.dtype.kind not in "biuf":
+    if given.dtype.kind not in "biuf" or is_boolean(values):
         kind = "complex ones" if given.dtype.kind == "c" else shown(values)
         raise ValueError(f"{name}: must be real numbers, not {kind}")
     return given.astype(np.float64)
@@ -272,7 +273,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
     """Return `value` as an int; ValueError about `name` unless it is a whole number in [low, high]."""
     without_derivative(name, value)
     try:
-        fits = int(value) == value and low <= int(value) <= high
+        fits = not is_boolean(value) and int(value) == value and low <= int(value) <= high
     except (TypeError, ValueError, OverflowError):
         fits = False
     if not fits:
@@ -292,7 +293,7 @@ def _number(name: str, value: Any, carried: bool = False) -> float:
         without_derivative(name, value)
     value = full_precision(name, value)
     try:
-        if isinstance(value, (str, bytes)):
+        if isinstance(value, (str, bytes, bool, np.bool_)):
             raise TypeError
         return number(value)
     except (TypeError, ValueError, OverflowError):

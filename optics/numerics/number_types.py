@@ -1,19 +1,30 @@
-"""Checks of arrays from the user.
+"""Checks of numbers and arrays from the user.
 
-They refuse half precision and masked elements, and carry out lazy operations of PyTorch.
+They find Booleans, refuse half precision and masked elements, and carry out lazy operations of PyTorch.
 """
 
 from __future__ import annotations
 
 import math
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
-__all__ = ["all_finite", "as_array", "full_precision", "readable", "real_array"]
+__all__ = ["all_finite", "as_array", "full_precision", "is_boolean", "is_number", "readable", "real_array"]
 
 HALF = "float16", "bfloat16", "complex32", "float8", "float6_", "float4_"  # starts of names of types
 DRJIT_HALF = "Float16", "f16"  # ends of names of Dr.Jit's types
+
+
+def is_boolean(value: Any) -> bool:
+    """Return whether `value` is True or False. Python would calculate with them as with 1 and 0."""
+    return isinstance(value, (bool, np.bool_))
+
+
+def is_number(value: Any) -> bool:
+    """Return whether `value` is a single real number, and no Boolean."""
+    return isinstance(value, Real) and not is_boolean(value)
 
 
 def readable(name: str, value: Any) -> Any:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optics import TurbidMedium
-from optics.numerics.arguments import shown, whole
+from optics.numerics.arguments import did_you_mean, of_kind, shown, whole
 from optics.spectra.spectrum import Spectrum
 from sim.envs.calls import seed_of
 from sim.envs.follow_camera import check_render_mode
@@ -134,6 +134,8 @@ def make_vec_env(
     _require_whole("world_seed", world_seed, 0)
     _check(n_envs, seed, memory, mode, render_mode)
     check_least_return(least_return, mode)
+    if vary is not None:
+        of_kind("vary", vary, Mapping, "{'light': (0.5, 2.0)}")
     if asked is not None:
         eyes = in_bands(eyes, asked.bands)
     where: dict[str, Any] = {"seed": world_seed, "mazes": mazes, "course": course, "wall_height": wall_height}
@@ -162,7 +164,7 @@ def make_parallel_env(
     """
     if not isinstance(encounter, Encounter):
         raise ValueError(
-            f"encounter = {encounter!r:.80}: must be a sim.Encounter, such as sim.Encounter(Prey(), Hunter())"
+            f"encounter = {shown(encounter)}: must be a sim.Encounter, such as sim.Encounter(Prey(), Hunter())"
         )
     _check(1, seed, memory, "training", render_mode)
     if find_spec("pettingzoo") is None:
@@ -173,10 +175,18 @@ def make_parallel_env(
 
 
 def refuse(options: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
-    """Raise a ValueError if `options` contains a name that is in `reasons`, which states why it must be left out."""
-    for name, why in reasons.items():
-        if name in options:
-            raise ValueError(f"{name} = {shown(options[name])}: must be left out, {why}")
+    """Refuse options that `make_vec_env` does not have, and those in `reasons`, which states why.
+
+    Raises:
+        ValueError: an option must be left out.
+    """
+    known = inspect.signature(make_vec_env).parameters
+    for name, value in options.items():
+        if name in reasons:
+            raise ValueError(f"{name} = {shown(value)}: must be left out, {reasons[name]}")
+        if name not in known:
+            right = f"must be an argument of sim.make_vec_env{did_you_mean(name, known)}"
+            raise ValueError(f"{name} = {shown(value)}: unknown, {right}")
 
 
 def in_bands(eyes: Eyes | Mapping[str, Eyes], bands: int) -> Any:

@@ -6,8 +6,11 @@ import contextlib
 
 import numpy as np
 
+from optics.numerics.arguments import shown, whole
+from sim.physics.physics import MOST_WORLDS
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.simulation import Simulation
+from sim.tasks.task_settings import MOST_STEPS
 
 __all__ = ["check_batch_task"]
 
@@ -19,14 +22,15 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 
     Nothing is rendered. Gymnasium's `check_env` does the same for environments.
 
-    n_envs: number of worlds, at least 2
-    steps: number of actions
+    n_envs: number of worlds, 2 to 1,000,000
+    steps: number of actions, 1 to 10⁹
 
     The function checks the following:
 
     - The task's settings are valid.
-    - All arrays that its methods return have the right shapes, and `proprioception` and the outcome of an overridden
-      `judge` contain finite numbers. (If `rewards` returns NaN, only the episode of this world ends.)
+    - All arrays that its methods return have the right shapes, and `rewards`, `proprioception` and the outcome of an
+      overridden `judge` contain finite numbers. (In an environment, NaN in `rewards` ends the episode of this world.)
+    - Worlds that `act` and `judge` name exist.
     - `reset` changes only the worlds that it was given.
     - A world's episode depends neither on other worlds nor on their number.
     - The same seed leads to the same episode.
@@ -34,16 +38,15 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     - After a stored state has been restored, the same actions have the same results.
 
     Raises:
-        ValueError: the task does not behave as described, is no `sim.BatchTask`, or `n_envs` is below 2. The message
-            states the method, the array, the world, and the correct behaviour.
+        ValueError: the task does not behave as described, is no `sim.BatchTask`, or a number is out of range. The
+            message states the method, the array, the world, and the correct behaviour.
         RuntimeError: the task changes the model of all worlds, or the model enables MuJoCo's "sleep".
 
     An exception in a method of the task is raised unchanged.
     """
     if not isinstance(task, BatchTask):
-        raise ValueError(f"task = {task!r:.80}: must be a sim.BatchTask")
-    if n_envs < 2:
-        raise ValueError(f"n_envs = {n_envs!r}: must be at least 2, to compare worlds")
+        raise ValueError(f"task = {shown(task)}: must be a sim.BatchTask")
+    n_envs, steps = whole("n_envs", n_envs, 2, MOST_WORLDS), whole("steps", steps, 1, MOST_STEPS)
     with (
         contextlib.closing(Simulation(task, n_envs, SEED)) as many,
         contextlib.closing(Simulation(task, 1, SEED)) as one,
@@ -77,6 +80,10 @@ def _step(simulation: Simulation, action: np.ndarray) -> dict[str, np.ndarray]:
     failed = simulation.move(action)
     before = simulation.poses().geom_xpos
     step = simulation.judge(failed)
+    if type(simulation.task).judge is BatchTask.judge:  # which adds only failures of `rewards`
+        for world, why in step.failure.items():
+            if world not in failed:
+                raise ValueError(f"world {world}: {why}")
     if simulation.task.renders_early:
         moved = np.flatnonzero((simulation.poses().geom_xpos != before).any(axis=(1, 2)))
         if unnamed := sorted({*moved.tolist()} - {*step.changed.tolist()}):

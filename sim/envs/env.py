@@ -26,8 +26,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         episode_steps, spectra, medium, vary, auxiliary, render_mode: see `sim.make_vec_env` and `sim.build_world`
 
     Raises:
-        ValueError: an argument is invalid, or `seed` or `n_envs` was given.
-        TypeError: `sim.make_vec_env` has no argument of this name.
+        ValueError: an argument is invalid or unknown, or `seed` or `n_envs` was given.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
         RuntimeError: a method of a `sim.Task` fails at the start of the first episode. An exception of a

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import shown
 from sim.envs.field_of_view_overlay import FieldsOfView, Nearness
 from sim.eyes.eyes import Eyes
 from sim.pictures.quick_camera import QuickCamera
@@ -34,9 +35,9 @@ def check_render_mode(render_mode: str | None) -> None:
     Raises:
         ValueError: the mode is neither "rgb_array", "eyes" nor None.
     """
-    if render_mode not in (None, *RENDER_MODES):
+    if render_mode is not None and not (isinstance(render_mode, str) and render_mode in RENDER_MODES):
         modes = ", ".join(map(repr, RENDER_MODES))
-        raise ValueError(f"render_mode = {render_mode!r}: must be one of {modes} or None")
+        raise ValueError(f"render_mode = {shown(render_mode)}: must be one of {modes} or None")
 
 
 class FollowCamera:

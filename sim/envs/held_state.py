@@ -9,6 +9,7 @@ import numpy as np
 
 from optics.numerics.number_types import readable
 from sim.physics.mujoco_worlds import MODELS
+from sim.scene.poses import world_indices
 
 
 def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
@@ -37,9 +38,4 @@ def chosen_worlds(worlds: Any, n: int) -> np.ndarray:
     Raises:
         ValueError: `worlds` contains other values than indices of worlds.
     """
-    if worlds is None:
-        return np.arange(n)
-    chosen = np.atleast_1d(np.asarray(readable("worlds", worlds)))
-    if chosen.ndim != 1 or chosen.dtype.kind not in "iu" or ((chosen < 0) | (chosen >= n)).any():
-        raise ValueError(f"worlds = {worlds!r:.80}: must be numbers of worlds, from 0 to {n - 1}")
-    return chosen
+    return np.arange(n) if worlds is None else world_indices("worlds", worlds, n)

@@ -36,15 +36,16 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
     options: arguments of `sim.make_vec_env`, such as memory. They are checked when an environment is made
 
     Raises:
-        ValueError: `task` is no `sim.Task`, or its `episode_steps` is invalid.
+        ValueError: `id_` is no text, `task` is no `sim.Task`, or its `episode_steps` is invalid.
         Error: the id has an invalid form. The class is `gymnasium.error.Error`.
     """
-    from optics.numerics.arguments import whole
+    from optics.numerics.arguments import of_kind, shown, whole
     from sim.tasks.task import Task
     from sim.tasks.task_settings import MOST_STEPS
 
     if not isinstance(task, Task) and not (isinstance(task, type) and issubclass(task, Task)):
-        raise ValueError(f"register_task: task = {task!r:.80}: must be a sim.Task, or its class")
+        raise ValueError(f"register_task: task = {shown(task)}: must be a sim.Task, or its class")
+    of_kind("register_task: id_", id_, str, "'FindBall-v0'")
     gymnasium.registry.pop(id_, None)
     _register(id_, whole("register_task: episode_steps", task.episode_steps, 1, MOST_STEPS), {"task": task, **options})
 

@@ -33,8 +33,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     eyes, memory, mode ...: see `sim.make_vec_env`
 
     Raises:
-        ValueError: an argument is invalid, or `seed` or `n_envs` was given.
-        TypeError: `sim.make_vec_env` has no argument of this name.
+        ValueError: an argument is invalid or unknown, or `seed` or `n_envs` was given.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
         RuntimeError: a method of a `sim.Task` fails at the start of the first episode. An exception of a

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import items, positive
+from optics.numerics.arguments import items, positive, shown
 from sim.exr.previews import preview_of_receptors, preview_of_spectra
 from sim.exr.spectral_layout import (
     PREVIEW,
@@ -52,6 +52,14 @@ class ExrError(ValueError):
     """A file that is incomplete, damaged, or without the spectral layout."""
 
 
+def file_path(name: str, value: Any) -> Path:
+    """Return the path of a file; ValueError unless `value` is text or a path, such as pathlib.Path."""
+    try:
+        return Path(value)
+    except TypeError:
+        raise ValueError(f"{name} = {shown(value)}: must be the path of a file, such as 'view.exr'") from None
+
+
 def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect: float = 1.0) -> None:
     """Write views to an OpenEXR file, completely or not at all; an existing file is replaced.
 
@@ -59,12 +67,13 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect:
     pixel_aspect: width of a pixel divided by its height, with which viewers display the file
 
     Raises:
-        ValueError: pixel_aspect is not positive and finite, there are no views, `views` contains anything other
-            than views, two views have the same name, or JSON cannot represent an attribute.
+        ValueError: `path` is no path, pixel_aspect is not positive and finite, there are no views, `views` contains
+            anything other than views, two views have the same name, or JSON cannot represent an attribute.
         OSError: the file cannot be written.
     """
     import OpenEXR
 
+    target = file_path("path", path)
     views = items("views", views, View, "View('left', radiance=...)")
     names = [view.name for view in views]
     if not views or len(set(names)) != len(names):
@@ -88,7 +97,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect:
         parts.append(OpenEXR.Part({**header, **attributes}, channels, name))
     encoded = io.BytesIO()  # OpenEXR cannot open files whose names are not UTF-8, so it writes to memory
     OpenEXR.File(parts).write(encoded)
-    _write_whole(Path(path), encoded.getbuffer())
+    _write_whole(target, encoded.getbuffer())
 
 
 def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list[View]:
@@ -98,7 +107,8 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     (`T.450,0nm` ...). A view has the name of its part, or of the file if the part has none. An ExrWarning names
     contents that are not read, such as polarisation.
 
-    most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can state any size
+    most_bytes: largest allowed size of the unpacked pixels [bytes], also infinity; the header of a small file can state
+        any size
 
     Raises:
         ExrError: the file cannot be read, is truncated, damaged, altered or too large, or has no spectral channels.
@@ -107,7 +117,8 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     """
     import OpenEXR
 
-    if not Path(path).is_file():
+    positive("most_bytes", most_bytes, "bytes", infinite=True)
+    if not file_path("path", path).is_file():
         raise FileNotFoundError(f"no such file: {path}")
     try:
         if (size := Path(path).stat().st_size) > most_bytes + LARGEST_HEADER:  # larger than without compression

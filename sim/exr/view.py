@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import shown
+from optics.numerics.arguments import of_kind, shown
 from optics.numerics.number_types import full_precision
 from sim.exr.spectral_layout import channel, require_nanometres
 from sim.eyes.compound_eye import CompoundEye
@@ -56,8 +56,9 @@ class View:
         others: further fields of the view, except for `receptors`, `peaks_nm` and `directions`
 
         Raises:
-            ValueError: the frame has another shape, or a field of the view is invalid.
+            ValueError: `eye` is no compound eye, the frame has another shape, or a field of the view is invalid.
         """
+        of_kind("eye", eye, CompoundEye, "sim.CompoundEye([[0, 0]], ommatidium)")
         if _shape(frame) != (len(eye), eye.channels):
             raise ValueError(
                 f"frame {_kind(frame)}: must be an array (ommatidium, channel), {(len(eye), eye.channels)}"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
+from optics.numerics.arguments import LARGEST, shown
+from optics.numerics.number_types import is_number
 from sim.eyes.compound_eye import WorldEye
 
 # Independent errors add in quadrature. An error of half the noise increases the total to √(1 + 1/4) = 1.12 times the
@@ -21,10 +21,10 @@ def allowed_error(eye: WorldEye, tolerance: float | None) -> float:
         not included), but at least 0.005 times `throughput`, the eye's signal of a white surface.
 
     Raises:
-        ValueError: the tolerance is not positive and finite.
+        ValueError: the tolerance is not positive or is above 10¹⁵.
     """
     if tolerance is None:
         return max(SHARE_OF_NOISE * float(eye.noise_sigma), LEAST_TOLERANCE * float(eye.throughput))
-    if not 0 < tolerance < math.inf:
-        raise ValueError(f"tolerance = {tolerance!r}: must be positive and finite")
-    return tolerance
+    if not (is_number(tolerance) and 0 < tolerance <= LARGEST):
+        raise ValueError(f"tolerance = {shown(tolerance)}: must be positive and at most {LARGEST:g}")
+    return float(tolerance)

@@ -15,7 +15,7 @@ from optics.numerics.read_only import read_only
 from optics.ommatidia.acceptance import AcceptanceFunction, acceptance_function
 from optics.spectra.receptors import receptors_of
 from optics.spectra.spectrum import daylight
-from sim.eyes.mounts import Mount
+from sim.eyes.mounts import Mount, mounts_of
 from sim.eyes.viewing_directions import unit_directions
 
 EXAMPLE = "optics.Ommatidium(optics.FacetLens(25e-6, 14e-6), optics.Waveguide(2e-6))"
@@ -118,10 +118,15 @@ class CompoundEye:
         """Return the viewing directions of eyes on one or more mounts, unit vectors (ommatidia of all mounts, 3).
 
         Their components are (ahead, left, up) in the frame of the object that carries the mounts.
+
+        Raises:
+            ValueError: `mounts` is empty, or contains anything other than mounts.
         """
         ahead, left, up = self.directions.T
         in_eye = np.stack([-left, up, ahead], axis=-1)
-        return np.concatenate([in_eye @ mount.local("body")[1].T for mount in mounts])
+        if not (known := mounts_of("mounts", mounts)):
+            raise ValueError("mounts is empty: must be at least one sim.Mount")
+        return np.concatenate([in_eye @ mount.local("body")[1].T for mount in known])
 
     @property
     def resolution(self) -> tuple[int, int]:
@@ -165,14 +170,16 @@ class CompoundEye:
     def acceptance(self, kind: int) -> AcceptanceFunction:
         """Return the acceptance function of the ommatidium with this index in `kinds`, for the eye's bands.
 
-        The properties `solid_angles`, `white` and `photons` raise the same errors, except for the IndexError.
+        The properties `solid_angles`, `white` and `photons` raise the same errors.
 
         Raises:
-            IndexError: there is no ommatidium with this index.
-            ValueError: the rhabdom guides no light in a band.
+            ValueError: there is no ommatidium with this index, or the rhabdom guides no light in a band.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
         """
-        return acceptance_function(self.kinds[0][kind], self.spectral_bands.wavelengths)
+        different = self.kinds[0]
+        return acceptance_function(
+            different[whole("kind", kind, 0, len(different) - 1)], self.spectral_bands.wavelengths
+        )
 
     @cached_property
     def solid_angles(self) -> np.ndarray:

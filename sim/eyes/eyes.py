@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optics.numerics.arguments import shown
+from optics.numerics.arguments import flag, shown
+from optics.numerics.number_types import is_boolean
 from optics.numerics.renamed import warn_renamed
 from optics.spectra.bands import FINEST
 from optics.spectra.photon_budget import PhotonBudget
@@ -89,14 +90,14 @@ class Eyes:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
             value = getattr(self, name)
             try:
-                fits = bool(valid(value))
+                fits = not is_boolean(value) and bool(valid(value))
             except (TypeError, ValueError, OverflowError):
                 fits = False
             if not fits:
                 raise ValueError(f"Eyes: {name} = {shown(value)}: must be {range_}")
 
         def counts(value: Any) -> bool:
-            return 1 <= value == int(value) <= MOST
+            return not is_boolean(value) and 1 <= value == int(value) <= MOST
 
         check("n_eyes", counts, f"a whole number, at least 1 and at most {MOST}")
         check(
@@ -115,14 +116,10 @@ class Eyes:
         object.__setattr__(self, "resolution", tuple(map(int, self.resolution)))
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
         check("optics", _is_pupil, "an optics.Pupil or None, the perfect lens")
-        if not isinstance(self.photon_budget, PhotonBudget | None):
-            raise ValueError(
-                f"Eyes: photon_budget = {shown(self.photon_budget)}: must be an optics.PhotonBudget or None"
-            )
-        if not isinstance(self.dynamics, ReceptorDynamics | None):
-            raise ValueError(f"Eyes: dynamics = {shown(self.dynamics)}: must be an optics.ReceptorDynamics or None")
+        check("photon_budget", lambda x: isinstance(x, PhotonBudget | None), "an optics.PhotonBudget or None")
+        check("dynamics", lambda x: isinstance(x, ReceptorDynamics | None), "an optics.ReceptorDynamics or None")
         self._check_density()
-        check("pupil_turned", lambda turned: isinstance(turned, bool | np.bool_), "True or False")
+        flag("Eyes: pupil_turned", self.pupil_turned)
         if self.pupil_turned and self.optics is None:
             raise ValueError(
                 "Eyes: pupil_turned = True and optics = None: must be False, or a Pupil that can be turned"

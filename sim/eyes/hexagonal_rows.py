@@ -31,7 +31,7 @@ def hexagonal_rows(rows: int, columns: int, fov_deg: float, acute_zone: float = 
         ValueError: an argument is out of range.
     """
     rows, columns = whole("rows", rows, 1, MOST_ALONG), whole("columns", columns, 1, MOST_ALONG)
-    half = math.radians(in_range("fov_deg", positive("fov_deg", fov_deg, "degrees"), 0, 360)) / 2
+    half = math.radians(positive("fov_deg", fov_deg, "degrees", most=360)) / 2
     in_range("acute_zone", acute_zone, 1, SHARPEST)
     shift = np.zeros((1, 1)) if rows == 1 else np.where(np.arange(rows) % 2, 0.25, -0.25)[:, None]
     even = -(2 * (np.arange(columns) + shift) + 1 - columns) / columns

@@ -9,10 +9,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean, finite, items, of_kind, reals, shown, whole
+from optics.numerics.arguments import did_you_mean, finite, in_range, items, of_kind, one_of, reals, shown, whole
 
 EXAMPLE = "sim.Mount('head')"
 MOST_EYES = 10_000  # chosen limit for the eyes of a fan or ring
+LONGEST = 1e15  # [m] chosen limit for the radius of a ring
 KINDS = ("site", "camera", "body")  # kinds of objects among which a name is searched, in this order
 # Axes (ahead, left, up) in the frame of the object that carries the eye, as rows. In the frame of a body or site, x
 # points ahead and z up. MuJoCo's cameras look along -z, with x to the right.
@@ -70,8 +71,9 @@ class Mount:
         """Return the kind and id of the object that carries the eye.
 
         Raises:
-            ValueError: the model has no such object.
+            ValueError: the model has no such object, or is no MjModel.
         """
+        of_kind("model", model, mujoco.MjModel, "mujoco.MjModel.from_xml_path('robot.xml')")
         for kind in KINDS if self.kind is None else (self.kind,):
             index = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), self.on)
             if index >= 0:
@@ -89,9 +91,9 @@ class Mount:
         kind: kind of the object, "site", "camera" or "body"
 
         Raises:
-            KeyError: the kind is unknown.
+            ValueError: the kind is unknown.
         """
-        ahead, left, up = _AXES[kind]
+        ahead, left, up = _AXES[one_of("kind", kind, KINDS)]
         azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
         level = np.cos(azimuth) * ahead + np.sin(azimuth) * left
         beside = -np.sin(azimuth) * ahead + np.cos(azimuth) * left
@@ -112,7 +114,7 @@ def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
         ValueError: `said` is a single mount, or not a sequence of mounts.
     """
     if not isinstance(said, Sequence) or not all(isinstance(mount, Mount) for mount in said):
-        raise ValueError(f"{where} = {said!r:.80}: must be several of sim.Mount, such as (sim.Mount('head'),)")
+        raise ValueError(f"{where} = {shown(said)}: must be several of sim.Mount, such as (sim.Mount('head'),)")
     return tuple(said)
 
 
@@ -137,12 +139,12 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
     n_eyes: number of eyes, 1 to 10,000
     placement_range_deg: angle from the first to the last eye [degrees]. With 360 (n - 1) / n degrees, n eyes are evenly
         spaced around the whole circle.
-    radius: radius of the circle [m]
+    radius: radius of the circle [m], 0 to 10¹⁵
 
     Raises:
         ValueError: an argument is invalid.
     """
-    return fan(Mount(on, offset=(finite("radius", radius), 0.0, 0.0)), n_eyes, placement_range_deg)
+    return fan(Mount(on, offset=(in_range("radius", radius, 0, LONGEST), 0.0, 0.0)), n_eyes, placement_range_deg)
 
 
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:

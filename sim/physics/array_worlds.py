@@ -33,7 +33,8 @@ class ArrayWorlds(MujocoWorlds):
     stacked over worlds when they are first read after a step. A name that mjData lacks raises an AttributeError.
 
     Raises:
-        ValueError: `variation` names an object that the model lacks or that cannot vary.
+        ValueError: an argument has the wrong type or is out of range, or `variation` names an object that the model
+            lacks or that cannot vary.
     """
 
     qpos: np.ndarray

@@ -11,6 +11,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import of_kind, whole
+from sim.physics.physics import MOST_THREADS, MOST_WORLDS
 from sim.scene.poses import Poses
 from sim.scene.variation import Drawn, Variation
 from sim.scene.world_models import WorldModels
@@ -18,6 +20,7 @@ from sim.scene.world_models import WorldModels
 __all__ = ["MujocoWorlds"]
 
 MODELS = "models"  # entry of a stored state that contains the worlds' models, if each world has its own model
+MOST_SUBSTEPS = 10**9  # chosen
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
@@ -27,14 +30,16 @@ class MujocoWorlds:
 
     given: the source from which the model was compiled
     model: the compiled model
-    threads: number of threads on which worlds are stepped
-    substeps: physics steps per action
+    n: number of worlds, 1 to 1,000,000
+    threads: number of threads on which worlds are stepped, 1 to 65,536
+    substeps: physics steps per action, 1 to 10⁹
     variation: ranges of quantities that differ between episodes; None: there are none
     datas: attribute, mjData of every world
     bodies: attribute, models of the worlds: one that all worlds share, or one for each world
 
     Raises:
-        ValueError: `variation` names an object that the model lacks or that cannot vary.
+        ValueError: an argument has the wrong type or is out of range, or `variation` names an object that the model
+            lacks or that cannot vary.
     """
 
     def __init__(
@@ -46,6 +51,11 @@ class MujocoWorlds:
         substeps: int = 1,
         variation: Variation | None = None,
     ) -> None:
+        of_kind("model", model, mujoco.MjModel, "mujoco.MjModel.from_xml_path('robot.xml')")
+        n, threads = whole("n", n, 1, MOST_WORLDS), whole("threads", threads, 1, MOST_THREADS)
+        substeps = whole("substeps", substeps, 1, MOST_SUBSTEPS)
+        if variation is not None:
+            of_kind("variation", variation, Variation, "Variation({'light': (0.5, 2)}), or None")
         self.model, self.n, self.substeps = model, n, substeps
         self.seconds = substeps * float(model.opt.timestep)
         self.bodies = WorldModels(given, model, n, variation)

@@ -11,7 +11,9 @@ import numpy as np
 from sim.scene.poses import Poses
 from sim.scene.variation import Drawn
 
-__all__ = ["Physics"]
+__all__ = ["MOST_THREADS", "MOST_WORLDS", "Physics"]
+
+MOST_WORLDS, MOST_THREADS = 1_000_000, 2**16  # chosen limits; higher numbers would exceed any computer
 
 
 class Physics(Protocol):

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.arguments import of_kind, whole
 from sim.physics.agent_motion import AgentPhysics, Agents, Motion
+from sim.physics.physics import MOST_THREADS, MOST_WORLDS
 from sim.physics.varied_appearances import varied_appearances
 from sim.scene.moved_bodies import MovedBodies, ReferencePose
 from sim.scene.poses import Poses
@@ -27,22 +29,26 @@ class SlidingAgents:
     """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
 
     `sim.Physics` describes the methods that have no description in this class. Methods that need the state raise a
-    RuntimeError before the first call of `place`.
+    RuntimeError before the first call of `place`, and so does `step` before the first call of `move_objects`.
 
     world: layout, model and starting positions
-    n: number of worlds
-    threads: number of threads that may step them
+    n: number of worlds, 1 to 1,000,000
+    threads: number of threads that may step them, 1 to 65,536
     variation: ranges of quantities that differ between episodes; None: there are none
     before, state: attributes, all worlds before and after the last action
     motion: attribute, motion of the agents during the last action; None before the first action
     chance: attribute, random streams of the worlds
 
     Raises:
-        ValueError: the model lacks a part of the agent, an object could collide, or `variation` names an object that
-            the model lacks or that cannot vary.
+        ValueError: an argument has the wrong type or is out of range, the model lacks a part of the agent, an object
+            could collide, or `variation` names an object that the model lacks or that cannot vary.
     """
 
     def __init__(self, world: World, n: int, threads: int = 1, variation: Variation | None = None) -> None:
+        of_kind("world", world, World, "sim.build_world('detection')")
+        n, threads = whole("n", n, 1, MOST_WORLDS), whole("threads", threads, 1, MOST_THREADS)
+        if variation is not None:
+            of_kind("variation", variation, Variation, "Variation({'light': (0.5, 2)}), or None")
         self.world, self.n, self.model = world, n, world.model
         self.agents = AgentPhysics(world, threads)
         self.seconds, self.substeps, self.frames, self.passed = self.agents.seconds, SUBSTEPS, 1, list[Poses]()
@@ -56,6 +62,7 @@ class SlidingAgents:
         self._turns = np.repeat(rest.xmat[:, bodies[:1]], n, axis=0)
         self._state: WorldState | None = None
         self._command = np.zeros((n, 2))
+        self._moved: tuple[np.ndarray, np.ndarray] | None = None
         self.before: WorldState | None = None
         self.motion: Motion | None = None
         self.chance: Any = None
@@ -147,10 +154,12 @@ class SlidingAgents:
         """Do nothing, since a task cannot change the model."""
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:
-        self.before = before = self.state
+        before = self.state
+        if self._moved is None:
+            raise RuntimeError("the objects have no positions after the step: call move_objects first")
+        self.before, (objects, courses) = before, self._moved
         heading, velocity = _steered(before.heading, self._command)
         self.motion = motion = self.agents.step(Agents(before.position, heading, before.velocity), velocity)
-        objects, courses = self._moved
         after = WorldState(
             position=motion.path[:, -1].copy(),
             heading=heading,

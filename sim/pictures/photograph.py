@@ -17,7 +17,9 @@ from optics.numerics.arguments import in_range, one_of, reals, shown
 from optics.spectra.bands import SpectralBands
 from optics.spectra.receptors import receptors_of
 from optics.spectra.srgb import decode_srgb, ink_radiance
+from sim.exr.files import file_path
 from sim.pictures.receptor_mosaic import ReceptorMosaic
+from sim.scene.color import srgb_image
 
 __all__ = ["ANIMALS", "read_depth", "read_photograph", "see_photograph"]
 
@@ -36,14 +38,14 @@ def read_photograph(path: str | Path) -> np.ndarray:
     """Read an image file as sRGB values (y, x, 3) in [0, 1], rotated according to its EXIF orientation.
 
     Raises:
-        ValueError: the file is no image, is damaged or too large, has transparency, or does not have three channels of
-            8 bits.
+        ValueError: `path` is no path; or the file is no image, is damaged or too large, has transparency, or does not
+            have three channels of 8 bits.
         OSError: the file cannot be read.
     """
     from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        with Image.open(file_path("path", path)) as image:
             mode, clear = image.mode, "transparency" in image.info
             upright = ImageOps.exif_transpose(image)
             pixels = np.asarray(upright.convert("RGB") if mode == "P" else upright)
@@ -119,23 +121,15 @@ def see_photograph(
     """
     one_of("animal", animal, ANIMALS)
     width = in_range("width_deg", width_deg, 0.1, 120.0)
-    linear = decode_srgb(_checked(photograph))
+    linear = decode_srgb(srgb_image("photograph", photograph, SMALLEST))
     z = _checked_depth(depth, linear.shape[:2], animal)
     in_range("uv", uv, 0.0, 1.0)
+    if progress is not None and not callable(progress):
+        raise ValueError(f"progress = {shown(progress)}: must be a function of the completed fraction, or None")
     report = progress or (lambda share: None)
     if animal in animals.COMPOUND:
         return _compound(linear, animal, width, uv, report)
     return _camera(linear, z, animal, width, uv, report)
-
-
-def _checked(photograph: Any) -> np.ndarray:
-    pixels = reals("photograph", photograph)
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or min(pixels.shape[:2]) < SMALLEST:
-        what = f"(y, x, 3), with at least {SMALLEST} pixels along each side"
-        raise ValueError(f"photograph has shape {pixels.shape}: must be sRGB values {what}")
-    if not (np.isfinite(pixels).all() and pixels.min() >= 0 and pixels.max() <= 1):
-        raise ValueError(f"photograph holds {shown(float(pixels.max()))}: must lie in [0, 1], so divide bytes by 255")
-    return pixels
 
 
 def _checked_depth(depth: Any, shape: tuple[int, ...], animal: str) -> np.ndarray:

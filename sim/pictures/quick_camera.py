@@ -22,7 +22,7 @@ from sim.scene import inventory, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.color import encode_srgb
 from sim.scene.mirror import MirrorWarning
-from sim.scene.rays import check_size
+from sim.scene.rays import checked_size
 
 # sRGB levels from 0 to 255. Steps of up to EDGE between neighbours do not look jagged. Pixels that differ by up to SAME
 # count as equal.
@@ -96,7 +96,7 @@ class QuickCamera:
 
         Errors are as in `picture`.
         """
-        check_size(width, height, 1)
+        width, height = checked_size(width, height)
         self.mirror.sync(data)
         view, size = self.mirror.viewpoint(camera), (height, width)
         self.mirror.face(view)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from optics.numerics.arguments import whole
+from optics.numerics.arguments import flag, of_kind, positive, reals, shown, whole
 from optics.numerics.read_only import read_only
-from sim.exr.files import write_exr
+from sim.exr.files import file_path, write_exr
 from sim.exr.previews import preview_of_receptors
+from sim.exr.spectral_layout import require_nanometres
 from sim.exr.view import View
-from sim.scene.color import encode_srgb
+from sim.scene.color import encode_srgb, srgb_image
 
 __all__ = ["ReceptorMosaic"]
 
@@ -30,6 +31,9 @@ class ReceptorMosaic:
     width_deg: angular width of the photograph [degrees].
     hexagons: True for ommatidia. Every second row, beginning with the second, is then shifted to the right by half an
         ommatidium.
+
+    Raises:
+        ValueError: an argument has the wrong type or shape, or a number is not finite.
     """
 
     animal: str
@@ -39,6 +43,17 @@ class ReceptorMosaic:
     hexagons: bool
 
     def __post_init__(self) -> None:
+        of_kind("ReceptorMosaic: animal", self.animal, str, "'mouse'")
+        signals = reals("ReceptorMosaic: signals", self.signals)
+        if signals.ndim != 3 or not signals.size or not np.isfinite(signals).all():
+            raise ValueError(
+                f"ReceptorMosaic: signals has shape {signals.shape}: must be finite numbers (channel, row, column)"
+            )
+        peaks = require_nanometres("ReceptorMosaic: peaks_nm", self.peaks_nm)
+        if peaks.shape != signals.shape[:1]:
+            raise ValueError(f"ReceptorMosaic: peaks_nm = {shown(self.peaks_nm)}: must be one for each channel")
+        positive("ReceptorMosaic: width_deg", self.width_deg, "degrees")
+        flag("ReceptorMosaic: hexagons", self.hexagons)
         object.__setattr__(self, "signals", read_only(np.asarray(self.signals)))
 
     def image(self, photograph: np.ndarray | None = None, height: int = 600) -> np.ndarray:
@@ -51,7 +66,8 @@ class ReceptorMosaic:
         height: height of the image in pixels, 16 to 8192.
 
         Raises:
-            ValueError: the height is no whole number in its range, or the photograph is no array (y, x, 3).
+            ValueError: the height is no whole number in its range, or the photograph has another shape or
+                values.
         """
         from PIL import Image
 
@@ -62,7 +78,7 @@ class ReceptorMosaic:
         drawn = self._hexagons(colors, tall) if self.hexagons else self._squares(colors, tall)
         if photograph is None:
             return drawn
-        left = Image.fromarray(np.rint(255 * np.asarray(photograph)).astype(np.uint8))
+        left = Image.fromarray(np.rint(255 * srgb_image("photograph", photograph)).astype(np.uint8))
         left = left.resize((max(1, round(tall * left.width / left.height)), tall), Image.Resampling.LANCZOS)
         between = np.full((tall, GAP, 3), 255, np.uint8)
         return np.concatenate([np.asarray(left), between, drawn], axis=1)
@@ -71,12 +87,12 @@ class ReceptorMosaic:
         """Write the return value of `image` to a PNG file; an existing file is replaced.
 
         Raises:
-            ValueError: see `image`.
+            ValueError: see `image`; or `path` is no path.
             OSError: the file cannot be written.
         """
         from PIL import Image
 
-        Image.fromarray(self.image(photograph, height)).save(path, format="PNG")
+        Image.fromarray(self.image(photograph, height)).save(file_path("path", path), format="PNG")
 
     def write_exr(self, path: str | Path) -> None:
         """Write the signals to an OpenEXR file, with one pixel for each receptor; `sim.read_exr` reads it.

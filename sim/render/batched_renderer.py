@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from optics.numerics.arguments import of_kind
 from sim.eyes.compound_eye import CompoundEye, WorldEye
 from sim.eyes.eyes import Eyes
 from sim.render.eye_renderer import EyeRenderer
@@ -12,7 +13,7 @@ from sim.render.fidelity import AREAS, Fidelity
 from sim.render.pending_frame import PendingFrame
 from sim.render.prepared_scene import Placed
 from sim.render.world_fidelity import chosen_fidelity
-from sim.render.world_scene import WorldScene
+from sim.render.world_scene import WorldScene, require_eyes_in_world
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
 
@@ -33,8 +34,8 @@ class BatchedRenderer(EyeRenderer):
         if it is larger
 
     Raises:
-        ValueError: n_envs is below 1, the rays do not fit into memory, the fidelity is no `sim.Fidelity`, the world or
-            the eyes do not support it, or `tracer` is unknown or "closed_form" for a world without a closed form.
+        ValueError: n_envs is below 1, the rays do not fit into memory, an argument has the wrong type, the world or the
+            eyes do not support the fidelity, or `tracer` is unknown or "closed_form" for a world without a closed form.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
@@ -42,8 +43,9 @@ class BatchedRenderer(EyeRenderer):
     def __init__(
         self, world: World, eyes: Eyes, n_envs: int, fidelity: Fidelity | None = None, tracer: str = "auto"
     ) -> None:
-        if fidelity is not None and not isinstance(fidelity, Fidelity):
-            raise ValueError(f"fidelity = {fidelity!r}: must be a sim.Fidelity, such as Fidelity(4, bands=4), or None")
+        require_eyes_in_world(world, eyes)
+        if fidelity is not None:
+            of_kind("fidelity", fidelity, Fidelity, "sim.Fidelity(4, bands=4), or None")
         scene = WorldScene(world, eyes if fidelity is None else replace(eyes, bands=fidelity.bands), tracer)
         self._open(scene, n_envs, fidelity or chosen_fidelity(scene))
 

@@ -1,7 +1,6 @@
 """Rendering of all eyes in all worlds as one wavefront, by one frozen kernel, with any tracer.
 
-Directions and wavelengths are fixed. A call therefore only uploads poses and launches the kernel that the first call
-recorded.
+Directions and wavelengths are fixed. A call only uploads poses and launches the kernel that the first call recorded.
 """
 
 from __future__ import annotations
@@ -34,6 +33,7 @@ from sim.render.ray_kernel import KernelInputs, Moving, RayKernel, launched
 from sim.render.receptor_noise import FEW
 from sim.render.renderable import check_renderable
 from sim.scene.frozen_kernels import FrozenKernel
+from sim.scene.poses import world_indices
 from sim.scene.variant import variant
 from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.eye_places import EyeFrames
@@ -136,8 +136,6 @@ class EyeRenderer:
         signals = self._mixing @ self.tracer.basis.T
         return EdgeRays(kernel, self._sampling, self.fidelity.rays_per_receptor, signals, noticed)
 
-    # --- signals and labels
-
     def signals(self, poses: Placed, light: np.ndarray | None = None) -> np.ndarray:
         """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
@@ -147,10 +145,9 @@ class EyeRenderer:
         light: factors of all lights of each world, (env, band); None: lights as in the model
 
         Raises:
-            ValueError: the number of worlds or the shape of `light` is wrong; the poses belong to another model, are
+            ValueError: the number of worlds or `light` is wrong; the poses belong to another model, are
                 not finite or have not been computed yet; or the worlds differ from the model in a part that is not in
                 `varied` (see `sim.ModelRenderer`).
-            IndexError: `poses` is an empty list.
         """
         return self.launch(poses, light).wait()
 
@@ -169,12 +166,16 @@ class EyeRenderer:
 
         `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to 8 worlds
         are rendered in separate buffers, so that a frame of all worlds may be pending at the same time. The errors are
-        those of `signals`, and an IndexError, which `wait` may raise, for an unknown world.
+        those of `signals`, and a ValueError for an unknown world.
         """
+        worlds = world_indices("worlds", worlds, self.n_envs)
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
-        few = np.resize(worlds, FEW)
-        seen = self._few.launch(self.scene.placed(poses).take(few), None if light is None else np.asarray(light)[few])
+        few, placed = np.resize(worlds, FEW), self.scene.placed(poses)
+        self.scene.check_count(placed, self.n_envs)
+        if light is not None:
+            light = LightFactors.from_light(light, (self.n_envs, self.eye.bands)).bands[few]
+        seen = self._few.launch(placed.take(few), light)
         return seen.then(lambda signals: signals[: len(worlds)])
 
     @cached_property
@@ -252,8 +253,6 @@ class EyeRenderer:
         labels = vars(self).get("labels")
         recorded = self._rays.n_recordings + self._sums.n_recordings + edges
         return recorded + (0 if labels is None else labels.recordings)
-
-    # --- kernels
 
     def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
         """Launch the kernels for the receptors' sums in these worlds, or the kernel `frozen` if it is given."""

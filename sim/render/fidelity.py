@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 
 from optics.numerics.arguments import one_of, shown, whole
+from optics.numerics.number_types import is_number
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.tracing.lighting import ALL, DIRECT, LEVELS
@@ -75,11 +75,11 @@ class Fidelity:
 
     def __post_init__(self) -> None:
         rays = self.rays_per_receptor
-        if not (isinstance(rays, Real) and 0 < rays <= MOST_RAYS):
+        if not (is_number(rays) and 0 < rays <= MOST_RAYS):
             most = f"{MOST_RAYS:g}"
             raise ValueError(f"rays_per_receptor = {shown(rays)}: must be positive and at most {most}, or 'auto'")
         whole("bands", self.bands, 1, MOST_BANDS)
-        if self.tolerance is not None and not (isinstance(self.tolerance, Real) and 0 < self.tolerance < math.inf):
+        if self.tolerance is not None and not (is_number(self.tolerance) and 0 < self.tolerance < math.inf):
             raise ValueError(f"tolerance = {shown(self.tolerance)}: must be positive, or None")
         if self.frames is not None:
             whole("frames", self.frames, 1, MOST_FRAMES)

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from optics.numerics.arguments import reals, shown
+from optics.numerics.number_types import all_finite
+
 
 @dataclass(frozen=True)
 class LightFactors:
@@ -21,11 +24,14 @@ class LightFactors:
         """Return a copy of the factors `light`, which must have this shape, (env, band).
 
         Raises:
-            ValueError: `light` has another shape.
+            ValueError: `light` has another shape, or an entry is negative or not finite.
         """
-        if np.shape(light) != shape:
-            raise ValueError(f"light has shape {np.shape(light)}: must be (env, band), {shape}")
-        return cls(np.array(light, np.float32))
+        factors = reals("light", light).astype(np.float32)
+        if factors.shape != shape:
+            raise ValueError(f"light has shape {factors.shape}: must be (env, band), {shape}")
+        if not all_finite(factors) or (factors < 0).any():
+            raise ValueError(f"light = {shown(light)}: must be finite factors of at least 0")
+        return cls(factors)
 
     @property
     def is_level(self) -> bool:

@@ -18,9 +18,10 @@ import numpy as np
 
 import optics
 from optics.elements.turbid_medium import medium_of
+from optics.numerics.arguments import one_of
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
-from sim.eyes.compound_eye import WorldEye
+from sim.eyes.compound_eye import WorldEye, world_eye
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.mounts import Mount, mounts_of
 from sim.render.edge_rays import edges_pay
@@ -82,12 +83,11 @@ def choose_model_fidelity(
 
     Raises:
         ValueError: the tolerance is not positive and finite, `light` is unknown, or ModelRenderer refuses an argument.
-        IndexError: `poses` is an empty list.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
-    if light not in (*FOLLOWED, AUTO):
-        raise ValueError(f"light = {light!r}: must be 'direct', 'bounce' or 'auto'")
+    one_of("light", light, (*FOLLOWED, AUTO))
+    world_eye("eye", eye)
     allowed = allowed_error(eye, tolerance)
     placed = poses if isinstance(poses, Poses) else Poses.from_data(poses)
     scene = PreparedScene(

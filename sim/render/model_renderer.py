@@ -74,6 +74,7 @@ class ModelRenderer(EyeRenderer):
     ) -> None:
         whole("n_envs", n_envs, 1, MOST_ENVS)
         world_eye("eye", eye)
+        of_kind("tracer", tracer, str, "'mitsuba'")
         if isinstance(eye, CompoundEye) and tracer != ModelTracer.name:
             raise ValueError(f"tracer = {tracer!r}: must be {ModelTracer.name!r} for a compound eye")
         fidelity = Fidelity(SIXTEEN, eye.bands) if fidelity is None else fidelity

@@ -183,8 +183,7 @@ class PreparedScene:
             ValueError: the number of worlds is wrong; the poses belong to another model, are not finite or have not
                 been computed yet; or the worlds differ from the model in a part that is not in `varied`.
         """
-        if poses.n != n_envs:
-            raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {n_envs}")
+        self.check_count(poses, n_envs)
         if isinstance(poses, MovedBodies):  # all other quantities are as in the model
             self._check_finite(poses.positions)
             if poses.reference.n_bodies != self.model.nbody:
@@ -202,6 +201,12 @@ class PreparedScene:
                 "first"
             )
         self.scene.as_built.refuse_differences(poses)
+
+    @staticmethod
+    def check_count(poses: Poses, n_envs: int) -> None:
+        """Raise a ValueError if the number of worlds is not `n_envs`."""
+        if poses.n != n_envs:
+            raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {n_envs}")
 
     @staticmethod
     def _check_finite(places: np.ndarray) -> None:

@@ -16,14 +16,18 @@ import mujoco
 import numpy as np
 
 import optics
+from optics.numerics.arguments import reals, shown, whole
 from sim.eyes.eyes import EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.eyes.receptive_fields import cells_for
+from sim.render.world_scene import require_eyes_in_world
 from sim.scene.band_error import lights_in_bands
 from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import MirrorWarning, mirror
+from sim.scene.rays import MOST_SAMPLES, MOST_SEED
 from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
 
+MOST_CELLS = 64  # chosen: the largest number of cells along a receptor's side
 MOST_PIXELS = 16  # chosen: the largest number of pixels along a cell's side
 
 
@@ -34,7 +38,7 @@ class ReferenceRenderer:
 
     world, eyes: as in `sim.BatchedRenderer`
     integrator: Mitsuba's integrator: "path", "direct", or a description such as {"type": "path", "max_depth": 3}
-    spp: samples per pixel of an image; a cell is one pixel if receptors are square, and several otherwise
+    spp: samples per pixel of an image, 1 to 2³¹ - 1; a cell is one pixel if receptors are square, and several otherwise
     samples_per_receptor: cells along a receptor's side, 1 to 64; None: 1 for a perfect lens, 4 behind a pupil, and more
         for narrow rhabdoms
     depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
@@ -43,7 +47,7 @@ class ReferenceRenderer:
     sampler: Mitsuba's sampler: "independent", or "multijitter" for less noise
     variant: spectral variant of Mitsuba, such as "scalar_spectral", which runs without LLVM; None: the default of this
         machine
-    seed: seed of the samples; the attribute may be changed between images
+    seed: seed of the samples, 0 to 2¹²⁸; the attribute may be changed between images
 
     Warnings (`sim.MirrorWarning`) name lamps with spectral lines for which the eye has too few bands.
 
@@ -69,6 +73,12 @@ class ReferenceRenderer:
         variant: str | None = None,
         seed: int = 0,
     ) -> None:
+        require_eyes_in_world(world, eyes)
+        spp, seed = whole("spp", spp, 1, MOST_SAMPLES), whole("seed", seed, 0, MOST_SEED)
+        if samples_per_receptor is not None:
+            whole("samples_per_receptor", samples_per_receptor, 1, MOST_CELLS)
+        if depths is not None and reals("depths", depths).shape != (2,):
+            raise ValueError(f"depths = {shown(depths)}: must be the nearest and the farthest distance [m], or None")
         if world.medium is not None:
             raise ValueError("world: its medium must be None, the reference renders clear air only")
         eye = eyes.eye()
@@ -81,7 +91,7 @@ class ReferenceRenderer:
         self._pixels = _pixels_per_cell(self.eye.receptor_size)
         self._integrator, self._spp, self._sampler, self.seed = integrator, spp, sampler, seed
         self._has_depth = depths is not None
-        z: Any = np.array(depths) if depths else math.inf
+        z: Any = math.inf if depths is None else np.array(depths)
         sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
         self.sight = replace(sight, parallax=0.0)  # rays only pass the middle of the pupil, where there is no parallax
         self._data = mujoco.MjData(world.model)

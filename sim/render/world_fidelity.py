@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import optics
-from optics.numerics.arguments import of_kind
+from optics.numerics.arguments import one_of
 from sim.eyes.allowed_error import allowed_error
 from sim.eyes.compound_eye import CompoundEye
 from sim.eyes.depth_layers import DepthLayers
@@ -17,7 +17,7 @@ from sim.render.fidelity_trials import FidelityTrials
 from sim.render.model_fidelity import AUTO, ModelStages
 from sim.render.random_views import near_views, random_views
 from sim.render.sample_choice import fewest_samples
-from sim.render.world_scene import WorldScene
+from sim.render.world_scene import WorldScene, require_eyes_in_world
 from sim.scene.poses import Poses
 from sim.worlds.world import World
 
@@ -46,10 +46,8 @@ def choose_fidelity(
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
-    of_kind("world", world, World, "sim.build_world('detection')")
-    of_kind("eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")
-    if bands not in ("auto", "own"):
-        raise ValueError(f"bands = {bands!r}: must be 'auto' or 'own'")
+    require_eyes_in_world(world, eyes)
+    one_of("bands", bands, ("auto", "own"))
     allowed = allowed_error(eyes.eye(), tolerance)
     if bands == "own" or eyes.ommatidium is not None:
         return chosen_fidelity(WorldScene(world, eyes, tracer), allowed)

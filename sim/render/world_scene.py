@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from optics.numerics.arguments import of_kind
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.eyes.mounts import ring
@@ -20,6 +23,13 @@ from sim.worlds.world import World
 OUTSIDE = 1e-6  # height of free eyes above the skin [radii], so that rounding does not move them below it
 
 
+def require_eyes_in_world(world: Any, eyes: Any) -> Eyes:
+    """Return the eyes; ValueError unless the arguments are a `sim.World` and `sim.Eyes`."""
+    of_kind("world", world, World, "sim.build_world('detection')")
+    found: Eyes = of_kind("eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")
+    return found
+
+
 class WorldScene(PreparedScene):
     """A world and the eyes of every agent in it.
 
@@ -32,7 +42,7 @@ class WorldScene(PreparedScene):
     """
 
     def __init__(self, world: World, eyes: Eyes, tracer: str = "auto") -> None:
-        self.world, self.eyes = world, eyes
+        self.world, self.eyes = world, require_eyes_in_world(world, eyes)
         mounts = ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))
         azimuths, body = eyes.azimuths(), int(world.model.body("agent").id)
         stand = LevelStand(body, EYE_HEIGHT, eye_positions(azimuths), eye_rotations(azimuths))

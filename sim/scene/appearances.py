@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import mujoco
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, is_sized, shown
 from sim.scene import surfaces
 from sim.scene.spectra import Spectra, of_geom
 
@@ -105,6 +105,8 @@ def varied_geoms(
         ValueError: `varied` contains a name that no visible geom has, or the name of a material that the model lacks;
             or a geom without listed materials has a measured spectrum.
     """
+    if isinstance(varied, str) or not (is_sized(varied) and all(isinstance(name, str) for name in varied)):
+        raise ValueError(f"varied = {shown(varied)}: must be names of geoms, such as ('ball',)")
     known = {model.geom(g).name: g for g in seen if model.geom(g).name}
     found = {}
     for name in varied:

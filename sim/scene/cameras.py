@@ -13,9 +13,13 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import reals
+from optics.numerics.arguments import positive, reals, shown
+from optics.numerics.number_types import is_boolean
 from sim.scene.pose_snapshot import PoseSnapshot
 from sim.scene.variant import MitsubaObject
+
+WIDEST_DEG = 179.0  # chosen: largest field of view
+FARTHEST = 1e15  # [m] chosen: largest coordinate of a point, whose square is within double precision
 
 
 @dataclass(frozen=True)
@@ -35,14 +39,20 @@ class Viewpoint:
     def looking_at(origin: np.ndarray, target: np.ndarray, fovy_deg: float = 45.0) -> Viewpoint:
         """Return a viewpoint at `origin` that looks at `target` [m], with z up (y up if the direction is vertical).
 
-        `origin` and `target` are points (3,), which must differ.
+        origin, target: points (3,), which must differ
+        fovy_deg: vertical field of view [degrees], above 0 and at most 179
 
         Raises:
-            ValueError: `origin` or `target` does not consist of real numbers.
+            ValueError: `origin` or `target` does not consist of three numbers of at most 10¹⁵, the points are equal, or
+                the field of view is out of range.
         """
-        origin, target = reals("origin", origin), reals("target", target)
+        origin, target = _point("origin", origin), _point("target", target)
+        fovy_deg = positive("fovy_deg", fovy_deg, "degrees", most=WIDEST_DEG)
         back = origin - target
-        back /= np.linalg.norm(back)
+        distance = np.linalg.norm(back)
+        if distance == 0:
+            raise ValueError(f"target = {shown(target.tolist())}: must differ from the origin")
+        back /= distance
         right = np.cross([0, 1.0, 0] if abs(back[2]) > 1 - 1e-9 else [0, 0, 1.0], back)
         right /= np.linalg.norm(right)
         rotation = np.column_stack([right, np.cross(back, right), back])
@@ -97,10 +107,18 @@ def sensor(view: Viewpoint, width: int, height: int, near: float) -> MitsubaObje
     )
 
 
+def _point(name: str, value: object) -> np.ndarray:
+    """Return a point [m], (3,); ValueError unless it consists of three numbers of at most FARTHEST."""
+    point = reals(name, value)
+    if point.shape != (3,) or not (np.abs(point) <= FARTHEST).all():
+        raise ValueError(f"{name} = {shown(value)}: must be a point, three numbers [m] of at most {FARTHEST:g}")
+    return point
+
+
 def _camera_id(model: mujoco.MjModel, camera: str | int) -> int:
     names = [model.camera(i).name for i in range(model.ncam)]
     if isinstance(camera, str) and camera in names:
         return names.index(camera)
-    if isinstance(camera, Integral) and 0 <= camera < model.ncam:
+    if isinstance(camera, Integral) and not is_boolean(camera) and 0 <= camera < model.ncam:
         return int(camera)
-    raise ValueError(f"no camera {camera!r}; the model has {', '.join(map(repr, names)) or 'none'}")
+    raise ValueError(f"no camera {shown(camera)}; the model has {', '.join(map(repr, names)) or 'none'}")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from optics.numerics.arguments import reals, shown
 from optics.spectra.srgb import decode_srgb
 
-__all__ = ["decode_srgb", "encode_srgb", "preview"]
+__all__ = ["decode_srgb", "encode_srgb", "preview", "srgb_image"]
 
 # IEC 61966-2-1
 _XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
@@ -16,6 +19,23 @@ def encode_srgb(linear: np.ndarray | float) -> np.ndarray:
     """Convert linear values in [0, 1] to sRGB display values in [0, 1]."""
     x = np.asarray(linear, dtype=float)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def srgb_image(name: str, value: Any, smallest: int = 1) -> np.ndarray:
+    """Return an image of sRGB values in [0, 1], (y, x, 3) float64.
+
+    smallest: smallest number of pixels along each side
+
+    Raises:
+        ValueError: the image has another shape or is smaller, or a value is outside [0, 1].
+    """
+    pixels = reals(name, value)
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or min(pixels.shape[:2]) < smallest:
+        what = f"(y, x, 3), with at least {smallest} pixel{'s' if smallest > 1 else ''} along each side"
+        raise ValueError(f"{name} has shape {pixels.shape}: must be sRGB values {what}")
+    if not (np.isfinite(pixels).all() and pixels.min() >= 0 and pixels.max() <= 1):
+        raise ValueError(f"{name} holds {shown(float(pixels.max()))}: must lie in [0, 1], so divide bytes by 255")
+    return pixels
 
 
 def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:

@@ -15,10 +15,11 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import items, shown
 from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, coincident, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
-from sim.scene.pose_snapshot import PoseSnapshot
+from sim.scene.pose_snapshot import PoseSnapshot, checked_data
 from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
@@ -59,7 +60,12 @@ def mirror(
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     return Mirror(
-        source.load(model), data, bodies=bodies, groups=groups, variant=variant or default_variant(), spectra=spectra
+        source.load(model),
+        data,
+        bodies=bodies,
+        groups=groups,
+        variant=default_variant() if variant is None else variant,
+        spectra=spectra,
     )
 
 
@@ -82,14 +88,14 @@ class Mirror:
         variant: str,
         spectra: Mapping[str, Spectrum | str] | None,
     ) -> None:
-        if not variant.endswith("spectral"):
-            raise ValueError(f"mirror: variant = {variant!r}: must be a spectral one such as {DEFAULT_VARIANT!r}")
+        if not (isinstance(variant, str) and variant.endswith("spectral")):
+            raise ValueError(f"mirror: variant = {shown(variant)}: must be a spectral one such as {DEFAULT_VARIANT!r}")
         self.model, self.variant = model, variant
         self.spectra = resolve(model, spectra)
         visible = _visible(model, bodies, groups)
         self.geoms = np.array([g for g in visible if shapes.has_shape(model, g)], dtype=int)
         surfaces.require_geoms(model, self.geoms.tolist(), "mirror: ")
-        data = _reference_pose(model) if data is None else _checked(model, data)
+        data = _reference_pose(model) if data is None else checked_data(model, data)
         self._places = PoseSnapshot.from_data(data)
         together = coincident.coincidences(data, self.geoms.tolist())
         self._parts = {int(g): shapes.parts(model, g, together.lift(g)) for g in self.geoms}
@@ -113,7 +119,7 @@ class Mirror:
         Raises:
             ValueError: the data belong to another model, contain no poses yet, or a pose is not finite.
         """
-        self._places = PoseSnapshot.from_data(_checked(self.model, data))
+        self._places = PoseSnapshot.from_data(checked_data(self.model, data))
         with in_variant(self.variant):
             for geom, parts in self._parts.items():
                 pose = shapes.pose(data, geom)
@@ -126,8 +132,11 @@ class Mirror:
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
-        """Return the BSDF of a geom, which need not be in the scene. KeyError: unknown name. IndexError: unknown id."""
-        index = self.model.geom(geom).id
+        """Return the BSDF of a geom, which need not be in the scene; ValueError for an unknown name or id."""
+        try:
+            index = self.model.geom(geom).id
+        except (KeyError, IndexError, TypeError):
+            raise ValueError(f"geom = {shown(geom)}: must be the name or the id of a geom of the model") from None
         with in_variant(self.variant):
             return self._bsdf(index)
 
@@ -147,20 +156,20 @@ class Mirror:
         Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
 
         camera: name or id of a camera of the model, or a Viewpoint
-        width, height: size of the image [pixels], whole numbers
+        width, height: size of the image [pixels], whole numbers from 1 to 65,536
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}.
             "direct" shows only emitters behind a transparent geom; a MirrorWarning names such geoms once.
-        spp, seed: number of samples per pixel, and seed of the samples, whole numbers
+        spp: number of samples per pixel, 1 to 2³¹ - 1
+        seed: seed of the samples, 0 to 2¹²⁸
         sampler: "independent", or "multijitter", whose images have less noise
 
         Raises:
-            ValueError: the camera is unknown or no plain perspective, the integrator is unknown, there is less than one
-                pixel or sample, a wavelength is outside 300 to 780 nm, or Mitsuba would apply an argument incorrectly.
-            RuntimeError: Mitsuba has no such sampler, or `width` or `height` is not a whole number.
-            TypeError: `spp` or `seed` is not a whole number.
+            ValueError: the camera is unknown or no plain perspective, the integrator or the sampler is unknown, a
+                number is not whole or out of range, a wavelength is outside 300 to 780 nm, or Mitsuba would apply an
+                argument incorrectly.
         """
         view = self.viewpoint(camera)
-        rays.check_size(width, height, spp)
+        width, height = rays.checked_size(width, height)
         asked = rays.checked_wavelengths(wavelengths)
         if rays.described(integrator)["type"] == "direct":
             self._warn_of_glass()
@@ -195,7 +204,7 @@ class Mirror:
 
     def _first_hits(self, camera: str | int | Viewpoint, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
         view = self.viewpoint(camera)
-        rays.check_size(width, height, 1)
+        width, height = rays.checked_size(width, height)
         with in_variant(self.variant):
             names, points = self._camera(view, width, height).first_hits()
         ids = np.array([int(name.split("_")[1]) if name else -1 for name in names], dtype=np.int32)
@@ -271,7 +280,7 @@ def _visible(model: mujoco.MjModel, bodies: Sequence[str] | None, groups: Sequen
     wanted = list(range(model.nbody))
     if bodies is not None:
         names = [model.body(i).name for i in range(model.nbody)]
-        unknown = sorted(set(bodies) - set(names))
+        unknown = sorted(set(items("mirror: bodies", bodies, str, "'world'")) - set(names))
         if unknown:
             raise ValueError(f"mirror: no body {unknown[0]!r}; the model has {', '.join(map(repr, names))}")
         wanted = [names.index(name) for name in bodies]
@@ -281,20 +290,4 @@ def _visible(model: mujoco.MjModel, bodies: Sequence[str] | None, groups: Sequen
 def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    return data
-
-
-def _checked(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """Return the data if they belong to this model and all their poses are finite; otherwise raise a ValueError."""
-    if data.geom_xpos.shape != (model.ngeom, 3) or data.xpos.shape != (model.nbody, 3):
-        raise ValueError(
-            f"mirror: data has {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies, but the model has "
-            f"{model.ngeom} and {model.nbody}"
-        )
-    if not data.geom_xmat.any():
-        raise ValueError("mirror: data contains no poses yet; call mujoco.mj_forward(model, data) first")
-    lost = ~(np.isfinite(data.geom_xpos).all(axis=1) & np.isfinite(data.geom_xmat).all(axis=1))
-    if lost.any():
-        name = model.geom(int(np.argmax(lost))).name or str(int(np.argmax(lost)))
-        raise ValueError(f"mirror: geom {name!r} has no finite position; the simulation is unstable, reset its data")
     return data

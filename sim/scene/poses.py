@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -10,7 +11,8 @@ from zlib import crc32
 import mujoco
 import numpy as np
 
-from optics.numerics.number_types import full_precision
+from optics.numerics.arguments import is_sized, shown
+from optics.numerics.number_types import full_precision, real_array
 from optics.numerics.read_only import FULL_PRECISION
 from optics.numerics.renamed import renamed
 
@@ -99,9 +101,11 @@ class Poses:
         datas: one mjData per world, after mj_forward or mj_step, or a single mjData for one world
 
         Raises:
-            IndexError: there are no worlds.
+            ValueError: there are no worlds, or `datas` contains anything other than mjData.
         """
         datas = [datas] if isinstance(datas, mujoco.MjData) else datas
+        if not (is_sized(datas) and len(datas) and all(isinstance(data, mujoco.MjData) for data in datas)):
+            raise ValueError(f"poses = {shown(datas)}: must be one MjData for each world, such as [data], or Poses")
         stacked = {name: np.array([getattr(data, name) for data in datas]) for name in OF_DATA}
         found = {name: _square(array) if name.endswith("mat") else array for name, array in stacked.items()}
         models = [data.model for data in datas]
@@ -148,6 +152,16 @@ class Poses:
         """
         name = {"site": "site_x", "camera": "cam_x", "body": "x"}[kind]
         return getattr(self, f"{name}pos")[:, index], getattr(self, f"{name}mat")[:, index]
+
+
+def world_indices(name: str, worlds: Any, n: int) -> np.ndarray:
+    """Return indices of worlds as an array, (k,) int; ValueError unless all are whole numbers from 0 to n - 1."""
+    given = real_array(name, worlds)
+    found = np.atleast_1d(np.array(math.nan) if given is None else given)
+    found = found if found.size else found.astype(int)
+    if found.ndim != 1 or found.dtype.kind not in "iu" or ((found < 0) | (found >= n)).any():
+        raise ValueError(f"{name} = {shown(worlds)}: must be numbers of worlds, from 0 to {n - 1}")
+    return found
 
 
 OF_DATA = tuple(f.name for f in fields(Poses) if f.name not in OF_MODELS)

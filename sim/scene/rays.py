@@ -14,22 +14,23 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from optics.numerics.arguments import reals, shown, whole
 from optics.numerics.autodiff import Array
-from optics.numerics.number_types import full_precision
 from optics.spectra.spectrum import LIMITS_NM
 from sim.scene.variant import Description, MitsubaObject
 
+MOST_PIXELS = 2**16  # chosen limit for the pixels along one side of an image
+MOST_SAMPLES = 2**31 - 1  # chosen limit for the samples per pixel
+MOST_SEED = 2**128  # largest allowed seed; the seeds that NumPy draws have 128 bits
 LANES = 4  # wavelengths in one mi.Spectrum
 WAVEFRONT = 1 << 21  # rays traced at once
 ROUNDING = 1e-12  # [m] tolerance for wavelengths
 NESTED = 64  # limit for the number of nested bodies that contain a camera
 
 
-def check_size(width: int, height: int, spp: int) -> None:
-    """Raise a ValueError if the width, the height or the number of samples per pixel is less than 1."""
-    for name, value in (("width", width), ("height", height), ("spp", spp)):
-        if value < 1:
-            raise ValueError(f"{name} = {value}: must be at least 1")
+def checked_size(width: Any, height: Any) -> tuple[int, int]:
+    """Return the width and height of an image as ints; ValueError unless they are whole numbers in [1, 65,536]."""
+    return whole("width", width, 1, MOST_PIXELS), whole("height", height, 1, MOST_PIXELS)
 
 
 def checked_wavelengths(wavelengths: Any) -> np.ndarray:
@@ -39,11 +40,10 @@ def checked_wavelengths(wavelengths: Any) -> np.ndarray:
         ValueError: there is no wavelength, or one is outside the range of the spectra, for example because it is in
             nanometres.
     """
-    found = np.asarray(full_precision("wavelengths", wavelengths), float)
+    found = reals("wavelengths", wavelengths)
     low, high = (1e-9 * limit for limit in LIMITS_NM)
     if found.ndim != 1 or not len(found) or not ((found > low - ROUNDING) & (found < high + ROUNDING)).all():
-        said = " ".join(repr(wavelengths).split())
-        raise ValueError(f"wavelengths = {said:.80}: must be in metres, from {low:.3g} to {high:.3g}")
+        raise ValueError(f"wavelengths = {shown(wavelengths)}: must be in metres, from {low:.3g} to {high:.3g}")
     return found
 
 
@@ -83,9 +83,10 @@ class Camera:
             less noise. Multijitter is not available in scalar variants, or for an spp that it would round.
 
         Raises:
-            ValueError: the integrator is unknown, Mitsuba would apply it incorrectly, or the sampler is not available.
-            RuntimeError: Mitsuba has no such sampler.
+            ValueError: the integrator or the sampler is unknown, Mitsuba would apply it incorrectly, or `spp` or `seed`
+                is not a whole number in its range.
         """
+        spp, seed = whole("spp", spp, 1, MOST_SAMPLES), whole("seed", seed, 0, MOST_SEED)
         width, height = self.size
         method = _integrator(integrator)
         samples_at_once = max(1, WAVEFRONT // (width * height))
@@ -199,7 +200,9 @@ def described(integrator: str | Mapping[str, Any]) -> Description:
         ValueError: the argument is neither a name nor a description.
     """
     if not isinstance(integrator, str) and not (isinstance(integrator, Mapping) and "type" in integrator):
-        raise ValueError(f"integrator = {integrator!r}: must be a name, or a description such as {{'type': 'path'}}")
+        raise ValueError(
+            f"integrator = {shown(integrator)}: must be a name, or a description such as {{'type': 'path'}}"
+        )
     return {"type": integrator} if isinstance(integrator, str) else dict(integrator)
 
 
@@ -208,18 +211,27 @@ def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
     if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
         # For point and directional lights, Mitsuba 3.9.1 adds several light samples instead of averaging them.
         raise ValueError('integrator "direct": its light samples cannot be set; take more spp')
+    return _loaded("integrator", integrator, description, mi.Integrator, "'path'")
+
+
+def _loaded(name: str, asked: Any, description: Description, kind: type, example: str) -> MitsubaObject:
+    """Return the object of Mitsuba with this description; ValueError if it is not of this kind.
+
+    name, asked, example: name and value of the user's argument, and a valid value
+    """
     try:
         found = mi.load_dict(description)
-        why = "" if isinstance(found, mi.Integrator) else "that is no integrator"
-    except RuntimeError as error:
+        why = "" if isinstance(found, kind) else f"that is no {name}"
+    except (RuntimeError, TypeError) as error:
         why = " ".join(str(error).split())
     if why:
-        raise ValueError(f"integrator = {integrator!r}: must be one of Mitsuba's, such as 'path'; its message: {why}")
+        raise ValueError(f"{name} = {shown(asked)}: must be one of Mitsuba's, such as {example}; its message: {why}")
     return found
 
 
 def _sampler(kind: str, n: int) -> MitsubaObject:
-    sampler: MitsubaObject = mi.load_dict({"type": kind, "sample_count": n})
+    one = {"type": kind, "sample_count": n}
+    sampler: MitsubaObject = _loaded("sampler", kind, one, mi.Sampler, "'independent'")
     if kind != "independent" and (_is_scalar() or sampler.sample_count() != n):
         raise ValueError(f"sampler = {kind!r}: cannot take {n} samples here; take 'independent'")
     return sampler

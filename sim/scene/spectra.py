@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, of_kind
 from optics.spectra.spectrum import LIMITS_NM, Spectrum, daylight, illuminant, reflectance
 from sim.scene.variant import Description
 
@@ -30,6 +30,8 @@ def resolve(model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None)
         ValueError: a name is neither a material nor a light of the model, or is both; a value is not a spectrum; or a
             reflectance is above 1.
     """
+    if spectra is not None:
+        of_kind("spectra", spectra, Mapping, "{'wall': 'foliage'}")
     materials = [model.material(i).name for i in range(model.nmat)]
     lights = [*(model.light(i).name for i in range(model.nlight)), HEADLIGHT]
     return {name: _resolved(name, value, materials, lights) for name, value in (spectra or {}).items()}

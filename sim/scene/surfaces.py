@@ -12,6 +12,8 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import is_sized, shown
+from optics.numerics.number_types import is_boolean
 from sim.scene import cube
 from sim.scene.color import decode_srgb
 from sim.scene.linear_textures import is_linear
@@ -54,7 +56,13 @@ def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
 
 
 def visible(model: mujoco.MjModel, groups: Sequence[int]) -> list[int]:
-    """Return the ids of the visible geoms: all geoms in these groups that are not completely transparent."""
+    """Return the ids of the visible geoms: all geoms in these groups that are not completely transparent.
+
+    Raises:
+        ValueError: a group is not a whole number.
+    """
+    if not is_sized(groups) or not all(isinstance(g, int | np.integer) and not is_boolean(g) for g in groups):
+        raise ValueError(f"groups = {shown(groups)}: must be numbers of geom groups, such as (0, 1, 2)")
     return [g for g in range(model.ngeom) if model.geom_group[g] in groups and rgba(model, g)[3] > 0]
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.constants import c, h, k
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, shown
 from optics.numerics.number_types import full_precision, readable
 from optics.spectra.spectrum import cie_1931, daylight
 
@@ -53,7 +53,7 @@ class Variation:
 
     def __post_init__(self) -> None:
         if not isinstance(self.ranges, Mapping):
-            raise ValueError(f"vary = {self.ranges!r:.80}: must be ranges by name, such as {{'light': (0.1, 1)}}")
+            raise ValueError(f"vary = {shown(self.ranges)}: must be ranges by name, such as {{'light': (0.1, 1)}}")
         for name, given in self.ranges.items():
             what = kind_of(name)
             if what == MATERIAL:

@@ -5,15 +5,16 @@ An error message names the method, and either the wrong shape or the world that 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from optics.numerics.arguments import shown
 from optics.numerics.number_types import all_finite, readable
-from sim.tasks.outcome import Outcome
+from sim.tasks.outcome import Outcome, RewardTerms
 
-__all__ = ["columns", "mapping", "not_finite", "require_outcome", "rows"]
+__all__ = ["columns", "mapping", "not_finite", "require_outcome", "require_worlds", "rows"]
 
 
 def rows(where: str, returned: Any, n: int, kind: type) -> np.ndarray:
@@ -46,14 +47,16 @@ def columns(where: str, returned: Any, n: int) -> np.ndarray:
     return array
 
 
-def mapping(where: str, returned: Any) -> Mapping[str, Any]:
+def mapping(where: str, returned: Any, right: str = "arrays by name, such as {'progress': (n,)}") -> Mapping[Any, Any]:
     """Return the object `returned` if it is a mapping. Its keys and values are not checked.
+
+    right: description of a valid object, for the error message
 
     Raises:
         ValueError: it is not a mapping.
     """
     if not isinstance(returned, Mapping):
-        raise ValueError(f"{where} returned {returned!r:.80}: must be arrays by name, such as {{'progress': (n,)}}")
+        raise ValueError(f"{where} returned {shown(returned)}: must be {right}")
     return returned
 
 
@@ -70,9 +73,11 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
     """Check that the arrays of an outcome fit the number of worlds `n` and the number of learning agents.
 
     Raises:
-        ValueError: an array has another shape or masked elements, a term is not finite, or the outcome names worlds
-            that do not exist.
+        ValueError: it is no Outcome, an array has another shape or masked elements, a term is not finite, or the
+            outcome names worlds that do not exist.
     """
+    if not isinstance(outcome, Outcome) or not isinstance(outcome.terms, RewardTerms):
+        raise ValueError(f"judge returned {shown(outcome)}: must be a sim.Outcome, whose terms are sim.RewardTerms")
     terms, size = outcome.terms.terms, n * learners
     for name, array, shape in (
         ("terms", terms, (len(outcome.terms.names), size)),
@@ -82,18 +87,26 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
     ):
         if type(array) is not np.ndarray:  # the usual type is readable
             readable(f"judge: {name}", array)
-        if array is not None and array.shape != shape:
-            raise ValueError(f"judge: {name} has shape {array.shape}: must be {shape}, one entry for each row")
+        if array is None and name == "over":
+            continue
+        if getattr(array, "shape", None) != shape:
+            found = f"has shape {array.shape}" if isinstance(array, np.ndarray) else f"is {shown(array)}"
+            raise ValueError(f"judge: {name} {found}: must be an array {shape}, one entry for each row")
     if not all_finite(terms):
         place, row = (int(i) for i in np.argwhere(~np.isfinite(terms))[0])
         value = terms[place, row]
         raise ValueError(
             f"judge: the term {outcome.terms.names[place]!r} is {value} in world {row % n}: must be finite"
         )
-    for name, worlds in (("changed", outcome.changed), ("failure", list(outcome.failure))):
-        for world in worlds:
-            if not 0 <= world < n:
-                raise ValueError(f"judge: {name} names world {world}: must be within 0 and {n - 1}")
+    require_worlds("judge: changed", outcome.changed, n)
+    require_worlds("judge: failure", outcome.failure, n)
+
+
+def require_worlds(where: str, named: Iterable[Any], n: int) -> None:
+    """Check that `named` consists of indices of worlds, below `n`; the error message begins with `where`."""
+    for world in named:
+        if not isinstance(world, int | np.integer) or not 0 <= world < n:
+            raise ValueError(f"{where} names world {shown(world)}: must be within 0 and {n - 1}")
 
 
 def _array(where: str, returned: Any, kind: Any) -> np.ndarray:
@@ -104,4 +117,4 @@ def _array(where: str, returned: Any, kind: Any) -> np.ndarray:
             return given.astype(kind)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise ValueError(f"{where} returned {returned!r:.80}: must be an array of numbers")
+    raise ValueError(f"{where} returned {shown(returned)}: must be an array of numbers")

@@ -14,7 +14,7 @@ from sim.physics.array_worlds import ArrayWorlds
 from sim.physics.controls import controls_of
 from sim.physics.physics import Physics
 from sim.scene.variation import Variation
-from sim.tasks.batch_arrays import columns, mapping, not_finite, rows
+from sim.tasks.batch_arrays import columns, mapping, not_finite, require_worlds, rows
 from sim.tasks.command import Command
 from sim.tasks.eye_kinds import EyeKind, auxiliary_of, kinds_of
 from sim.tasks.outcome import Outcome, RewardTerms
@@ -226,8 +226,16 @@ class BatchTask(TaskSettings):
         """Call `act`, and return the worlds that fail in this call, each with the reason.
 
         failed: the worlds that have already failed, each with the reason
+
+        Raises:
+            ValueError: `act` returned something else than a mapping from indices of worlds, or None.
         """
-        return self.act(worlds, actions) or {}
+        broken = self.act(worlds, actions)
+        if broken is None:
+            return {}
+        where = f"{type(self).__name__}: act"
+        require_worlds(where, mapping(where, broken, "{0: 'fell over'}, or None"), worlds.n)
+        return broken
 
     def all_proprioception(self, worlds: Any, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
         """Return the proprioception of every agent in the chosen worlds, as arrays (k, value) by name for each agent.

@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean, of_kind
+from optics.numerics.arguments import did_you_mean, of_kind, shown
 from optics.numerics.number_types import readable
 from sim.physics.controls import actuator_names
 from sim.tasks.batch_task import BatchTask
@@ -45,7 +45,7 @@ class Frozen:
     def __post_init__(self) -> None:
         of_kind("Frozen: task", self.task, Task, "Predator()")
         if self.policy is not None and not callable(getattr(self.policy, "predict", self.policy)):
-            raise ValueError(f"Frozen: policy = {self.policy!r:.80}: must be a function, have `predict`, or be None")
+            raise ValueError(f"Frozen: policy = {shown(self.policy)}: must be a function, have `predict`, or be None")
         object.__setattr__(self, "task", among(self.task, ()))
 
     @property
@@ -113,10 +113,11 @@ class Encounter:
             ValueError: no animal has this name or a name in `policies`, `policies` contains the learning animal, or a
                 policy is neither a function nor an object with `predict`.
         """
+        of_kind("policies", policies, Mapping, "{'Predator': policy}, or {}")
         for asked in (name, *policies):
-            if asked not in self.names:
+            if not isinstance(asked, str) or asked not in self.names:
                 known = did_you_mean(asked, self.names) or f": it has {', '.join(self.names)}"
-                raise ValueError(f"Encounter: no animal {asked!r}{known}")
+                raise ValueError(f"Encounter: no animal {shown(asked)}{known}")
         if name in policies:
             raise ValueError(f"Encounter: policies: {name!r} is the one that learns: must be left out")
         rest = [animal for animal in self.animals if name_of(animal) != name]

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from optics.numerics.arguments import did_you_mean, items
+from optics.numerics.arguments import did_you_mean, items, shown
 from sim.eyes.compound_eye import WorldEye, world_eye
 from sim.eyes.mounts import Mount, mounts_of
 from sim.render.fidelity import Fidelity
@@ -117,7 +117,9 @@ def _by_name(where: str, said: Any, names: Mapping[str, Any] | Sequence[str]) ->
         return said
     if names and not isinstance(said, Mapping):
         return dict.fromkeys(names, said)
-    raise ValueError(f"{where} = {said!r:.80}: must have an entry for each kind of eyes, {{'wide': ..., 'sharp': ...}}")
+    raise ValueError(
+        f"{where} = {shown(said)}: must have an entry for each kind of eyes, {{'wide': ..., 'sharp': ...}}"
+    )
 
 
 def _listed(names: Mapping[str, Any]) -> str:

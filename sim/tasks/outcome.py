@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.arguments import is_sized, one_of, shown
+
 __all__ = ["NOWHERE", "Outcome", "RewardTerms", "Step"]
 
 NOWHERE = np.empty(0, int)
@@ -25,13 +27,16 @@ class RewardTerms:
     terms: values of the terms, (term, row)
 
     Raises:
-        ValueError: the number of terms differs from the number of names.
+        ValueError: `names` is not a sequence of names, or `terms` is not an array of numbers with a row for each name.
     """
 
     def __init__(self, names: Sequence[str], terms: np.ndarray) -> None:
+        if isinstance(names, str) or not is_sized(names):
+            raise ValueError(f"names = {shown(names)}: must be the names of the terms, such as ('goal',)")
         self.names, self.terms = tuple(names), terms  # (term, row)
-        if len(self.names) != len(terms):
-            raise ValueError(f"terms has {len(terms)} rows: must be {len(self.names)}, one for each of {self.names}")
+        is_table = isinstance(terms, np.ndarray) and terms.ndim == 2 and terms.dtype.kind in "biuf"
+        if not is_table or len(terms) != len(self.names):
+            raise ValueError(f"terms = {shown(terms)}: must be numbers (term, row), one term for each of {self.names}")
         self._rows: list[dict[str, float]] | None = None
 
     @classmethod
@@ -41,10 +46,16 @@ class RewardTerms:
         rows: terms by name, for each row; a term that a row lacks is 0 in `terms`
 
         Raises:
-            ValueError: there are no rows.
+            ValueError: there are no rows, or a row is not a mapping.
         """
-        names = list(dict.fromkeys(name for row in rows for name in row))
-        found = cls(names, np.array([[row.get(name, 0.0) for row in rows] for name in names]).reshape(-1, len(rows)))
+        try:
+            names = list(dict.fromkeys(name for row in rows for name in row))
+            terms = np.array([[row.get(name, 0.0) for row in rows] for name in names]).reshape(-1, len(rows))
+        except (TypeError, AttributeError, ValueError):
+            raise ValueError(
+                f"rows = {shown(rows)}: must be the terms of each row, such as [{{'goal': 1.0}}]"
+            ) from None
+        found = cls(names, terms)
         found._rows = [dict(row) for row in rows]
         return found
 
@@ -65,6 +76,8 @@ class RewardTerms:
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values of one term, (row,); ValueError if there is no term of this name."""
+        if not isinstance(name, str) or name not in self.names:
+            one_of("term", name, self.names)
         return np.asarray(self.terms[self.names.index(name)])
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from optics.numerics.arguments import shown
-from optics.numerics.number_types import all_finite
+from optics.numerics.number_types import all_finite, is_number
 from optics.numerics.read_only import read_only
 from sim.physics.physics import Physics
 from sim.scene.poses import Poses
@@ -284,7 +283,7 @@ def check_least_return(least_return: float | None, mode: str) -> None:
     """
     if least_return is None:
         return
-    if isinstance(least_return, bool) or not isinstance(least_return, Real) or not least_return < 0:
+    if not (is_number(least_return) and least_return < 0):
         raise ValueError(f"least_return = {shown(least_return)}: must be below 0, or None")
     if mode != "training":
         raise ValueError(

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from optics.numerics.arguments import one_of
 from optics.numerics.autodiff import Array
 from sim.scene.poses import Poses
 from sim.scene.variant import variant
@@ -82,8 +83,7 @@ class Tracers:
     def __init__(
         self, scene: ModelScene, places: EyePlaces, name: str = "auto", stand: LevelStand | None = None
     ) -> None:
-        if name not in TRACERS:
-            raise ValueError(f"tracer = {name!r}: must be one of {', '.join(map(repr, TRACERS))}")
+        one_of("tracer", name, TRACERS)
         self._scene, self._name, self._places, self._stand = scene, name, places, stand
         self._known: dict[str, Tracer] = {}
         self._areas: dict[str, AreaTracer] = {}

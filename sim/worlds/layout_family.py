@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import whole
+from optics.numerics.arguments import of_kind, one_of, whole
 from optics.numerics.read_only import read_only
 from sim.worlds.course import MOST_STEPS, Course
 from sim.worlds.maze import draw_maze
@@ -88,9 +88,9 @@ class LayoutFamily:
         """Return the number of layouts in the set of this name, "training", "selection" or "test".
 
         Raises:
-            AttributeError: there is no such set.
+            ValueError: there is no such set.
         """
-        return int(getattr(self, f"n_{name}"))
+        return int(getattr(self, f"n_{one_of('name', name, SETS)}"))
 
     def random(self, name: str, index: int, purpose: int) -> np.random.Generator:
         """Return the random number generator of one layout, for its walls (purpose 0) or its stripes (purpose 1).
@@ -99,11 +99,12 @@ class LayoutFamily:
         index: index of the layout in the set
 
         Raises:
-            ValueError: there is no such set, or a number is negative.
+            ValueError: there is no such set, `index` is not a whole number from 0 to 99, or `purpose` is neither 0 nor
+                1.
         """
-        return np.random.default_rng(
-            np.random.SeedSequence(self.seed, spawn_key=(SETS.index(name), index, purpose)),
-        )
+        place = SETS.index(one_of("name", name, SETS))
+        index, purpose = whole("index", index, 0, MOST_LAYOUTS - 1), whole("purpose", purpose, _WALLS, _STRIPES)
+        return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(place, index, purpose)))
 
 
 @dataclass(frozen=True)
@@ -112,10 +113,17 @@ class LayoutSet:
 
     family: the family
     name: "training", "selection" or "test"
+
+    Raises:
+        ValueError: the family is no LayoutFamily, or there is no such set.
     """
 
     family: LayoutFamily
     name: str
+
+    def __post_init__(self) -> None:
+        of_kind("LayoutSet: family", self.family, LayoutFamily, "sim.LayoutFamily(seed=0)")
+        one_of("LayoutSet: name", self.name, SETS)
 
     def __len__(self) -> int:
         """Return the number of layouts."""

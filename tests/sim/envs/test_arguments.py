@@ -111,6 +111,13 @@ def test_other_functions_refuse_arguments_that_they_do_not_have(make, name):
         make(Rail(), **{name: 3})
 
 
+@pytest.mark.parametrize("make", [sim.make_env, lambda task, **given: gymnasium.make_vec("Rail-v0", 2, **given)])
+def test_unknown_arguments_are_named(make):
+    sim.register_task("Rail-v0", Rail)
+    with pytest.raises(ValueError, match=r"memry = 3: unknown, must be an argument .* did you mean 'memory'\?"):
+        make(Rail(), memry=3)
+
+
 def test_a_mode_of_the_task_is_refused():
     """An environment would replace it by its own."""
     task = Rail()

@@ -143,9 +143,40 @@ class WrongWorld(FindBalls):
         return Outcome(RewardTerms(["near"], np.zeros((1, worlds.n))), nothing, nothing, changed=np.array([7]))
 
 
+class NoNumber(FindBalls):
+    def rewards(self, worlds):
+        return {"near": np.where(np.arange(worlds.n) == 1, np.nan, 1.0)}
+
+
+class OffEnd(FindBalls):
+    def act(self, worlds, actions):
+        return {worlds.n: "fell over"}
+
+
+class NoReason(FindBalls):
+    def act(self, worlds, actions):
+        return [0]
+
+
+class NoOutcome(FindBalls):
+    def judge(self, worlds, failed):
+        return None
+
+
+class Mask(FindBalls):
+    def judge(self, worlds, failed):
+        nothing = np.zeros(worlds.n, bool)
+        return Outcome(RewardTerms(["near"], np.zeros((1, worlds.n))), nothing, nothing, changed=nothing)
+
+
 @pytest.mark.parametrize(
     ("task", "said"),
     [
+        (NoNumber, "world 1: rewards: 'near' is nan: must be a finite number"),
+        (OffEnd, "OffEnd: act names world 4: must be within 0 and 3"),
+        (NoReason, r"NoReason: act returned \[0\]: must be {0: 'fell over'}, or None"),
+        (NoOutcome, "judge returned None: must be a sim.Outcome, whose terms are sim.RewardTerms"),
+        (Mask, "judge: changed names world False: must be within 0 and 3"),
         (WrongShape, r"WrongShape: rewards: 'near' has shape \(3,\): must be \(4,\), one entry for each world"),
         (NoMapping, "NoMapping: rewards returned .*: must be arrays by name"),
         (WrongEnd, r"WrongEnd: terminated has shape \(\): must be \(4,\)"),
@@ -183,5 +214,5 @@ def test_a_reward_that_is_not_finite_ends_its_own_world():
 def test_bad_arguments_of_the_checker():
     with pytest.raises(ValueError, match=r"task = .*: must be a sim.BatchTask"):
         sim.check_batch_task(FindBall())
-    with pytest.raises(ValueError, match="n_envs = 1: must be at least 2"):
+    with pytest.raises(ValueError, match=r"n_envs = 1: must be a whole number in \[2, 1000000\]"):
         sim.check_batch_task(FindBalls(), n_envs=1)

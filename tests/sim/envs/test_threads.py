@@ -33,7 +33,7 @@ def test_all_libraries_have_this_number_of_threads(before, count):
     assert set(child.stdout.split()) == {str(count)}
 
 
-@pytest.mark.parametrize("count", [0, -1, 1.5, "two", None, 10**6])
+@pytest.mark.parametrize("count", [0, -1, 1.5, "two", None, 10**6, True])
 def test_bad_numbers_are_refused(count):
     with pytest.raises(ValueError, match=r"^count = .*: must be a whole number in \[1, 1024\]$"):
         sim.set_threads(count)

@@ -83,3 +83,9 @@ def test_a_compound_eye_in_rows_has_their_shape():
 def test_bad_arguments_are_named(given, message):
     with pytest.raises(ValueError, match=message):
         sim.hexagonal_rows(*given)
+
+
+@pytest.mark.parametrize("fov_deg", [0, -1.0, 361])
+def test_the_largest_field_is_named(fov_deg):
+    with pytest.raises(ValueError, match=r"fov_deg = .*: must be greater than 0 and at most 360, in degrees"):
+        sim.hexagonal_rows(3, 4, fov_deg)

@@ -83,6 +83,7 @@ def test_both_sides_mirror():
         (lambda: sim.Mount(b"head"), "Mount: on = b'head': must be a kind of str"),
         (lambda: sim.Mount(""), "Mount: on = '': must be the name of a site, a camera or a body"),
         (lambda: sim.ring(None, 2, 90, 0.2)[0], "Mount: on = None: must be a kind of str"),
+        (lambda: sim.ring("head", 2, 90, -1.0)[0], r"radius = -1.0: must lie in \[0, 1e\+15\]"),
         (lambda: sim.Mount("head", azimuth_deg=np.inf), "azimuth_deg = inf: must be finite"),
         (lambda: sim.Mount("head", offset=(1, 2)), "offset = .* must be three lengths"),
         (

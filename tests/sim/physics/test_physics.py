@@ -9,6 +9,7 @@ import pytest
 
 from sim.physics import agent_motion
 from sim.physics.agent_motion import AgentPhysics
+from sim.physics.sliding_agents import SlidingAgents
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
 from sim.worlds.catalog import SUBSTEPS
@@ -160,6 +161,13 @@ def test_a_broken_world_ends_its_episode_with_a_reason(world):
     assert step.failure == {1: "unstable physics"}
     assert step.terminated.tolist() == [False, True, False]
     assert np.isfinite(step.reward).all()
+
+
+def test_a_step_without_objects_is_refused(world):
+    agents = SlidingAgents(world, 1)
+    agents.place(np.array([0]), world.starts.position[:1], np.zeros(1), np.zeros((1, 3, 2)), np.zeros((1, 3)))
+    with pytest.raises(RuntimeError, match="the objects have no positions after the step: call move_objects first"):
+        agents.step(())
 
 
 def test_objects_that_collide_are_refused(world):

@@ -171,6 +171,12 @@ def test_invisible_geoms_and_other_bodies_are_left_out():
     assert list(sim.mirror(model, bodies=["box"]).geoms) == [3]
 
 
+@pytest.mark.parametrize("target", [[1.0, 2.0, 3.0], [1e200, 0.0, 0.0], [0.0, 0.0], [np.nan, 0.0, 0.0]])
+def test_viewpoints_need_two_points(target):
+    with pytest.raises(ValueError, match=r"^target = .*: must (differ from the origin|be a point, three numbers)"):
+        Viewpoint.looking_at([1.0, 2.0, 3.0], target)
+
+
 def test_bad_input_is_named():
     model = mujoco.MjModel.from_xml_string(xml_of(LIGHT, WHITE))
     mirror = sim.mirror(model)
