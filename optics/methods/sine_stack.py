@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -21,12 +20,14 @@ from optics.methods.diffraction_kernel import FAR, diffraction_kernel, near_fiel
 from optics.methods.sine_samples import MOST_SQUARE, MOST_STRETCH, RIM, SineSamples
 from optics.numerics.array_library import turned
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.kept_values import KeptValues
 from optics.numerics.precision import padded_for_packets, precision
 
 __all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines", "single_stack"]
 
 # Choices for tables of the transmittance against r²: number of values per cycle of the edge, and of smoothed waves.
 PER_CYCLE, SMOOTHED_LEVELS = 1000, 16384
+KEPT = 12  # choice, limited by memory: arrays that are kept for further PSFs with the same samples
 SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a few points
 
 
@@ -37,7 +38,7 @@ class SineGeometry:
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the outermost samples with light, (pupil,).
-    elsewhere: sines at which factors along the other axis are evaluated, see `slow_factor.axis_factor`, (pupil,).
+    elsewhere: sines at which factors along the other axis are evaluated, see `axis_kernel.AxisFactor`, (pupil,).
     """
 
     distance: np.ndarray
@@ -141,18 +142,16 @@ class SineStack(SineGeometry):
         return np.asarray(found)
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
+    def known(self) -> KeptValues:
         """Arrays that do not depend on the light, for further PSFs with the same samples."""
-        return {}
+        return KeptValues(KEPT)
 
     def _sizes(self, dtype: str) -> np.ndarray:
         """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x).
 
         The transmittance of smoothed waves is complex.
         """
-        if dtype not in self.known:
-            self.known[dtype] = self._new_sizes(dtype)
-        return np.asarray(self.known[dtype])
+        return np.asarray(self.known.get(dtype, lambda: self._new_sizes(dtype)))
 
     def _new_sizes(self, dtype: str) -> np.ndarray:
         stretch = 1 / self._cosine2(dtype)
@@ -209,9 +208,7 @@ class SineStack(SineGeometry):
         wavelength: wavelength [m] in the medium, a number.
         """
         key = "to_middle", float(wavelength), dtype
-        if key not in self.known:
-            self.known[key] = turned(*self._to_middle(wavelength, *self.points), dtype)
-        return np.asarray(self.known[key])
+        return np.asarray(self.known.get(key, lambda: turned(*self._to_middle(wavelength, *self.points), dtype)))
 
 
 @lru_cache(maxsize=16)

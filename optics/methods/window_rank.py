@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from optics.elements.light_stack import LightStack
+from optics.methods.remaining_factor import RemainingFactor
 from optics.methods.sine_stack import SineGeometry
-from optics.methods.slow_factor import RANKS, Path, cross_term, remaining_factor
+from optics.methods.slow_factor import RANKS, Path, cross_term
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
@@ -105,7 +106,8 @@ def window_ranks(
         s, t = rays.directions
         most = RANK_SHARE * DERIVATIVE_ERROR * tolerance / math.sqrt(2)
         tests.append(((s[:, None, :], t[:, None, :]), (across, down), np.ones(1), most))
-    exact = [remaining_factor(path, geometry, directions, at) for directions, at, *_ in tests]
+    factors = [RemainingFactor(path, geometry, directions) for directions, *_ in tests]
+    exact = [factor.at(test[1]) for factor, test in zip(factors, tests, strict=True)]
     found, least = np.zeros(len(tolerance), int), RANK_OF_DISTANCE if derivatives and derivatives.moves else 1
     crossed = np.zeros(len(tolerance), bool)
     for rank in RANKS:
@@ -114,7 +116,8 @@ def window_ranks(
         if rank < least:
             continue
         nodes = half * chebyshev_points(rank)
-        fits = [_errors(path, geometry, nodes, test, whole) < test[3] for test, whole in zip(tests, exact, strict=True)]
+        parts = zip(tests, factors, exact, strict=True)
+        fits = [_errors(factor, nodes, test[1], test[2], whole) < test[3] for test, factor, whole in parts]
         found[(found == 0) & np.all(fits, axis=0)] = rank
         if rank == 1 and derivatives is None and not found.all():
             a, b = cross_term(path, geometry, rays.directions, rays.window)
@@ -126,24 +129,24 @@ def window_ranks(
 
 
 def _errors(
-    path: Path,
-    geometry: SineGeometry,
+    factor: RemainingFactor,
     nodes: np.ndarray,
-    at: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray],
+    place: tuple[np.ndarray, np.ndarray],
+    weight: np.ndarray,
     exact: np.ndarray,
 ) -> np.ndarray:
     """Return the root mean square errors of the slow factor that is interpolated from nodes of the window, (beam,).
 
-    at: directions of points of the pupils, positions (u, v) [m] relative to the middle of the window, and weights.
-    exact: the slow factor at these points and positions.
+    place: positions (u, v) [m] relative to the middle of the window.
+    exact: the slow factor at these positions.
     """
-    (directions, (u, v), weight, _), total = at, np.zeros(1)
+    (u, v), total = place, np.zeros(1)
     if len(nodes) == 1:
         return _rms(exact - 1, weight)
     for a, across in enumerate(lagrange_basis(u, nodes)):
         for b, down in enumerate(lagrange_basis(v, nodes)):
-            place = np.full((1,) * exact.ndim, nodes[a]), np.full((1,) * exact.ndim, nodes[b])
-            total = total + across * down * remaining_factor(path, geometry, directions, place)
+            node = np.full((1,) * exact.ndim, nodes[a]), np.full((1,) * exact.ndim, nodes[b])
+            total = total + across * down * factor.at(node)
     return _rms(exact - total, weight)
 
 

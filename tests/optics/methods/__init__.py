@@ -1,6 +1,7 @@
 """Tests that fail when a module of optics/methods is broken. The oracles are closed forms that all methods satisfy.
 
 angular_spectrum: test_angular_spectrum.py, test_textbook.py, test_oracles_waves.py, test_even_pupils.py
+axis_kernel: test_sine_stack.py, test_diffraction_kernel.py
 carrier: point_spread/test_field.py
 derivative_cells: point_spread/test_gradients.py
 diffraction_kernel: test_diffraction_kernel.py
@@ -22,6 +23,7 @@ window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py
 pixelated_spectrum: elements/test_pixel_relief.py
 problem: point_spread/test_planner.py
+remaining_factor: test_sine_stack.py, test_diffraction_kernel.py
 row_blocks: test_row_blocks.py
 spectrum_sampling: test_row_blocks.py, test_even_pupils.py
 pupil_sampling: test_textbook.py, elements/test_pixel_relief.py
