@@ -144,7 +144,8 @@ class _CheckSums:
 
     @cached_property
     def _kernels(self) -> tuple[AxisRows, AxisRows]:
-        return tuple(AxisRows(self.path, self.samples, axis, self.dtype) for axis in (0, 1))
+        across, down = (AxisRows(self.path, self.samples, axis, self.dtype) for axis in (0, 1))
+        return across, down
 
     def _interpolated(self, axis: int, places: np.ndarray) -> np.ndarray:
         """Return L_a A e^{-ik u s} for columns (0) or rows (1) of the window, (stack, place · a, sample)."""
@@ -153,27 +154,25 @@ class _CheckSums:
 
     @cached_property
     def _along(self) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes and phases [waves] of the factors along x and y for all columns and rows.
+        """Amplitudes and phases [waves] of the factors along x and y in all columns and rows, for a single pupil.
 
-        The shapes are (part, pupil, 1, a, 1, column) and (part, pupil, b, 1, row, 1).
+        The shapes are (part, 1, a, 1, column) and (part, b, 1, 1, row).
         """
         factor, (u, v) = self._interpolation[2], self._places
-        return (
-            np.stack(factor.along[0].at(factor.rounded(u[None, None, None, None, :]))),
-            np.stack(factor.along[1].at(factor.rounded(v[None, None, None, :, None]))),
-        )
+        across = factor.along[0].at(factor.rounded(u[None, None, None, None, :]))
+        down = factor.along[1].at(factor.rounded(v[None, None, None, :, None]))
+        return np.stack(across)[:, 0], np.stack(down)[:, 0].swapaxes(-1, -2)
 
     def _ratio(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return the factor G between the interpolation points and crossings of the window, (stack, b, a, v, u)."""
-        factor, (across, down) = self._interpolation[2], self._along
-        x, y = self._places
-        window = x[columns][:, None, None, None, :], y[rows][:, None, None, :, None]
-        if len(columns) == 1:
-            across, down = across[..., columns[0]], down[..., rows[0], :]
-        else:
-            across = np.take_along_axis(across, columns[None, :, None, None, None, :], axis=5)
-            down = np.take_along_axis(down, rows[None, :, None, None, :, None], axis=4)
-        return factor.divided(tuple(map(factor.rounded, window)), [across, down])
+        factor, (x, y) = self._interpolation[2], self._places
+        u, v = factor.rounded(x[columns][:, None, None, None, :]), factor.rounded(y[rows][:, None, None, :, None])
+        if len(self.samples.at) > 1:
+            return factor.at((u, v))
+        across, down = (
+            np.moveaxis(part[..., at], -2, 1) for part, at in zip(self._along, (columns, rows), strict=True)
+        )
+        return factor.divided((u, v), [across, down.swapaxes(-1, -2)])
 
 
 def _remaining(
