@@ -12,7 +12,6 @@ from functools import cached_property
 import numpy as np
 
 from optics.methods.axis_kernel import AxisFactor
-from optics.methods.sine_samples import SineSamples
 from optics.methods.sine_stack import SineGeometry
 from optics.methods.slow_factor import Path, slow_parts
 from optics.numerics.array_library import turned
@@ -31,7 +30,7 @@ class RemainingFactor:
     """
 
     path: Path
-    samples: SineSamples | SineGeometry
+    samples: SineGeometry
     directions: Pair
     dtype: str = "float64"
 

@@ -118,7 +118,13 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
         return None
     pupil, finer = (_single(samples) for samples in plan.samples(np.array([0])))
     return WindowSampling(
-        pupil, finer, int(plan.ranks[0]), bool(plan.crossed[0]), plan.half, float(plan.seconds[0]), float(plan.bytes[0])
+        pupil,
+        finer,
+        int(plan.ranks[0]),
+        bool(plan.crossed[0]),
+        plan.geometry.half,
+        float(plan.seconds[0]),
+        float(plan.bytes[0]),
     )
 
 
