@@ -12,10 +12,10 @@ cost: test_fourier.py, point_spread/test_planner.py
 even_fields: test_even_fields.py, methods/test_even_pupils.py
 field: test_fourier.py, methods/test_textbook.py
 fourier: test_fourier.py
-fourier_kept_values: test_kept_values.py
-matrices: test_fourier.py
+fourier_matrices: test_fourier.py
 grid: test_grid.py
 interpolation: test_interpolation.py
+kept_values: test_kept_values.py
 matrices: test_fourier.py
 number_types: test_number_types.py, sim/test_number_types.py
 precision: test_precision.py
