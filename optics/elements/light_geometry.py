@@ -57,6 +57,18 @@ class LightGeometry:
         known = (-np.sign(focal) * behind, np.abs(focal)), (before, source)
         return [(read_only(index), read_only(r)) for index, r in known if np.isfinite(r).any()]
 
+    def waves(self, x: np.ndarray, y: np.ndarray) -> np.ndarray | float:
+        """Return the paths of all spherical waves at points (x, y) [m], in waves, up to a constant, (beam, y, x).
+
+        x, y: points, (beam, y, x).
+        """
+        total: np.ndarray | float = 0.0
+        r2, per_wave = x * x + y * y if self.spheres else 0.0, 1 / self.arrays[2][:, None, None]
+        for index, distance in self.spheres:
+            centre = distance[:, None, None]
+            total = total + (index[:, None, None] * per_wave) * r2 / (np.sqrt(r2 + centre * centre) + centre)
+        return total
+
     def slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the gradients of the paths of all spherical waves along x and y at `disk_points`, (beam, point)."""
         if across not in self._slopes:

@@ -150,20 +150,30 @@ class LightStack:
 
         x, y: points, (beam, y, x).
         """
-        per_radius, per_wave = (part[:, None, None] for part in (1 / self.radius, 1 / self.vacuum_wavelength))
+        per_radius = (1 / self.radius)[:, None, None]
         coefficients, others = self._polynomials
-        total = np.zeros((len(self.beams), *x.shape[1:]))
+        total = np.zeros((len(self.beams), *x.shape[1:])) + self.geometry.waves(x, y)
         if coefficients.any():
             total += power_sum(coefficients, x * per_radius, y * per_radius)
-        if self.geometry.spheres:
-            r2 = x * x + y * y
-        for index, distance in self.geometry.spheres:
-            centre = distance[:, None, None]
-            total += (index[:, None, None] * per_wave) * r2 / (np.sqrt(r2 + centre * centre) + centre)
         for place in range(len(self.beams)):
             if place in others or self._tilted[place]:
                 total[place] += self._other_path(place, x[place], y[place]) / self.vacuum_wavelength[place]
         return total
+
+    def powers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return y^i x^j at points in units of the radius, for `polynomial_waves`, (beam, i, j, point).
+
+        x, y: points [m], (beam, y, x).
+        """
+        steps, radius = np.arange(self._polynomials[0].shape[1]), self.radius[:, None]
+        across, down = (at.reshape(len(at), -1)[:, None] / radius[..., None] for at in (x, y))
+        found: np.ndarray = (down ** steps[:, None])[:, :, None] * (across ** steps[:, None])[:, None]
+        return found
+
+    def polynomial_waves(self, powers: np.ndarray) -> np.ndarray:
+        """Return the paths of polynomial reliefs and wavefronts, in waves, up to a constant, (beam, point)."""
+        coefficients = self._polynomials[0].reshape(len(self.beams), 1, -1)
+        return np.asarray((coefficients @ powers.reshape(len(powers), coefficients.shape[2], -1))[:, 0])
 
     def _other_path(self, place: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the part of the path [m] of one beam that is neither a polynomial nor a sphere about the axis."""

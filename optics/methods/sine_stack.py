@@ -186,15 +186,26 @@ class SineStack(SineGeometry):
         count = stack.smooth_points
         if count is None or count >= self.at.shape[1] or not self.smooth(0.0):
             return self._paths(stack, *self.points)
-        side = self.at[:, [0, -1]]
-        nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
+
+        def computed() -> tuple[np.ndarray, np.ndarray]:
+            """Return the paths without reliefs and wavefronts at Chebyshev points, and powers of these points."""
+            side = self.at[:, [0, -1]]
+            nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
+            points = self.points_at(nodes[:, None, :], nodes[:, :, None])
+            return stack.geometry.waves(*points) + self._from(stack, *points), stack.powers(*points)
+
+        straight, powers = self.known.get(("paths", stack.geometry, count), computed)
+        paths = straight + stack.polynomial_waves(powers).reshape(-1, count, count)
         weight = even_weights(self.at.shape[1], count)
-        paths = self._paths(stack, *self.points_at(nodes[:, None, :], nodes[:, :, None]))
         return np.asarray(weight @ paths @ weight.T)
 
     def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the paths through points (x, y) [m], in waves up to a constant."""
-        return np.asarray(stack.waves(x, y) + self._to_middle(stack.wavelength[:, None, None], x, y)[1])
+        return np.asarray(stack.waves(x, y) + self._from(stack, x, y))
+
+    def _from(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the paths from points (x, y) [m] to the middle of the window, in waves up to a constant."""
+        return self._to_middle(stack.wavelength[:, None, None], x, y)[1]
 
     def _to_middle(self, wavelength: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the `diffraction_kernel` from points (x, y) [m] to the middle of the window."""

@@ -88,9 +88,12 @@ class _CheckSums:
 
         field: contribution of each sample to the middle of the window, (stack, y, x).
         """
-        across, down = (self._interpolated(axis, places) for axis, places in enumerate((columns, rows)))
-        sums = down @ field @ across.swapaxes(1, 2)
         count = len(self._weight)
+        across, down = (
+            (kernel[:, :, None, :] * self._weight).reshape(len(rows), -1, kernel.shape[2])
+            for kernel in self._rows(columns, rows)
+        )
+        sums = down @ field @ across.swapaxes(1, 2)
         split = sums.reshape(len(rows), rows.shape[1], count, columns.shape[1], count)
         found: np.ndarray = intensity_of(np.einsum("nbavu,nvbua->nvu", self._ratio(rows, columns), split))
         return found
@@ -142,15 +145,21 @@ class _CheckSums:
         """
         return lagrange_basis(self.samples.at[0], self._interpolation[0][0]).astype(self.dtype)
 
+    def _rows(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the kernels A e^{-ik u s} for columns and rows of the window, (stack, place, sample)."""
+        across, down = self._kernels
+        if across is not down:
+            return across.at(columns), down.at(rows)
+        both = across.at(np.concatenate([columns, rows], axis=1))
+        return both[:, : columns.shape[1]], both[:, columns.shape[1] :]
+
     @cached_property
     def _kernels(self) -> tuple[AxisRows, AxisRows]:
-        across, down = (AxisRows(self.path, self.samples, axis, self.dtype) for axis in (0, 1))
-        return across, down
-
-    def _interpolated(self, axis: int, places: np.ndarray) -> np.ndarray:
-        """Return L_a A e^{-ik u s} for columns (0) or rows (1) of the window, (stack, place · a, sample)."""
-        kernel = self._kernels[axis].at(places)
-        return np.asarray((kernel[:, :, None, :] * self._weight).reshape(len(places), -1, kernel.shape[2]))
+        """Kernels along x and y, which are the same if the window is square and lies on a diagonal."""
+        (height, width), (x, y) = self.path.window.shape, self.path.window.centre
+        across = AxisRows(self.path, self.samples, 0, self.dtype)
+        same = height == width and x == y
+        return across, across if same else AxisRows(self.path, self.samples, 1, self.dtype)
 
     @cached_property
     def _along(self) -> tuple[np.ndarray, np.ndarray]:
