@@ -30,6 +30,7 @@ window_rank          rank of the slow factor for the samples of `window_plan`
 window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         several sources and wavelengths through one pupil, from the same samples
 window_check         error of such PSFs, by a sum over other samples in a few places
+mirrored_matrix      products with matrices that do not change if rows and columns are mirrored
 window_sums          sums over the pupil for `window_sampling` and `window_stack`, and their adjoint
 far_field            one Fourier transform onto directions for each of a few nodes of the window
 far_field_nodes      the choice of the nodes of `far_field`, and their weights in every direction
