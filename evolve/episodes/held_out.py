@@ -13,7 +13,9 @@ __all__ = ["held_out_episodes"]
 def held_out_episodes(
     run: Run, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None
 ) -> Episodes:
-    """Play evaluation episodes in the test set of a run. The same arguments give the same episodes.
+    """Play evaluation episodes in the test set of a run, and return their results.
+
+    The same arguments give the same episodes.
 
     candidate_id: id of the candidate; None: the best candidate
     seed: seed of the episodes
@@ -21,8 +23,10 @@ def held_out_episodes(
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the run has no test set, or the user task was not named when the run was opened, or fails.
+        ConfigError: the run has no test set, or the user task was not named when the run was opened, or its module
+            cannot be executed.
         ValueError: `episodes` is below 1, or `seed` is negative.
+        RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: the policy's file cannot be read.
     """

@@ -29,7 +29,7 @@ class CheckpointError(ValueError):
 
 
 class CheckpointWarning(UserWarning):
-    """A checkpoint that cannot be used was renamed; training starts from an earlier checkpoint or the beginning."""
+    """An unusable checkpoint was renamed; training starts from an earlier checkpoint or from the beginning."""
 
 
 def metadata_of(content: bytes) -> dict[str, str]:
@@ -46,7 +46,7 @@ def metadata_of(content: bytes) -> dict[str, str]:
 
 
 def owned(owner: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, str]:
-    """Return the metadata of a checkpoint: its owner, `numbers`, and a placeholder that `sealed` replaces."""
+    """Return a checkpoint's metadata: its owner, `numbers`, and a placeholder for the checksum that `sealed` adds."""
     return {ENTRY: json.dumps({**numbers, "owner": owner, "sha256": BLANK})}
 
 
@@ -60,6 +60,8 @@ def sealed(content: bytes) -> bytes:
 
 def read_owned(path: Path, owner: Mapping[str, Any]) -> tuple[bytes, dict[str, Any]] | None:
     """Return the bytes of a checkpoint, and the numbers in its metadata; None if the file does not exist.
+
+    owner: training run to which the checkpoint must belong, see `TrainingRung.owners`
 
     Raises:
         CheckpointError: the file is damaged or unreadable, has no checksum, or belongs to another owner.
@@ -118,7 +120,10 @@ def _require_owner(found: Any, owner: Mapping[str, Any]) -> None:
 
 
 def _end(content: bytes) -> int:
-    """Return the position [bytes] at which a file's header ends; with a damaged length, it may lie beyond the file."""
+    """Return the position [bytes] at which a file's header ends.
+
+    If the length of the header is damaged, the position may lie beyond the end of the file.
+    """
     return LENGTH_BYTES + int.from_bytes(content[:LENGTH_BYTES], "little")
 
 

@@ -154,7 +154,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
     """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
 
     brain: size and wiring of the brain
-    first_actions: mean and standard deviation of each element of untrained actions; None: 0 and FIRST_SPREAD
+    first_actions: mean and standard deviation of each element of untrained actions; None: 0 and 0.5
     """
 
     def __init__(
@@ -219,7 +219,7 @@ def save_policy(policy: EyePolicy, path: Path | str) -> None:
 def load_policy(path: Path | str) -> EyePolicy:
     """Return the policy that a file contains; nothing in the file is executed.
 
-    Torch is set to one thread, as in learning: several threads would vary the order of sums, and thereby episodes.
+    Torch is set to one thread, as in learning: several threads would vary the order of sums, and thereby actions.
 
     Raises:
         ValueError: the file does not exist, or is not a policy; for example, it is a pickle or truncated.

@@ -1,4 +1,4 @@
-"""Comparison of runs: their results, their cost, and the settings in which they differ."""
+"""Comparison of runs: their results, training steps and time, and the settings in which they differ."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
 
 
 def _shown(value: Any) -> str:
-    """Return a value as text, in the form in which `--set` accepts it."""
+    """Return a value as text, in the form in which `--set` accepts it; "-" for a missing value."""
     if isinstance(value, bool):
         return str(value).lower()
     return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

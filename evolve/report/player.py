@@ -44,7 +44,8 @@ def episode_sentence(episode: Episode) -> str:
     terms = ", ".join(f"{name} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
     parts = f" ({terms})" if terms else ""
     end = "" if episode.failure is None else f" It ended because the task failed: {episode.failure}."
-    return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total}{parts}.{end}"
+    name = f"{episode.mode.capitalize()} episode with seed {episode.seed}"
+    return f"{name}: {len(episode)} actions, return {total}{parts}.{end}"
 
 
 def player(episode: Episode) -> Html:
@@ -223,7 +224,7 @@ def _kept(episode: Episode) -> np.ndarray:
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
     """Return (frame, "goal" or "adversary") for each time at which an object was reached, in order of the frames.
 
-    frame: index in `kept` of the first time step from then on
+    frame: index in `kept` of the first time step at or after this time
     """
     found = [
         (int(np.searchsorted(kept, time)), name)

@@ -52,7 +52,10 @@ class LightGeometry:
 
     @cached_property
     def spheres(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Spherical waves: their indices (negative for waves that converge) and the distances of their centres [m]."""
+        """Spherical waves of the lenses and of the sources: index and distance [m] of the centre, (beam,) each.
+
+        The index of a wave that converges is negative.
+        """
         *_, behind, before, focal, source = self.arrays
         known = (-np.sign(focal) * behind, np.abs(focal)), (before, source)
         return [(read_only(index), read_only(r)) for index, r in known if np.isfinite(r).any()]

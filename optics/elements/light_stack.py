@@ -120,7 +120,7 @@ class LightStack:
 
     @cached_property
     def _polynomials(self) -> tuple[np.ndarray, list[int]]:
-        """Coefficients of `powers_of` for each beam, and the beams whose reliefs or wavefronts are no polynomials."""
+        """Coefficients of `powers_of` for each beam, and the beams whose reliefs or wavefronts are not polynomials."""
         known = [
             powers_of(beam.pupil, beam.wavelength, step)
             for beam, (_, _, step) in zip(self.beams, self._indices, strict=True)
@@ -134,7 +134,7 @@ class LightStack:
 
     @cached_property
     def mapped(self) -> np.ndarray:
-        """True for beams whose relief or wavefront is no polynomial and may have fine detail, (beam,)."""
+        """True for beams whose relief or wavefront is not a polynomial and may have fine detail, (beam,)."""
         return read_only(np.isin(np.arange(len(self.beams)), self._polynomials[1]))
 
     @cached_property

@@ -16,8 +16,8 @@ from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 __all__ = ["DERIVATIVE_ERROR", "Derivatives", "WindowRays", "window_ranks"]
 
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
-# Choices: parts of these errors that the rank may take, and with `cross_term`, whose remaining phase depends mostly on
-# the position in the window alone.
+# Choices: part of the tolerance, or of DERIVATIVE_ERROR, that the rank may take, without and with `cross_term`. With
+# this term, the remaining phase depends mostly on the position in the window alone.
 RANK_SHARE, CROSSED_SHARE = 0.3, 0.9
 PLACES = 6  # choice: number of places along a side of the window that determine the rank for derivatives
 OUTSIDE = 1e-3  # choice: weight of rays that miss the window
@@ -41,8 +41,8 @@ class Derivatives:
 class WindowRays:
     """Some rays from each pupil, and where they hit a window.
 
-    window: positions (u, v) [m] relative to the middle of the window. Diffraction spreads the light around them, and
-        those outside the window are moved to its side, (beam, ray).
+    window: positions (u, v) [m] relative to the middle of the window, (beam, ray). They are the hit points of the rays,
+        moved outwards by the width of diffraction and, if they then lie outside the window, to its nearest side.
     weight: weights of the rays, with a mean of 1, (beam, ray).
     mean_sine: root mean square of the sines along an axis, (beam,).
     """
@@ -55,7 +55,8 @@ class WindowRays:
     def from_slopes(cls, slopes: StackSlopes, geometry: WindowGeometry) -> WindowRays:
         """Return rays from points that are spread evenly over the disks.
 
-        To first order, a ray hits the window at D/n times the slope of the path to its middle, with D the distance.
+        To first order, a ray hits the window at D/n times the slope of its path to the middle of the window, where D is
+        the distance from the ray's point of the pupil to this middle.
         """
         half, planned = geometry.half, geometry.rays(slopes.across)
         blur, pairs = planned.blur, zip((slopes.along_x, slopes.along_y), planned.at, strict=True)

@@ -23,15 +23,15 @@ class Auxiliary:
     """Auxiliary observations of one kind of eyes in all worlds, at the centre of each receptor.
 
     renderer: renderer of depth and ids for these eyes.
-    names: the requested quantities, a subset of AUXILIARY.
+    names: the requested quantities, of "depth", "ids" and "flow".
     prefix: prefix of their names in an observation.
     spaces: spaces of the entries in one world's observation, by name:
         depth: distance of the visible point along the eye's axis [m], (eye, height, width) float32; 0 if nothing is
             visible
         ids: id of the visible geom, (eye, height, width) int32; -1 if nothing is visible
         flow: motion of the visible point on the retina since the last observation, to the right and down [receptors],
-            (eye, 2, height, width) float32. The flow is 0 in the first observation of an episode, if nothing is
-            visible, and if the visible point was not in front of the eye at the last observation.
+            (eye, 2, height, width) float32. The flow is 0 in three cases: in the first observation of an episode, if
+            nothing is visible, and if the visible point was not in front of the eye at the last observation.
     """
 
     def __init__(self, renderer: Labels, names: Sequence[str], prefix: str = "") -> None:
@@ -65,12 +65,14 @@ class Auxiliary:
         self._before = poses
 
     def _flow(self, now: Poses, depth: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Return the optic flow of the points that are visible now, (world, eye, 2, height, width); 0 without a hit.
+        """Return the optic flow of the points that are visible now, (world, eye, 2, height, width).
+
+        It is 0 without a hit, and for points that were not in front of the eye.
 
         Points are followed from their present positions back to the previous poses. The flow is the negative of this
         motion.
 
-        depth, ids: what the centre of each receptor sees, see `flow_between`
+        depth, ids: depth and geom id of the point that is visible at the centre of each receptor, see `flow_between`
         """
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)

@@ -25,7 +25,8 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     The function checks the following:
 
     - The task's settings are valid.
-    - All arrays that its methods return have the right shapes, finite numbers and valid indices of worlds.
+    - All arrays that its methods return have the right shapes, and `proprioception` and the outcome of an overridden
+      `judge` contain finite numbers. (If `rewards` returns NaN, only the episode of this world ends.)
     - `reset` changes only the worlds that it was given.
     - A world's episode depends neither on other worlds nor on their number.
     - The same seed leads to the same episode.
@@ -59,7 +60,7 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 def _actions(simulation: Simulation, steps: int) -> list[np.ndarray]:
     """Return random actions (world, value) for each step, which are the same in any number of worlds.
 
-    All worlds take the same actions.
+    All worlds take the same actions, which have a fixed seed.
     """
     size = sum(agent.n_actions for agent in simulation.agents)
     random = np.random.default_rng(SEED)

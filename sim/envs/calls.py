@@ -1,7 +1,7 @@
 """Checks of the calls of an environment: their order, their seeds and their actions. All environments share them.
 
-An action that is not finite has two consequences. In a batch, it ends the episode of its world, so that the other
-worlds continue (`sim.tasks.simulation`). An environment of one world has no other worlds to protect, and refuses it.
+A batch accepts an action that is not finite: the action ends the episode of its world, and the other worlds continue
+(`sim.tasks.simulation`). An environment of one world refuses such an action with a ValueError.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def seed_of(name: str, seed: Any) -> int | None:
 
 
 def actions_of(name: str, actions: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return actions as a float32 array. Numbers beyond the range of float32 are limited to it.
+    """Return actions as a float32 array. Finite numbers beyond the range of float32 are limited to it.
 
     name: the actions' name in messages, such as "actions"
     shape: required shape of the actions

@@ -32,7 +32,7 @@ def check_render_mode(render_mode: str | None) -> None:
     """Refuse an unknown render mode.
 
     Raises:
-        ValueError: the mode is neither one of RENDER_MODES nor None.
+        ValueError: the mode is neither "rgb_array", "eyes" nor None.
     """
     if render_mode not in (None, *RENDER_MODES):
         modes = ", ".join(map(repr, RENDER_MODES))
@@ -47,7 +47,7 @@ class FollowCamera:
         number of rays per pixel at eight wavelengths. They take twenty to fifty times as long.
 
     Raises:
-        ValueError: samples is below 1.
+        ValueError: `samples` is neither None nor a whole number of at least 1.
     """
 
     def __init__(self, world: World, eyes: Eyes | None = None, samples: int | None = None) -> None:

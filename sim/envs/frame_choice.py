@@ -1,7 +1,7 @@
 """Choice of the number of frames per action that receptors with dynamics need for correct motion blur.
 
 A few random actions are simulated. For each number of frames, the responses at the end of each action are compared with
-the responses to the largest possible number, up to one frame per physics step.
+the responses to the largest number that is tried: at most FINEST, and at most one frame per physics step.
 """
 
 from __future__ import annotations
@@ -37,10 +37,11 @@ def dynamics_of(eye: Any) -> Any:
 def with_frames(
     task: BatchTask, fidelities: Sequence[Fidelities | None], scenes: Mapping[str, WorldScene] | None
 ) -> list[Fidelities | None]:
-    """Return the fidelities with `frames` set for all eyes whose receptors have dynamics.
+    """Return the fidelities with the number of frames per action (`frames`) that receptors with dynamics need.
 
-    The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify it. Otherwise it
-    is the smallest number for which the errors of all signals are acceptable.
+    The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify the number.
+    Otherwise it is the smallest number for which the errors of all signals are acceptable. If no eyes have receptors
+    with dynamics, or the fidelities of all such eyes specify the number, the fidelities are returned unchanged.
 
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
     scenes: see `renderers_for`
@@ -128,7 +129,10 @@ def _chosen(
 
 
 def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.ndarray]:
-    """Return noise-free signals during random actions, (action, frame, world, ...) for each renderer."""
+    """Return noise-free signals during random actions (of a fixed seed), for each renderer.
+
+    They are (action, frame, world, ...). The actions stop when an episode ends.
+    """
     random = np.random.default_rng(0)
     worlds.reset()
     found: list[list[list[np.ndarray]]] = [[] for _ in renderers]

@@ -27,8 +27,9 @@ class OmmatidialSampling:
     """Samples of a compound eye.
 
     An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
-    weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. Equal
-    ommatidia share PATTERNS arrangements of rays, one of which is drawn for each ommatidium, so that the errors of
+    weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. With 8
+    rays or more, weights are corrected so that two test scenes are exact in every band. Equal ommatidia share 16
+    arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random choice, so that the errors of
     neighbours are nearly independent.
 
     depth: a single layer, because facets have a large depth of field
@@ -107,7 +108,10 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
 
 
 def _tests(places: np.ndarray, spread: float) -> np.ndarray:
-    """Return the light of two scenes at places (place, 2): uniform, and a Gaussian of variance `spread` on the axis."""
+    """Return the light of two test scenes at places (place, 2), as an array (place, scene).
+
+    The light is uniform in the first scene, and a Gaussian of variance `spread` around the axis in the second.
+    """
     return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
 
 
@@ -118,8 +122,8 @@ def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray,
     narrow.
 
     weights: weights before the correction, (ray, band)
-    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of the table, (place, scene)
-    powers: acceptance function of each band at the places of the table, (band, place)
+    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of `powers`, (place, scene)
+    powers: tabulated acceptance function of each band, (band, place)
     """
     found = weights.copy()
     for band, power in enumerate(powers):

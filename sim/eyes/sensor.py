@@ -35,7 +35,7 @@ class Facets(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class BoxSensor(ReadOnlyArrays):
-    """Sensor of an eye with a perfect lens: a receptor's signal is the mean of the light over the receptor's square.
+    """Sensor of an eye with a perfect lens: a receptor's signal is the mean of the light over the receptor's area.
 
     directions: unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32; ray = receptor *
         rays_per_receptor + sample
@@ -64,7 +64,8 @@ class BoxSensor(ReadOnlyArrays):
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Return the function that maps sums of spectral components over each receptor's rays to signals.
 
-        mixing, basis: see `sim.eyes.receptor_sums`
+        mixing: weight of each band in each channel, (channel, band)
+        basis: contribution of each component to each band, (component, band)
         """
         return of_receptors(mixing @ basis.T / self.rays_per_receptor)
 
@@ -116,7 +117,8 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Return the function that maps spectral components along rays (layer * component, view, ray) to signals.
 
-        mixing, basis: see `sim.eyes.receptor_sums`
+        mixing: weight of each band in each channel, (channel, band)
+        basis: contribution of each component to each band, (component, band)
         """
         count, k = self.depth.count, len(basis)
         bands = len(self.weights) // count
@@ -145,10 +147,11 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
 class OmmatidialSensor(ReadOnlyArrays):
     """Sensor of a compound eye, whose ommatidia have their own rays.
 
-    The kernel multiplies the light along each ray by the weight of the ray and sums over an ommatidium's rays. The
-    weight is the integral of the acceptance function in each band over the directions near the ray. The weights in band
-    b sum to Ω_b, the integral over all directions, relative to the mean of Ω over all bands. The signal of type t is
-    Σ_b mixing[t, b] times the sum in band b, divided by the same expression for white light.
+    The kernel multiplies the light along each ray by the weight of the ray and sums over an ommatidium's rays. Let Ω_b
+    be the integral of the acceptance function in band b over all directions. In this band, the weight of a ray is the
+    integral over the directions near the ray, divided by the mean of Ω over all bands. The weights therefore sum to
+    Ω_b / mean(Ω). The signal of type t is Σ_b mixing[t, b] times the sum in band b, divided by the same expression for
+    white light.
 
     directions, bounce_samples, rays_per_receptor: see `BoxSensor`
     facets: weights and starting points of the rays
@@ -178,7 +181,8 @@ class OmmatidialSensor(ReadOnlyArrays):
 
         Components must be bands.
 
-        mixing, basis: see `sim.eyes.receptor_sums`
+        mixing: weight of each band in each channel, (channel, band)
+        basis: contribution of each component to each band, (component, band), the identity matrix
         """
         signals, white = of_receptors(mixing @ basis.T), (mixing @ self.white.T).astype(np.float32)
         return lambda light: signals(light) / white

@@ -31,7 +31,7 @@ class LocalContacts:
     whole: the world's complete model
     alone: the model of the world's agent without the world (`sim.worlds.agent_model`)
     free_motion: obstacles of the agent, and the distance at which it may touch them
-    threads: number of threads, see `sim.physics.mujoco_batch`
+    threads: number of threads for MuJoCo's batched step of 128 or more worlds
     """
 
     def __init__(self, whole: mujoco.MjModel, alone: mujoco.MjModel, free_motion: FreeMotion, threads: int) -> None:
@@ -95,8 +95,8 @@ def local_contacts_of(
     """Return the local contacts of a world's agent; None if small models cannot replace the whole model.
 
     Small models cannot replace it if agents have no free motion or no obstacles, or if bodies other than the agent
-    move. Every obstacle must be a simple primitive that is fixed to the world, and the world's model must be as
-    compiled.
+    move. Every obstacle must be a simple primitive that is fixed to the world, and the world's model must not
+    have been changed since it was compiled.
 
     whole: the world's complete model
     """

@@ -52,7 +52,7 @@ _VIEW = 5  # rows of four floats: position, columns of the rotation, (tan(fovy /
 class RayLight:
     """Light along rays, and the planes that they hit.
 
-    linear: sRGB, not clipped, (3, ray)
+    linear: linear sRGB, not clipped, (3, ray)
     plane: coefficients of the tangent plane at each hit point, (3, ray); 0 without a hit. Any ray of the image meets
         this plane at 1 / depth = plane @ (across, above, 1) [1/m], see `plane_coordinates`.
     """
@@ -108,7 +108,7 @@ class CameraRays:
     def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
         """Return the light along rays of an image of size (height, width).
 
-        codes: whole numbers that specify the rays, see the module's docstring, (ray,)
+        codes: a whole number for each ray: 8 times the index of its pixel, plus the index of its sample, (ray,)
         """
         traced = self._inside if self.mirror.surrounds(view.position) else self._outside
         suns = {k: self.mirror.towards(name, view) for k, name in self._suns.items()}

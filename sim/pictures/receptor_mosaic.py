@@ -26,7 +26,7 @@ class ReceptorMosaic:
 
     animal: name of the animal.
     signals: signals (channel, row, column), from the top left of the visual field. A white surface gives 1.
-    peaks_nm: peak wavelength of each channel, (channel,).
+    peaks_nm: peak wavelength of each channel [nm], (channel,).
     width_deg: angular width of the photograph [degrees].
     hexagons: True for ommatidia. Every second row, beginning with the second, is then shifted to the right by half an
         ommatidium.
@@ -45,7 +45,7 @@ class ReceptorMosaic:
         """Return an sRGB image (height, x, 3) uint8 of the receptors, to the right of the photograph if it is given.
 
         Red, green and blue show the receptors with the longest, the middle and the shortest peaks. A single type is
-        shown as grey.
+        shown as grey. Of two types, the one with the shorter peak is shown as green and blue.
 
         photograph: sRGB values in [0, 1], (y, x, 3).
         height: height of the image in pixels, 16 to 8192.

@@ -61,7 +61,8 @@ def check_memory(demand: Demand) -> None:
     """Refuse rendering that does not fit into memory.
 
     Raises:
-        ValueError: there is too little memory; the message states how many rays per receptor fit.
+        ValueError: there is too little memory, or an array would have more than 2³² elements. The message states how
+            many rays per receptor fit.
     """
     free = available()
     excess = max(demand.bytes / free, demand.elements / INDICES)
@@ -99,7 +100,10 @@ def _of_machine() -> float:
 
 
 def _of_container(root: Path) -> float:
-    """Return the free bytes below the limits of control groups; at least 1, because a group may exceed its limit."""
+    """Return the free bytes below the limits of control groups; infinite without limits.
+
+    The result is at least 1, because a group may exceed its limit.
+    """
     free = math.inf
     for limit, used, statistics, prefix in _GROUPS:
         try:

@@ -16,9 +16,9 @@ Frames = tuple[np.ndarray, np.ndarray]  # pupils [m] (world, eye, 3), eyes' fram
 
 
 def receptor_centres(eye: optics.Eye) -> np.ndarray:
-    """Return the receptors' centres (receptor, 2), from the middle of the eye, in sides of a receptor.
+    """Return the receptors' centres, relative to the middle of the retina [receptor widths and heights], (receptor, 2).
 
-    x points to the right and y down.
+    The coordinate x points to the right, and y points down.
     """
     height, width = eye.resolution
     row, column = (index.ravel() for index in np.indices((height, width)))
@@ -28,9 +28,10 @@ def receptor_centres(eye: optics.Eye) -> np.ndarray:
 def flow_between(
     eye: optics.Eye, depth: np.ndarray, ids: np.ndarray, moments: tuple[Poses, Poses], frames: tuple[Frames, Frames]
 ) -> np.ndarray:
-    """Return the flow to the right and down [receptors], (world, eye, 2, height, width) float32.
+    """Return how far the point that each receptor sees moves in the image, (world, eye, 2, height, width) float32.
 
-    It is NaN without a hit, or if the point is not in front of the eye at the second moment.
+    The motion is to the right and down [receptors], from the first to the second moment. It is NaN if there is no such
+    point, or if the point is not in front of the eye at the second moment.
 
     depth, ids: depth and geom that each receptor's centre sees at the first moment, (world, eye, height, width)
     moments: poses at both moments

@@ -3,8 +3,8 @@
 A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
 world's noise therefore depends on the world's own seed and history, and not on other worlds.
 
-The noise of `optics.Eye.see` is drawn as numbers of photons (`optics.eye.photoreceptor`). Both kinds of noise have the
-same mean, variance and third moment.
+This noise has the same mean, variance and third moment as the noise of `optics.Eye.see`, which is drawn as numbers of
+photons (`optics.eye.photoreceptor`).
 """
 
 from __future__ import annotations
@@ -161,6 +161,7 @@ class NoiseModel:
     def __call__(self, signals: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Return noisy signals (n, ...) from standard normal numbers z of the same shape, which may be overwritten.
 
+        For each signal s, V is the variance of its noise, and N the number of photons for a signal of 1.
         Shot noise agrees with the Poisson distribution up to the third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish &
         Fisher 1938). The third moment matters below a hundred photons.
         """

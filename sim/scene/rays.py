@@ -79,9 +79,8 @@ class Camera:
 
         It is the mean over `spp` random positions in each pixel.
 
-        sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel. Its noise is lower
-            than the standard error of independent samples. It is not available in scalar variants, or for an spp that
-            it would round.
+        sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel, so that images have
+            less noise. Multijitter is not available in scalar variants, or for an spp that it would round.
 
         Raises:
             ValueError: the integrator is unknown, Mitsuba would apply it incorrectly, or the sampler is not available.
@@ -155,7 +154,7 @@ class Camera:
     def _sum_of_samples(
         self, method: MitsubaObject, spectrum: list[float], sampler: MitsubaObject, seed: int
     ) -> np.ndarray:
-        """Return the sum of the sampler's samples per pixel, (LANES, pixels)."""
+        """Return the sum of the sampler's samples per pixel, (4 lanes, pixels)."""
         width, height = self.size
         n = sampler.sample_count()
         if _is_scalar():

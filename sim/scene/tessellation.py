@@ -1,7 +1,8 @@
 """Geoms as triangles with MuJoCo's texture coordinates, in the geom's frame.
 
 In MuJoCo's coordinates u points to the right and v downwards, and (0, 0) is the outer corner of the image's first
-texel. They were measured with the renderer of MuJoCo 4.0.0 (tests/sim/scene/test_textures.py compares with it).
+texel. These conventions were measured with the renderer of MuJoCo 4.0.0, with which tests/sim/scene/test_textures.py
+compares the results.
 """
 
 from __future__ import annotations
@@ -126,7 +127,9 @@ def strip(half_sides: np.ndarray) -> Triangles:
 
 
 def ellipsoid(semi_axes: np.ndarray) -> Triangles:
-    """Return an ellipsoid: u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere before scaling.
+    """Return an ellipsoid.
+
+    Its texture coordinates are u = azimuth / 2π and v = polar angle / π from +z, of the unit sphere before scaling.
 
     semi_axes: lengths of the semi-axes along x, y, z [m], (3,)
     """
@@ -134,7 +137,9 @@ def ellipsoid(semi_axes: np.ndarray) -> Triangles:
 
 
 def cylinder(radius: float, half_length: float) -> Triangles:
-    """Return a cylinder. Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2).
+    """Return a cylinder.
+
+    Texture coordinates are u = azimuth / 2π and v = (1 - z/h)/2 on the side, ((x/r + 1)/2, (y/r + 1)/2) on the ends.
 
     radius, half_length: radius r [m], and half of the length along z, h [m]
     """
@@ -175,9 +180,9 @@ def capsule(radius: float, half_length: float) -> Triangles:
 def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
     """Return a mesh asset with one vertex per corner of each face.
 
-    Vertices are not shared, because normals and texture coordinates have separate indices. As in MuJoCo's renderer, a
-    corner of a mesh without texture coordinates gets the normal of its face if its own normal deviates from it by more
-    than 37°.
+    Vertices are not shared, because normals and texture coordinates have separate indices. In a mesh without texture
+    coordinates, a corner gets the normal of its face if the two normals differ by more than 37°, as in MuJoCo's
+    renderer.
     """
     faces = slice(model.mesh_faceadr[mesh_id], model.mesh_faceadr[mesh_id] + model.mesh_facenum[mesh_id])
     vertices = model.mesh_vert[model.mesh_face[faces].ravel() + model.mesh_vertadr[mesh_id]].astype(float)
@@ -236,7 +241,7 @@ def _arc(start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
 def _revolved(radius: np.ndarray, height: np.ndarray, scale: np.ndarray, v: np.ndarray) -> Triangles:
     """Return the surface of revolution of the profile (radius, height), from top to bottom, scaled afterwards.
 
-    The vertices of the seam are doubled, since u is 0 on one side of it and 1 on the other.
+    The vertices of the seam are doubled, since the texture coordinate u is 0 on one side of it and 1 on the other.
 
     radius, height: profile of the unit shape, (n,)
     scale: factors along x, y, z [m], (3,)

@@ -16,7 +16,7 @@
     test        1.5    10     -10    -2     the same, for final results
 
 Terms and weights follow the text of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
-Evolution". The fitness is the sum of an evaluation episode's rewards, averaged over these episodes. In training, the
+Evolution". The fitness is the mean, over all evaluation episodes, of the sum of an episode's rewards. In training, the
 code published with the paper gives a metre of progress the same weight as an action in contact; rhabdom uses the
 weights of the text. Foraging is not in the paper and has the reward of detection. A training run may begin with a w_c
 closer to 0 (setting `learning.contact_ramp` of `evolve`). At the end of training, and in the fitness, the weights are
@@ -50,7 +50,7 @@ class RewardWeights:
 
     @cached_property
     def column(self) -> np.ndarray:
-        """Weights in the order of TERMS, (term, 1)."""
+        """Weights of progress, goal, adversary and contact, in this order, (term, 1)."""
         return np.array([[getattr(self, name)] for name in TERMS])
 
 
@@ -60,7 +60,7 @@ MODES = {"training": TRAINING, "evaluation": EVALUATION, "test": EVALUATION}
 
 
 def check_mode(mode: str) -> None:
-    """Check that a mode is one of MODES.
+    """Check that a mode is "training", "evaluation" or "test".
 
     Raises:
         ValueError: the mode is unknown.
@@ -71,7 +71,7 @@ def check_mode(mode: str) -> None:
 def reward_terms(
     weights: RewardWeights, progress: np.ndarray, goal: np.ndarray, adversary: np.ndarray, contact: np.ndarray
 ) -> np.ndarray:
-    """Return the terms of the reward in the order of TERMS, (term, n), from the progress [m] and the events.
+    """Return the terms of the reward, (term, n), from the progress [m] and the events, in the order of the arguments.
 
     progress, goal, adversary, contact: amounts by which the weights are multiplied, (n,)
     """

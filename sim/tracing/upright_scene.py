@@ -37,7 +37,7 @@ class UprightScene:
     walls: all walls and the floor
     lights: all lights
     spheres: all visible spheres
-    bodies: these spheres, followed by the eyes' own body if it is a sphere, which the eyes do not see
+    bodies: these spheres, followed by the body that carries the eyes, if it is a sphere. The eyes do not see this body
     heights: heights of all bodies' centres in the reference pose [m], (body,)
     settled: True for bodies that keep this height, (body,)
     model: the MuJoCo model
@@ -150,7 +150,10 @@ def _refuse_what_eyes_would_see(
 ) -> None:
     """Refuse eyes that would see their own body.
 
-    The body must be a sphere, and its eyes must lie on its surface and look straight away from its centre.
+    A body without visible geoms passes. Otherwise, it must be one sphere on the body's vertical axis. The eyes must lie
+    on or outside its surface, and look straight away from its centre.
+
+    own: ids of the body's visible geoms
 
     Raises:
         NoClosedForm: these conditions are not met.

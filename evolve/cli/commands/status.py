@@ -53,9 +53,9 @@ def _read(arguments: Namespace) -> dict[str, Any]:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print one line for each run in a directory, with the latest run last.
+    """Print one line (or JSON object) for each run in a directory, with the latest run last.
 
-    For a run that cannot be read, the line states the reason.
+    For a run that cannot be read, it states the reason.
     """
     # os.path.exists returns False for an unreadable folder, which cannot be a run of this user. pathlib would raise.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
@@ -104,9 +104,10 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
 
 
 def standing(run: Run) -> dict[str, Any]:
-    """Return the state of a run, its best candidate and its generations as JSON values.
+    """Return the state of a run, its best candidate and its generations as JSON values by name.
 
-    The state is "running" if a process holds the lock of the run, else "finished" or "interrupted".
+    Only "mishaps" is a list of `EpisodeFailure`, whose fields are JSON values. The state is "running" if a process
+    holds the lock of the run, else "finished" or "interrupted".
 
     Raises:
         OSError: the lock or config.toml cannot be read.

@@ -45,8 +45,8 @@ class Texture:
 class StripeTables:
     """Tables of all textures, one array per component.
 
-    rows: in fours, the second and the first integral up to each texel's centre, and the deviations of this texel and of
-        the next one from the texture's mean
+    rows: four numbers for each texel: the second and the first integral up to the texel's centre, and the deviations of
+        this texel and of the next one from the texture's mean
     means: the textures' means, for each texel
     """
 
@@ -145,7 +145,7 @@ class Stripes:
 
 
 def _least_side(largest: float) -> float:
-    """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most ROUNDING.
+    """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most 0.001.
 
     It is at least one texel, because textures are linear between texels. A mean is a sum of four values of the second
     integral, divided by the product of the sides. Each value is rounded twice: in the table, and after the polynomial
