@@ -45,7 +45,7 @@ class SineSamples:
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: sine along the other axis at which `slow_factor.axis_factor` evaluates the factor of an axis.
+    elsewhere: sine along the other axis at which `axis_kernel.AxisFactor` evaluates the factor of an axis.
     """
 
     edge: PupilEdge

@@ -10,9 +10,11 @@ import numpy as np
 
 from optics.apertures.aperture import SoftAperture
 from optics.elements.light_stack import LightStack
+from optics.methods.mirrored_matrix import mirroring_share
 from optics.methods.pupil_sampling import MOST_ACROSS
-from optics.methods.sine_stack import SineGeometry, SineStack, rim_sines
+from optics.methods.sine_stack import SineStack
 from optics.methods.window_edges import FINER, WindowEdges
+from optics.methods.window_geometry import WindowGeometry, window_geometry
 from optics.methods.window_rank import Derivatives, WindowRays, window_ranks
 from optics.numerics.grid import Grid
 
@@ -23,7 +25,7 @@ STEPS = 8  # choice: numbers of samples per octave; equal ones share arrays
 ELSEWHERE = 8  # choice: number of steps between 0 and the largest sine
 SHIFT = (math.sqrt(5) - 1) / 2  # choice: shift of the finer samples of the check in pitches, see `window_check`
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
-PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 4e-4, 1.5e-8, 3e-8, 1.5e-10
+PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 4e-4, 1.5e-8, 3e-8, 8.5e-11
 MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of the slow factor
 
 
@@ -42,15 +44,15 @@ class WindowPlan:
     derivatives: Derivatives | None = None
     smoothed: bool = False
 
-    @property
-    def half(self) -> float:
-        """Distance [m] from the middle of the window within which interpolation points lie."""
-        return max(self.window.own_half_width, self.window.dx)
+    @cached_property
+    def geometry(self) -> WindowGeometry:
+        """Light without reliefs and wavefronts, and the window."""
+        return window_geometry(self.stack, self.window)
 
     @cached_property
     def edges(self) -> WindowEdges:
         """Soft edges, and the densities of samples that they need."""
-        return WindowEdges(self.stack, self.window, self.half, self.tolerance, self.derivatives, self.smoothed)
+        return WindowEdges(self.stack, self.geometry, self.tolerance, self.derivatives, self.smoothed)
 
     @cached_property
     def counts(self) -> np.ndarray:
@@ -85,10 +87,10 @@ class WindowPlan:
 
     @cached_property
     def _rays(self) -> WindowRays:
-        return WindowRays.from_stack(self.stack, self.window)
+        return WindowRays.from_slopes(self.stack.slopes, self.geometry)
 
     @cached_property
-    def _elsewhere(self) -> np.ndarray:
+    def elsewhere(self) -> np.ndarray:
         """Sines for `SineGeometry`, in steps of a share of the largest sine, so that PSFs can share arrays, (beam,)."""
         step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
         return np.asarray(np.rint(self._rays.mean_sine / step) * step)
@@ -96,8 +98,8 @@ class WindowPlan:
     @cached_property
     def _ranks(self) -> tuple[np.ndarray, np.ndarray]:
         steepest = np.minimum(self._rims[1], 1 - 1e-9)  # finite points, also for pupils without a rank
-        geometry = SineGeometry(self.stack.distance, self.window.centre, steepest, self._elsewhere)
-        return window_ranks(self.stack, geometry, self._rays, self.window, self.tolerance, self.derivatives)
+        factor = self.geometry.ray_factor(self.stack.slopes.across, steepest, self.elsewhere)
+        return window_ranks(self.geometry, factor, self._rays, self.tolerance, self.derivatives)
 
     def samples(self, places: np.ndarray) -> tuple[SineStack, SineStack]:
         """Return the samples of some pupils, which have the same count, and the finer samples of the check.
@@ -111,7 +113,7 @@ class WindowPlan:
         found = []
         for many, shift, (half, steepest, _), edges in sets:
             at = (half[places] / (many - shift))[:, None] * (np.arange(-many, many + 1) + shift)
-            geometry = self.stack.distance[places], self.window.centre, steepest[places], self._elsewhere[places]
+            geometry = self.stack.distance[places], self.window.centre, steepest[places], self.elsewhere[places]
             own = tuple(edges[k] for k in places), self.stack.radius[places], self.edges.curvature[places]
             found.append(SineStack(*geometry, at, *own))
         return found[0], found[1]
@@ -131,6 +133,7 @@ class WindowPlan:
         across, (height, width) = 2 * self.counts + 1, self.window.shape
         inner = self.ranks * across
         products = (inner * inner * width + height * inner * width) * np.where(self.crossed, 2, 1)
+        products = products * mirroring_share(self.window, inner)
         samples = across**2 + (2 * self.finer_count(self.counts) + 1) ** 2
         entries = np.where(self.ranks == 1, 0, inner * inner)
         seconds = PER_PSF + samples * PER_SAMPLE + entries * PER_ENTRY + products * PER_PRODUCT
@@ -155,5 +158,4 @@ class WindowPlan:
         return self._sines(self.edges.finer_edges)
 
     def _sines(self, edges: list[SoftAperture]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        outermost = (1 + np.array([edge.reach for edge in edges])) * self.stack.radius
-        return rim_sines(outermost, self.window.centre, self.stack.distance)
+        return self.geometry.rims(np.array([edge.reach for edge in edges]))
