@@ -234,8 +234,8 @@ class Pupil:
         It is relative to the path through the centre without relief and wavefront.
         """
         total = source.path(x, y) * like(x, self.index_before(wavelength))
-        if (shorter := lens_path(self, x, y)) is not None:
-            total = total - shorter * like(x, self.index_behind(wavelength))
+        if self.thin_lens_focal_length is not None:
+            total = total - lens_path(self.thin_lens_focal_length, x, y) * like(x, self.index_behind(wavelength))
         if self.bends(wavelength):
             total = total + like(x, self.index_step(wavelength)) * relief_height(self, x, y)
         return total if (ahead := wavefront_ahead(self, x, y)) is None else total - ahead

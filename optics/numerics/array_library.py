@@ -8,6 +8,7 @@ passes a tensor has imported it.
 from __future__ import annotations
 
 import sys
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from optics.numerics.autodiff import Array, carries_derivative, is_differentiable, plain
 from optics.numerics.precision import padded_for_packets
 
-__all__ = ["fma", "gather", "indices", "library", "like", "matrix_like", "turned"]
+__all__ = ["fma", "gather", "indices", "library", "like", "matrix_like", "sparse_product", "turned"]
 
 
 def library(x: Array) -> Any:
@@ -82,6 +83,32 @@ def fma(a: Array, b: Array, c: Array) -> Array:
     """Return ab + c; Dr.Jit rounds it once."""
     own = library(a)
     return own.fma(a, b, c) if own.__name__ == "drjit" else a * b + c
+
+
+def sparse_product(matrix: Any, values: Array) -> Array:
+    """Return the product of a sparse matrix of SciPy and a vector of NumPy or PyTorch.
+
+    Derivatives of PyTorch are the product with the transposed matrix. Tensors must be on the processor.
+    """
+    own = library(values)
+    return matrix @ values if own is np else _sparse_operation(own).apply(values, matrix)
+
+
+@lru_cache(maxsize=1)
+def _sparse_operation(torch: Any) -> Any:
+    """Return `sparse_product` as an operation of PyTorch."""
+
+    class SparseProduct(torch.autograd.Function):
+        @staticmethod
+        def forward(ctx: Any, values: Array, matrix: Any) -> Array:
+            ctx.matrix = matrix
+            return torch.from_numpy(matrix @ values.detach().numpy())
+
+        @staticmethod
+        def backward(ctx: Any, *gradients: Array) -> tuple[Array, None]:
+            return torch.from_numpy(ctx.matrix.T @ gradients[0].numpy()), None
+
+    return SparseProduct
 
 
 def turned(size: Any, waves: Array, dtype: str) -> Array:

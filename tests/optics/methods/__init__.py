@@ -22,6 +22,7 @@ window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py
 pixelated_spectrum: elements/test_pixel_relief.py
 problem: point_spread/test_planner.py
+sampled_path: test_sampled_path.py
 row_blocks: test_row_blocks.py
 spectrum_sampling: test_row_blocks.py, test_even_pupils.py
 pupil_sampling: test_textbook.py, elements/test_pixel_relief.py
