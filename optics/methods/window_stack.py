@@ -80,11 +80,10 @@ class WindowStack:
 
     def _light(self, samples: SineSamples) -> Iterator[Array]:
         """Yield the light behind the pupil times the areas of the samples, (source, η, ξ), for each wavelength."""
-        pupil, (x, y, size) = self.pupil, samples.layout
+        pupil, (x, y, _) = self.pupil, samples.layout
         height, ahead = (found(pupil, samples, self.convert) for found in (sampled_height, sampled_wavefront))
         if pupil.mask is not None:
-            across, down = self.convert(x / pupil.radius), self.convert(y / pupil.radius)
-            size = self.convert(size) * pupil.amplitude(across, down)
+            amplitude = pupil.amplitude(self.convert(x / pupil.radius), self.convert(y / pupil.radius))
         for wavelength in self.wavelengths:
             light = self._straight(samples, wavelength)
             path = None if height is None else like(height, pupil.index_step(wavelength)) * height
@@ -92,10 +91,10 @@ class WindowStack:
                 path = -ahead if path is None else path - ahead
             if path is not None:
                 light = light * turned(1.0, path / wavelength, self.dtype)
-            yield light * like(light.real, size)
+            yield light if pupil.mask is None else light * like(light.real, amplitude)
 
     def _straight(self, samples: SineSamples, wavelength: float) -> Array:
-        """Return the waves behind the ideal lens, (source, η, ξ).
+        """Return the waves behind the ideal lens times the areas of the samples, (source, η, ξ).
 
         If no number of lens and sources carries a derivative, NumPy computes the waves.
         """
@@ -103,7 +102,7 @@ class WindowStack:
         indices = pupil.index_before(wavelength), pupil.index_behind(wavelength)
         lens = _LensLight(pupil.thin_lens_focal_length, self.sources, indices, wavelength, self.dtype)
         if lens.carries_derivatives:
-            return lens.waves(*map(self.convert, samples.points))
+            return lens.waves(*map(self.convert, samples.layout))
         return self.convert(_fixed_waves(lens.plain, samples))
 
     def _image(self, light: Array, sampling: WindowSampling, path: Path) -> Array:
@@ -143,17 +142,17 @@ class _LensLight:
         focal = None if self.focal_length is None else number(self.focal_length)
         return replace(self, focal_length=focal, sources=tuple(source.plain for source in self.sources))
 
-    def waves(self, x: Array, y: Array) -> Array:
-        """Return the waves at points (x, y) [m], (source, y, x)."""
+    def waves(self, x: Array, y: Array, size: Array) -> Array:
+        """Return the waves at points (x, y) [m], with amplitude `size`, (source, y, x)."""
         before, behind = self.indices
         found = library(x).stack([source.path(x, y) for source in self.sources]) * (before / self.wavelength)
         if self.focal_length is not None:
             found = found - lens_path(self.focal_length, x, y) * (behind / self.wavelength)
-        return turned(1.0, found, self.dtype)
+        return turned(size, found, self.dtype)
 
 
 @cached_arrays(MOST_BYTES, lambda waves: waves.nbytes)
 def _fixed_waves(lens: _LensLight, samples: SineSamples) -> np.ndarray:
-    """Return the waves behind a lens at samples. Pupils of a design often have the same lens and sources."""
-    found: np.ndarray = lens.waves(*samples.points)
+    """Return the waves behind a lens at samples, times their areas. Pupils often have the same lens and sources."""
+    found: np.ndarray = lens.waves(*samples.layout)
     return found
