@@ -25,6 +25,7 @@ pupil_path        parts of the optical path that do not depend on the wavelength
 pupil_slopes      slopes of the wavefront behind a pupil
 wavefront_slopes  directions of a wavefront's rays
 beam              light of one wavelength between source and sensor plane
+light_geometry    sources, lenses and media of several beams
 light_stack       light of several beams at once
 pupil_polynomials reliefs and wavefronts as sums of powers
 derivative_knots  cells in which derivatives with respect to samples of maps are polynomials

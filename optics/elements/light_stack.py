@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from optics.elements.beam import Beam
+from optics.elements.light_geometry import FEW, MANY, LightGeometry, disk_points, light_geometry
 from optics.elements.pupil_path import relief_height, wavefront_ahead
 from optics.elements.pupil_polynomials import power_sum, powers_of
 from optics.numerics.autodiff import number
@@ -21,17 +22,18 @@ __all__ = ["LightStack", "StackSlopes"]
 SPHERE_POINTS = (
     8  # choice: number of Chebyshev points across the pupil for spheres, in addition to those of polynomials
 )
-FEW, MANY = 21, 53  # choices: points across the pupil at which slopes are evaluated, without and with fine detail
 
 
 @dataclass(frozen=True, eq=False)
 class StackSlopes(ReadOnlyArrays):
     """Gradients of the optical paths behind several pupils, at the same points of their disks.
 
+    across: number of points across the pupils, see `disk_points`.
     x, y: points in units of the radius, (point,).
     along_x, along_y: gradients, (beam, point).
     """
 
+    across: int
     x: np.ndarray
     y: np.ndarray
     along_x: np.ndarray
@@ -63,23 +65,40 @@ class LightStack:
         return found
 
     @cached_property
-    def radius(self) -> np.ndarray:
-        """Radii of the pupils [m], (beam,)."""
-        return read_only(np.array([beam.pupil.radius for beam in self.beams]))
-
-    @cached_property
-    def distance(self) -> np.ndarray:
-        """Distances of the window behind the pupils [m], (beam,)."""
-        return read_only(np.array([number(beam.distance) for beam in self.beams]))
+    def geometry(self) -> LightGeometry:
+        """Sources, lenses and media."""
+        found = []
+        for beam, tilted, (behind, before, _) in zip(self.beams, self._tilted, self._indices, strict=True):
+            focal = beam.pupil.thin_lens_focal_length
+            lens = math.inf if focal is None else number(focal)
+            source = math.inf if tilted else beam.source.distance
+            radius, distance = beam.pupil.radius, number(beam.distance)
+            found.append((radius, distance, beam.wavelength, behind, before, lens, source))
+        return light_geometry(found)
 
     @property
-    def index(self) -> np.ndarray:
-        """Refractive indices behind the pupils, (beam,)."""
-        return self._indices[0]
+    def radius(self) -> np.ndarray:
+        """Radii of the pupils [m], (beam,)."""
+        return self.geometry.arrays[0]
+
+    @property
+    def distance(self) -> np.ndarray:
+        """Distances of the window behind the pupils [m], (beam,)."""
+        return self.geometry.arrays[1]
+
+    @property
+    def vacuum_wavelength(self) -> np.ndarray:
+        """Wavelengths in vacuum [m], (beam,)."""
+        return self.geometry.arrays[2]
+
+    @property
+    def wavelength(self) -> np.ndarray:
+        """Wavelengths in the media behind the pupils [m], (beam,)."""
+        return self.geometry.wavelength
 
     @cached_property
-    def _indices(self) -> np.ndarray:
-        """Refractive indices behind and before the pupils, and the steps of the reliefs, (3, beam).
+    def _indices(self) -> list[tuple[float, float, float]]:
+        """Refractive indices behind and before the pupils, and the steps of the reliefs, for each beam.
 
         Pupils of a population often have the same media, whose curves are then evaluated once.
         """
@@ -93,28 +112,7 @@ class LightStack:
                 step = number(pupil.index_step(wavelength))
                 values = known[media] = beam.index, pupil.index_before(wavelength), step
             found.append(values)
-        return read_only(np.array(found).reshape(-1, 3).T)
-
-    @cached_property
-    def vacuum_wavelength(self) -> np.ndarray:
-        """Wavelengths in vacuum [m], (beam,)."""
-        return read_only(np.array([beam.wavelength for beam in self.beams]))
-
-    @property
-    def wavelength(self) -> np.ndarray:
-        """Wavelengths in the media behind the pupils [m], (beam,)."""
-        found: np.ndarray = self.vacuum_wavelength / self.index
         return found
-
-    @cached_property
-    def _spheres(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Spherical waves: their indices (negative for waves that converge) and the distances of their centres [m]."""
-        focal = [beam.pupil.thin_lens_focal_length for beam in self.beams]
-        lenses = np.array([math.inf if f is None else number(f) for f in focal])
-        before = self._indices[1]
-        sources = np.array([math.inf if self._tilted[k] else b.source.distance for k, b in enumerate(self.beams)])
-        known = (-np.sign(lenses) * self.index, np.abs(lenses)), (before, sources)
-        return [(read_only(index), read_only(r)) for index, r in known if np.isfinite(r).any()]
 
     @cached_property
     def _tilted(self) -> list[bool]:
@@ -123,8 +121,10 @@ class LightStack:
     @cached_property
     def _polynomials(self) -> tuple[np.ndarray, list[int]]:
         """Coefficients of `powers_of` for each beam, and the beams whose reliefs or wavefronts are no polynomials."""
-        steps = self._indices[2].tolist()
-        known = [powers_of(beam.pupil, beam.wavelength, step) for beam, step in zip(self.beams, steps, strict=True)]
+        known = [
+            powers_of(beam.pupil, beam.wavelength, step)
+            for beam, (_, _, step) in zip(self.beams, self._indices, strict=True)
+        ]
         size = max([len(one) for one in known if one is not None], default=1)
         found = np.zeros((len(known), size, size))
         for place, one in enumerate(known):
@@ -150,30 +150,40 @@ class LightStack:
 
         x, y: points, (beam, y, x).
         """
-        per_radius, per_wave = (part[:, None, None] for part in (1 / self.radius, 1 / self.vacuum_wavelength))
+        per_radius = (1 / self.radius)[:, None, None]
         coefficients, others = self._polynomials
-        total = np.zeros((len(self.beams), *x.shape[1:]))
+        total = np.zeros((len(self.beams), *x.shape[1:])) + self.geometry.waves(x, y)
         if coefficients.any():
             total += power_sum(coefficients, x * per_radius, y * per_radius)
-        if self._spheres:
-            r2 = x * x + y * y
-        for index, distance in self._spheres:
-            centre = distance[:, None, None]
-            total += (index[:, None, None] * per_wave) * r2 / (np.sqrt(r2 + centre * centre) + centre)
         for place in range(len(self.beams)):
             if place in others or self._tilted[place]:
                 total[place] += self._other_path(place, x[place], y[place]) / self.vacuum_wavelength[place]
         return total
+
+    def powers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return y^i x^j at points in units of the radius, for `polynomial_waves`, (beam, i, j, point).
+
+        x, y: points [m], (beam, y, x).
+        """
+        steps, radius = np.arange(self._polynomials[0].shape[1]), self.radius[:, None]
+        across, down = (at.reshape(len(at), -1)[:, None] / radius[..., None] for at in (x, y))
+        found: np.ndarray = (down ** steps[:, None])[:, :, None] * (across ** steps[:, None])[:, None]
+        return found
+
+    def polynomial_waves(self, powers: np.ndarray) -> np.ndarray:
+        """Return the paths of polynomial reliefs and wavefronts, in waves, up to a constant, (beam, point)."""
+        coefficients = self._polynomials[0].reshape(len(self.beams), 1, -1)
+        return np.asarray((coefficients @ powers.reshape(len(powers), coefficients.shape[2], -1))[:, 0])
 
     def _other_path(self, place: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the part of the path [m] of one beam that is neither a polynomial nor a sphere about the axis."""
         beam, total = self.beams[place], np.zeros(np.broadcast_shapes(x.shape, y.shape))
         pupil = beam.pupil
         if self._tilted[place]:
-            total += self._indices[1][place] * beam.source.path(x, y)
+            total += self._indices[place][1] * beam.source.path(x, y)
         if place in self._polynomials[1]:
-            if pupil.height is not None and self._indices[2][place] != 0:
-                total += self._indices[2][place] * np.asarray(relief_height(pupil, x, y))
+            if pupil.height is not None and self._indices[place][2] != 0:
+                total += self._indices[place][2] * np.asarray(relief_height(pupil, x, y))
             if (ahead := wavefront_ahead(pupil, x, y)) is not None:
                 total -= ahead
         return total
@@ -192,17 +202,14 @@ class LightStack:
         coefficients, others = self._polynomials
         pieces = {place: self.beams[place].pupil.pieces(self.beams[place].wavelength) for place in others}
         across = MANY if any(4 * count > FEW for count in pieces.values()) else FEW
-        grid, x, y = _points(across)
+        grid, x, y = disk_points(across)
         by_x, by_y = _power_slopes(across, coefficients.shape[1])
         flat, scale = coefficients.reshape(len(coefficients), -1), (self.vacuum_wavelength / self.radius)[:, None]
-        along_x, along_y = flat @ by_x * scale, flat @ by_y * scale
-        r = np.hypot(x, y) * self.radius[:, None]
-        for index, distance in self._spheres:
-            outward = index[:, None] * self.radius[:, None] / np.hypot(r, distance[:, None])
-            along_x, along_y = along_x + outward * x, along_y + outward * y
-        inside = np.hypot(grid[None, :], grid[:, None]) <= 1
+        spheres_x, spheres_y = self.geometry.slopes(across)
+        along_x, along_y = flat @ by_x * scale + spheres_x, flat @ by_y * scale + spheres_y
         for place in range(len(self.beams)):
             if place in others or self._tilted[place]:
+                inside = np.hypot(grid[None, :], grid[:, None]) <= 1
                 radius = self.radius[place]
                 step = radius / (8 * max(pieces.get(place, 1), 4))
                 for along, (dx, dy) in ((along_x, (step, 0.0)), (along_y, (0.0, step))):
@@ -211,22 +218,13 @@ class LightStack:
                         for s in (1, -1)
                     )
                     along[place] += ((ahead - behind) / (2 * step))[inside]
-        return StackSlopes(x, y, along_x, along_y)
-
-
-@lru_cache(maxsize=4)
-def _points(across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return positions along an axis, and points (x, y) of the square grid inside the unit disk."""
-    grid = np.linspace(-1, 1, across)
-    x, y = np.meshgrid(grid, grid)
-    inside = np.hypot(x, y) <= 1
-    return read_only(grid), read_only(x[inside]), read_only(y[inside])
+        return StackSlopes(across, x, y, along_x, along_y)
 
 
 @lru_cache(maxsize=16)
 def _power_slopes(across: int, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives of y^i x^j by x and by y at the points of `_points`, (power of y · power of x, point)."""
-    _, x, y = _points(across)
+    """Return the derivatives of y^i x^j by x and by y at `disk_points`, (power of y · power of x, point)."""
+    _, x, y = disk_points(across)
     powers = np.arange(size)
     px, py = (at[None, :] ** powers[:, None] for at in (x, y))
     dx, dy = (powers[:, None] * np.roll(part, 1, axis=0) for part in (px, py))

@@ -43,14 +43,19 @@ def powers_of(pupil: Pupil, wavelength: float, step: float) -> np.ndarray | None
     if relief is not None:
         found = SPLINES.T @ plain(relief.control_points) @ SPLINES * (step / wavelength)
     if wavefront is not None:
-        size = max(len(found), wavefront.order + 1)
-        found = np.pad(found, (0, size - len(found)))
-        scale = 1.0 if wavefront.radius is None else pupil.radius / wavefront.radius
-        lengths = scale ** np.arange(size)
-        for (n, m), value in wavefront.modes.items():
-            if value != 0:
-                own = _mode_powers(n, m) * np.outer(lengths[: n + 1], lengths[: n + 1])
-                found[: n + 1, : n + 1] -= value * UM / wavelength * own
+        of_relief, size = found, max(len(found), wavefront.order + 1)
+        found = np.zeros((size, size))
+        found[: len(of_relief), : len(of_relief)] = of_relief
+        modes = {mode: value for mode, value in wavefront.modes.items() if value != 0}
+        if modes:
+            powers = _powers_of_modes(tuple(modes))
+            own = (np.array([*modes.values()]) * (UM / wavelength) @ powers.reshape(len(modes), -1)).reshape(
+                powers[0].shape
+            )
+            if wavefront.radius is not None:
+                lengths = (pupil.radius / wavefront.radius) ** np.arange(len(own))
+                own = own * lengths * lengths[:, None]
+            found[: len(own), : len(own)] -= own
     found[0, 0] = 0.0  # a constant phase does not affect the light, but would need digits
     return found
 
@@ -86,6 +91,16 @@ def _sum(a: np.ndarray | None, b: np.ndarray | None) -> np.ndarray | None:
     if a is None or b is None:
         return b if a is None else a
     return np.add(a, b, out=a)
+
+
+@lru_cache(maxsize=32)
+def _powers_of_modes(modes: tuple[tuple[int, int], ...]) -> np.ndarray:
+    """Return the coefficients of several Zernike polynomials, (mode, power of y, power of x)."""
+    size = max(n for n, _ in modes) + 1
+    found = np.zeros((len(modes), size, size))
+    for own, (n, m) in zip(found, modes, strict=True):
+        own[: n + 1, : n + 1] = _mode_powers(n, m)
+    return found
 
 
 @lru_cache(maxsize=(HIGHEST_ORDER + 1) * (HIGHEST_ORDER + 2) // 2)

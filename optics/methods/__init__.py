@@ -20,8 +20,11 @@ smooth_spectrum      the angular spectrum of steep pupils, from the light of `sm
 hankel               the angular spectrum of rotationally symmetric pupils, along one radius
 low_rank             one matrix product, with a Fourier kernel times a slow factor
 slow_factor          the slow factor of `low_rank`, and the points of the window that interpolate it
+axis_kernel          the diffraction kernel along one axis of the window
+remaining_factor     the slow factor, divided by its values along both axes
 window_sampling      `low_rank` at coarse tolerances, for one PSF
 window_plan          samples of several pupils that the light in a window needs, at coarse tolerances
+window_geometry      the part of these plans that does not depend on reliefs and wavefronts
 window_edges         soft edges and densities of these samples, smoothed waves of wide pupils without a lens
 window_rank          rank of the slow factor for the samples of `window_plan`
 window_images        PSFs of several pupils from the samples of `window_plan`

@@ -45,7 +45,7 @@ class SineSamples:
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: sine at which factors along the other axis are evaluated, see `slow_factor.axis_factor`.
+    elsewhere: sine at which factors along the other axis are evaluated, see `axis_kernel.AxisFactor`.
     """
 
     edge: PupilEdge

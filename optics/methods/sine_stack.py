@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -21,12 +20,14 @@ from optics.methods.diffraction_kernel import FAR, diffraction_kernel, near_fiel
 from optics.methods.sine_samples import MOST_SQUARE, MOST_STRETCH, RIM, SineSamples
 from optics.numerics.array_library import turned
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.kept_values import KeptValues
 from optics.numerics.precision import padded_for_packets, precision
 
 __all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines", "single_stack"]
 
 # Choices for tables of the transmittance against r²: number of values per cycle of the edge, and of smoothed waves.
 PER_CYCLE, SMOOTHED_LEVELS = 1000, 16384
+KEPT = 12  # choice, limited by memory: arrays that are kept for further PSFs with the same samples
 SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a few points
 
 
@@ -37,7 +38,7 @@ class SineGeometry:
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the outermost samples with light, (pupil,).
-    elsewhere: sines at which factors along the other axis are evaluated, see `slow_factor.axis_factor`, (pupil,).
+    elsewhere: sines at which factors along the other axis are evaluated, see `axis_kernel.AxisFactor`, (pupil,).
     """
 
     distance: np.ndarray
@@ -141,18 +142,16 @@ class SineStack(SineGeometry):
         return np.asarray(found)
 
     @cached_property
-    def known(self) -> dict[Any, Any]:
+    def known(self) -> KeptValues:
         """Arrays that do not depend on the light, for further PSFs with the same samples."""
-        return {}
+        return KeptValues(KEPT)
 
     def _sizes(self, dtype: str) -> np.ndarray:
         """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x).
 
         The transmittance of smoothed waves is complex.
         """
-        if dtype not in self.known:
-            self.known[dtype] = self._new_sizes(dtype)
-        return np.asarray(self.known[dtype])
+        return np.asarray(self.known.get(dtype, lambda: self._new_sizes(dtype)))
 
     def _new_sizes(self, dtype: str) -> np.ndarray:
         stretch = 1 / self._cosine2(dtype)
@@ -187,15 +186,26 @@ class SineStack(SineGeometry):
         count = stack.smooth_points
         if count is None or count >= self.at.shape[1] or not self.smooth(0.0):
             return self._paths(stack, *self.points)
-        side = self.at[:, [0, -1]]
-        nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
+
+        def computed() -> tuple[np.ndarray, np.ndarray]:
+            """Return the paths without reliefs and wavefronts at Chebyshev points, and powers of these points."""
+            side = self.at[:, [0, -1]]
+            nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
+            points = self.points_at(nodes[:, None, :], nodes[:, :, None])
+            return stack.geometry.waves(*points) + self._from(stack, *points), stack.powers(*points)
+
+        straight, powers = self.known.get(("paths", stack.geometry, count), computed)
+        paths = straight + stack.polynomial_waves(powers).reshape(-1, count, count)
         weight = even_weights(self.at.shape[1], count)
-        paths = self._paths(stack, *self.points_at(nodes[:, None, :], nodes[:, :, None]))
         return np.asarray(weight @ paths @ weight.T)
 
     def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the paths through points (x, y) [m], in waves up to a constant."""
-        return np.asarray(stack.waves(x, y) + self._to_middle(stack.wavelength[:, None, None], x, y)[1])
+        return np.asarray(stack.waves(x, y) + self._from(stack, x, y))
+
+    def _from(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the paths from points (x, y) [m] to the middle of the window, in waves up to a constant."""
+        return self._to_middle(stack.wavelength[:, None, None], x, y)[1]
 
     def _to_middle(self, wavelength: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the `diffraction_kernel` from points (x, y) [m] to the middle of the window."""
@@ -209,9 +219,7 @@ class SineStack(SineGeometry):
         wavelength: wavelength [m] in the medium, a number.
         """
         key = "to_middle", float(wavelength), dtype
-        if key not in self.known:
-            self.known[key] = turned(*self._to_middle(wavelength, *self.points), dtype)
-        return np.asarray(self.known[key])
+        return np.asarray(self.known.get(key, lambda: turned(*self._to_middle(wavelength, *self.points), dtype)))
 
 
 @lru_cache(maxsize=16)

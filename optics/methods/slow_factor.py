@@ -14,22 +14,19 @@ from optics.methods.diffraction_kernel import near_field
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples
 from optics.methods.sine_samples import SineSamples
-from optics.methods.sine_stack import SineGeometry, SineStack, even_weights
+from optics.methods.sine_stack import SineGeometry
 from optics.numerics.array_library import turned
-from optics.numerics.grid import Grid, sample_positions
+from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
 __all__ = [
     "RANKS",
     "Path",
-    "axis_factor",
-    "axis_kernel",
     "cross_term",
     "fourier_kernel",
-    "remaining_factor",
     "slow_factor",
+    "slow_parts",
     "uniform_rank",
-    "window_kernel",
 ]
 
 # Choice: ranks to try, in ascending order.
@@ -37,7 +34,6 @@ RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 # Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; see test_low_rank.py.
 RANK_RIPPLE = 0.4
 FEW_WAVES = 1000.0  # choice: number of waves of a path up to which float32 is sufficient
-SMOOTH = 12  # choice: number of sines, and of positions, from which smooth phases are interpolated
 TRIED = 41  # choice: number of test positions along a line through the window
 
 
@@ -55,6 +51,11 @@ class Path:
     @classmethod
     def from_problem(cls, problem: Problem) -> Path:
         return cls(problem.wavelength, problem.distance, problem.window)
+
+    @property
+    def key(self) -> tuple[bytes, bytes, Grid]:
+        """The same numbers in a form that can be hashed."""
+        return np.asarray(self.wavelength).tobytes(), np.asarray(self.distance).tobytes(), self.window
 
     def short(self, steepest: float | np.ndarray) -> bool:
         """Return whether paths differ by few enough waves for float32, for pupils with sines up to `steepest`."""
@@ -135,51 +136,10 @@ def slow_factor(
     window: points u (x, y) [m], relative to the window's centre.
     dtype: type in which the phase is rounded, "float32" or "float64".
     """
-    return np.asarray(turned(*_slow(path, pupil, directions, window), dtype))
+    return np.asarray(turned(*slow_parts(path, pupil, directions, window), dtype))
 
 
-def axis_factor(
-    path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
-) -> np.ndarray:
-    """Return the slow factor along x (0) or y (1), relative to its value at the middle of the window, complex.
-
-    Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
-    that kernel. Along the other axis, the sine is that of the centre plus `elsewhere`.
-
-    sines: sines along the axis, minus that of the pupil's centre.
-    places: positions [m] along the axis, relative to the middle of the window. They broadcast with the sines.
-    """
-    return np.asarray(turned(*_along(path, samples, axis, sines, places), "float64"))
-
-
-def remaining_factor(
-    path: Path,
-    samples: SineSamples | SineGeometry,
-    directions: tuple[np.ndarray, np.ndarray],
-    window: tuple[np.ndarray, np.ndarray],
-    dtype: str = "float64",
-) -> np.ndarray:
-    """Return the slow factor, relative to the middle of the window, divided by both axis factors.
-
-    It varies even more slowly over the window. Arguments: see `slow_factor`. With dtype="float32", short paths are
-    computed in float32, too.
-    """
-    none, points = np.zeros((1,) * directions[0].ndim), samples.points_at(*directions)
-    if dtype == "float32" and path.short(samples.steepest):
-        path = path.rounded(dtype)
-        points, directions, window = (_rounded(pair, dtype) for pair in (points, directions, window))
-        none = none.astype(dtype)
-    size, waves = _slow(path, points, directions, window)
-    middle = _slow(path, points, directions, (none, none))
-    size, waves = size / middle[0], waves - middle[1]
-    for axis in (0, 1):
-        along = _along(path, samples, axis, directions[axis], window[axis])
-        size /= along[0]
-        waves -= along[1]
-    return np.asarray(turned(size, waves, dtype))
-
-
-def _slow(
+def slow_parts(
     path: Path,
     pupil: tuple[np.ndarray, np.ndarray],
     directions: tuple[np.ndarray, np.ndarray],
@@ -201,26 +161,6 @@ def _slow(
     return z * z / distance2 * size, excess
 
 
-def _rounded(pair: tuple[np.ndarray, np.ndarray], dtype: str) -> tuple[np.ndarray, np.ndarray]:
-    return pair[0].astype(dtype), pair[1].astype(dtype)
-
-
-def _along(
-    path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return amplitude and phase [waves] of `axis_factor`."""
-    none, elsewhere = np.zeros((1,) * max(sines.ndim, places.ndim), places.dtype), samples.elsewhere
-    other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
-    other = other.astype(places.dtype)
-    directions, window = ((sines, other), (places, none)) if axis == 0 else ((other, sines), (none, places))
-    points = _rounded(samples.points_at(*directions), str(places.dtype))
-    size, waves = _slow(path, points, directions, window)
-    middle = _slow(path, points, directions, (none, none))
-    size /= middle[0]
-    waves -= middle[1]
-    return size, waves
-
-
 def cross_term(
     path: Path,
     samples: SineGeometry,
@@ -238,43 +178,6 @@ def cross_term(
     wavelength, z = path.numbers(s.ndim)
     cosine = np.sqrt(np.maximum(1 - 2 * np.square(samples.elsewhere), 0)).reshape(-1, *[1] * (s.ndim - 1))
     return u * s * (cosine * (-2j * np.pi) / (wavelength * z)), v * t
-
-
-def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, dtype: str) -> np.ndarray:
-    """Return the Fourier kernel times `axis_factor`, (stack, place, sample), complex.
-
-    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window.
-
-    places: positions [m] along the axis, relative to the middle of the window, (stack, place).
-    dtype: "float32" or "float64".
-    """
-    return np.asarray(turned(*_whole(path, samples, axis, samples.at, places), dtype))
-
-
-def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
-    """Return `axis_kernel` for all columns (0) or rows (1) of the window, (stack, place, sample).
-
-    The phase is smooth, and is interpolated from a few sines and positions.
-    """
-    at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
-    if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
-        return axis_kernel(path, samples, axis, place[None, :], dtype)
-    nodes = chebyshev_points(SMOOTH)
-    sides = [part[:, [0, -1]] for part in (at, place[None, :])]
-    sines, few = (side.mean(axis=1)[:, None] + np.diff(side) / 2 * nodes for side in sides)
-    to_sines, to_places = (even_weights(count, SMOOTH) for count in (at.shape[1], len(place)))
-    size, waves = (to_places @ part @ to_sines.T for part in _whole(path, samples, axis, sines, few))
-    return np.asarray(turned(size, waves, dtype))
-
-
-def _whole(
-    path: Path, samples: SineStack, axis: int, sines: np.ndarray, places: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return amplitude and phase [waves] of `axis_kernel`, (stack, place, sine)."""
-    sines, places = sines[:, None, :], places[:, :, None]
-    size, waves = _along(path, samples, axis, sines, places)
-    wavelength, _ = path.numbers(3)
-    return size, waves - places * sines / wavelength
 
 
 def fourier_kernel(

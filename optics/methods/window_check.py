@@ -10,14 +10,19 @@ trust. The error of the sum itself is at most half of the error that it finds.
 from __future__ import annotations
 
 from bisect import bisect
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from optics.methods.axis_kernel import AxisRows, axis_factor
 from optics.methods.diffraction_kernel import diffraction_kernel
+from optics.methods.remaining_factor import RemainingFactor
 from optics.methods.sine_stack import SineStack
-from optics.methods.slow_factor import Path, axis_factor, axis_kernel, remaining_factor
+from optics.methods.slow_factor import Path
 from optics.methods.window_sums import intensity_of
 from optics.numerics.array_library import turned
+from optics.numerics.grid import sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
 __all__ = ["window_errors"]
@@ -43,11 +48,12 @@ def window_errors(
     images: |U|² over the window, (stack, y, x).
     tolerance: tolerance of the PSFs.
     """
-    window = path.window
+    dtype = str(field.real.dtype)
+    key = "check", path.key, dtype, float(tolerance)
+    check: _CheckSums = samples.known.get(key, lambda: _CheckSums(samples, path, dtype, INTERPOLATED * tolerance))
     total = np.square(images, dtype=np.float64).sum((1, 2))
     rows, columns, chance = _drawn(np.where((total > 0)[:, None, None], images, 1))
-    u, v = ((at - n // 2) * window.dx for at, n in zip((columns, rows), window.shape[::-1], strict=True))
-    exact, apart = _at_points(samples, path, field, (u, v), tolerance)
+    exact = check.intensity(field, rows, columns)
     drawn = images[np.arange(len(images))[:, None, None], rows[:, :, None], columns[:, None, :]]
     squared = np.mean(np.square(drawn - exact) / chance, (1, 2))
     # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the darker of the two
@@ -55,70 +61,127 @@ def window_errors(
     total = np.where(total > 0, np.where(squared > 0.01 * total, bright, total), np.nan)
     rounding = float(np.finfo(field.real.dtype).eps)
     # Below the goal of the interpolation, the difference may be its own error, which both sums do not share.
-    unlike = np.where(apart > INTERPOLATED * tolerance, apart, 0)
+    unlike = np.where(check.apart > INTERPOLATED * tolerance, check.apart, 0)
     return np.asarray(CAUTION * (np.sqrt(squared / total) + unlike) + UNSEEN * tolerance + rounding)
 
 
-def _at_points(
-    samples: SineStack, path: Path, field: np.ndarray, place: tuple[np.ndarray, np.ndarray], tolerance: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return |U|² in columns u and rows v [m], relative to the middle of the window, (stack, v, u).
-
-    The second result is the largest difference between the slow factor and the diffraction kernel, (stack,).
+@dataclass(frozen=True, eq=False)
+class _CheckSums:
+    """Sums over samples of pupils in rows and columns of a window. Parts that do not depend on the light are kept.
 
     The slow factor, divided by its values A along both axes, is interpolated from a few points (ξ_a, η_b) of the pupil
     with weights L_a and L_b:
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v) Σ_ηξ L_b A_v e^{-ik v t} P L_a A_u e^{-ik u s}.
+
+    dtype: type of real and imaginary parts, "float32" or "float64".
+    most: error of the interpolation at which the search for the number of points ends.
     """
-    (u, v), dtype = place, str(field.real.dtype)
-    nodes, ratio, apart = _ratios(samples, path, place, dtype, INTERPOLATED * tolerance)
-    # The nodes and the samples of all pupils are alike, apart from their scale.
-    weight = lagrange_basis(samples.at[0], nodes[0]).astype(dtype)
-    across, down = (_interpolated_kernel(path, samples, axis, part, weight) for axis, part in enumerate((u, v)))
-    sums = down @ field @ across.swapaxes(1, 2)
-    split = sums.reshape(len(v), v.shape[1], len(weight), u.shape[1], len(weight))
-    return intensity_of(np.einsum("nbavu,nvbua->nvu", ratio, split)), apart
 
+    samples: SineStack
+    path: Path
+    dtype: str
+    most: float
 
-def _interpolated_kernel(
-    path: Path, samples: SineStack, axis: int, place: np.ndarray, weight: np.ndarray
-) -> np.ndarray:
-    """Return L_a A e^{-ik u s}, (stack, place · a, sine)."""
-    kernel = axis_kernel(path, samples, axis, place, str(weight.dtype))
-    return np.asarray((kernel[:, :, None, :] * weight).reshape(len(place), -1, weight.shape[1]))
+    def intensity(self, field: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Return |U|² at crossings of rows (stack, row) and columns (stack, column), (stack, row, column).
 
+        field: contribution of each sample to the middle of the window, (stack, y, x).
+        """
+        count = len(self._weight)
+        across, down = (
+            (kernel[:, :, None, :] * self._weight).reshape(len(rows), -1, kernel.shape[2])
+            for kernel in self._rows(columns, rows)
+        )
+        sums = down @ field @ across.swapaxes(1, 2)
+        split = sums.reshape(len(rows), rows.shape[1], count, columns.shape[1], count)
+        found: np.ndarray = intensity_of(np.einsum("nbavu,nvbua->nvu", self._ratio(rows, columns), split))
+        return found
 
-def _ratios(
-    samples: SineStack, path: Path, place: tuple[np.ndarray, np.ndarray], dtype: str, most: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return interpolation points in sines, (pupil, a), the factor there, (stack, b, a, v, u), and its error, (stack,).
+    @property
+    def apart(self) -> np.ndarray:
+        """Largest difference between slow factor and diffraction kernel, in the corners of the window, (stack,)."""
+        return self._interpolation[1]
 
-    The factor is the slow factor relative to the middle of the window, divided by its values along both axes. Its
-    interpolation is compared with the factor in the middle and at the rim of the pupil, for the outermost columns and
-    rows of each window. The search starts with a number of points that is usually sufficient for the phase there.
+    @cached_property
+    def _interpolation(self) -> tuple[np.ndarray, np.ndarray, RemainingFactor]:
+        """Interpolation points in sines, (pupil, a), their error, (stack,), and the factor at pairs of points.
 
-    most: error at which the search ends.
-    """
-    (u, v), (left, top) = place, ([0, -1, 0, -1], [0, 0, -1, -1])  # corners, since rows and columns ascend
-    angle, radius = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None] * np.array([0, *[1] * 12])
-    rim = samples.directions(radius * np.cos([0, *angle]), radius * np.sin([0, *angle]))
-    corners = u[:, left, None], v[:, top, None]
-    exact = _remaining(path, samples, (rim[0][:, None], rim[1][:, None]), corners)
-    phase = float(np.abs(np.angle(exact)).max())
-    side = samples.at[:, [0, -1]]
-    middle, half = side.mean(axis=1)[:, None], np.diff(side) / 2
-    for order in ORDERS[bisect(PHASES, phase) :]:
-        nodes = middle + half * chebyshev_points(order)
-        own = np.broadcast_to(nodes[:, None, :], (len(nodes), order, order))
-        weight = [lagrange_basis((part - middle) / half, chebyshev_points(order)) for part in rim]
-        directions = own[..., None, None], own.swapaxes(1, 2)[..., None, None]
-        found = remaining_factor(path, samples, directions, (u[:, None, None, None], v[:, None, None, :, None]), dtype)
-        outer = np.einsum("nbac,bnk,ank->nck", found[..., top, left], weight[1], weight[0])
-        apart = np.abs(outer - exact).max(axis=(1, 2))
-        if apart.max() < most:
-            break
-    return nodes, found, apart
+        The interpolation is compared with the kernel in the middle and at the rim of the pupil. The search starts with
+        a number of points that is usually sufficient for the phase there.
+        """
+        samples, (left, top) = self.samples, ([0, 1, 0, 1], [0, 0, 1, 1])
+        angle, radius = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None] * np.array([0, *[1] * 12])
+        rim = samples.directions(radius * np.cos([0, *angle]), radius * np.sin([0, *angle]))
+        u, v = (at[[0, -1]] for at in self._places)
+        corners = u[None, left, None], v[None, top, None]
+        exact = _remaining(self.path, samples, (rim[0][:, None], rim[1][:, None]), corners)
+        phase = float(np.abs(np.angle(exact)).max())
+        side = samples.at[:, [0, -1]]
+        middle, half = side.mean(axis=1)[:, None], np.diff(side) / 2
+        for order in ORDERS[bisect(PHASES, phase) :]:
+            nodes = middle + half * chebyshev_points(order)
+            weight = [lagrange_basis((part - middle) / half, chebyshev_points(order)) for part in rim]
+            directions = nodes[:, None, :, None, None], nodes[:, :, None, None, None]
+            factor = RemainingFactor(self.path, samples, directions, self.dtype)
+            found = factor.at((u[None, None, None, None, :], v[None, None, None, :, None]))
+            outer = np.einsum("nbac,bnk,ank->nck", found[..., top, left], weight[1], weight[0])
+            apart = np.abs(outer - exact).max(axis=(1, 2))
+            if apart.max() < self.most:
+                break
+        return nodes, apart, factor
+
+    @cached_property
+    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions of all columns and rows [m], relative to the middle of the window."""
+        height, width = self.path.window.shape
+        return sample_positions(width, self.path.window.dx), sample_positions(height, self.path.window.dx)
+
+    @cached_property
+    def _weight(self) -> np.ndarray:
+        """Weights L_a of the interpolation points at the samples, (a, sample).
+
+        The points and the samples of all pupils are alike, apart from their scale.
+        """
+        return lagrange_basis(self.samples.at[0], self._interpolation[0][0]).astype(self.dtype)
+
+    def _rows(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the kernels A e^{-ik u s} for columns and rows of the window, (stack, place, sample)."""
+        across, down = self._kernels
+        if across is not down:
+            return across.at(columns), down.at(rows)
+        both = across.at(np.concatenate([columns, rows], axis=1))
+        return both[:, : columns.shape[1]], both[:, columns.shape[1] :]
+
+    @cached_property
+    def _kernels(self) -> tuple[AxisRows, AxisRows]:
+        """Kernels along x and y, which are the same if the window is square and lies on a diagonal."""
+        (height, width), (x, y) = self.path.window.shape, self.path.window.centre
+        across = AxisRows(self.path, self.samples, 0, self.dtype)
+        same = height == width and x == y
+        return across, across if same else AxisRows(self.path, self.samples, 1, self.dtype)
+
+    @cached_property
+    def _along(self) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes and phases [waves] of the factors along x and y in all columns and rows, for a single pupil.
+
+        The shapes are (part, 1, a, 1, column) and (part, b, 1, 1, row).
+        """
+        factor, (u, v) = self._interpolation[2], self._places
+        across = factor.along[0].at(factor.rounded(u[None, None, None, None, :]))
+        down = factor.along[1].at(factor.rounded(v[None, None, None, :, None]))
+        return np.stack(across)[:, 0], np.stack(down)[:, 0].swapaxes(-1, -2)
+
+    def _ratio(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Return the factor G between the interpolation points and crossings of the window, (stack, b, a, v, u)."""
+        factor, (x, y) = self._interpolation[2], self._places
+        u, v = factor.rounded(x[columns][:, None, None, None, :]), factor.rounded(y[rows][:, None, None, :, None])
+        if len(self.samples.at) > 1:
+            return factor.at((u, v))
+        across, down = (
+            np.moveaxis(part[..., at], -2, 1) for part, at in zip(self._along, (columns, rows), strict=True)
+        )
+        return factor.divided((u, v), [across, down.swapaxes(-1, -2)])
 
 
 def _remaining(

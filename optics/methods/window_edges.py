@@ -12,8 +12,9 @@ directions of the rays at the edge.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
@@ -22,8 +23,8 @@ from optics.apertures.circular import Annulus, Circle
 from optics.apertures.soft_edge import SoftEdge
 from optics.elements.light_stack import LightStack
 from optics.elements.wavefront import Zernike
+from optics.methods.window_geometry import WindowGeometry
 from optics.methods.window_rank import Derivatives
-from optics.numerics.grid import Grid
 
 __all__ = ["FINER", "WindowEdges"]
 
@@ -39,9 +40,7 @@ NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
 # Choices: the same spread for light behind maps, whose fine detail diffracts light away from its rays. Cycles at a
 # tolerance of 0.01, the same relative to those of the rays at the edge, and exponent of the tolerance.
 MAPPED_CYCLES, MAPPED_RIM_CYCLES, MAPPED_EXPONENT = 4.0, 3.0, -0.4
-# Choices: distance from the axis [radii] beyond which rays count as rays of the edge, and cycles of most of these rays,
-# relative to their median.
-RIM, RIM_CYCLES = 0.85, 1.2
+RIM_CYCLES = 1.2  # choice: cycles of most of the rays of the edge, relative to their median
 # Choices for PSFs that carry derivatives, to which points near the edge contribute as much as others. The soft edge is
 # then narrow: ripples as above, passband relative to the stopband; cycles per radius at a tolerance of 0.01, the same
 # relative to those of the rays at the edge, exponent of the tolerance, and cycles per cell between knots.
@@ -60,15 +59,13 @@ FINER = 2.0 ** (1 / 3)  # choice: density of the finer samples of the check, rel
 class WindowEdges:
     """Soft edges of several pupils for one window.
 
-    half: distance [m] from the middle of the window within which interpolation points lie.
     tolerance: tolerances of the PSFs, (beam,).
     derivatives: needs of derivatives; None if none are requested.
     smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
     """
 
     stack: LightStack
-    window: Grid
-    half: float
+    geometry: WindowGeometry
     tolerance: np.ndarray
     derivatives: Derivatives | None = None
     smoothed: bool = False
@@ -86,28 +83,32 @@ class WindowEdges:
     @cached_property
     def edges(self) -> list[SoftAperture]:
         """Soft apertures of the samples, (beam,)."""
-        narrow = self._narrow(self.density, CARRIED_RIPPLES[0])
-        if self.derivatives is not None:
-            return narrow
-        return self._unless_mapped(self._wide(self._choice[1].passband, self._ripples(self.curvature)[0]), narrow)
+        wide = partial(self._wide, self._choice[1].passband, self._ripples(self.curvature)[0])
+        return self._unless_mapped(wide, partial(self._narrow, self.density, CARRIED_RIPPLES[0]))
 
     @cached_property
     def finer_edges(self) -> list[SoftAperture]:
         """Soft apertures that are as sharp as the finer samples allow, (beam,)."""
-        narrow = self._narrow(FINER * self.density, CARRIED_RIPPLES[1])
-        if self.derivatives is not None:
-            return narrow
-        bands = self._choice[1]
-        passband = np.maximum(
-            FINER * self.density - bands.around - _transitions(self._ripples(self.curvature)[1]), bands.passband
-        )
-        wide = self._wide(np.minimum(passband, SHARPER * bands.passband), self._ripples(self.curvature)[1])
-        return self._unless_mapped(wide, narrow)
+        return self._unless_mapped(self._finer_wide, partial(self._narrow, FINER * self.density, CARRIED_RIPPLES[1]))
 
-    def _unless_mapped(self, wide: list[SoftAperture], narrow: list[SoftAperture]) -> list[SoftAperture]:
-        """Return wide soft edges, and narrow ones for maps: their fine detail sends light from the edge anywhere."""
-        choices = zip(self.stack.mapped.tolist(), narrow, wide, strict=True)
-        return [one if mapped else other for mapped, one, other in choices]
+    def _finer_wide(self) -> list[SoftAperture]:
+        bands, ripple = self._choice[1], self._ripples(self.curvature)[1]
+        passband = np.maximum(FINER * self.density - bands.around - _transitions(ripple), bands.passband)
+        return self._wide(np.minimum(passband, SHARPER * bands.passband), ripple)
+
+    def _unless_mapped(
+        self, wide: Callable[[], list[SoftAperture]], narrow: Callable[[], list[SoftAperture]]
+    ) -> list[SoftAperture]:
+        """Return wide soft edges, and narrow ones for derivatives and for maps.
+
+        The fine detail of maps sends light from the edge anywhere.
+        """
+        mapped = self.stack.mapped
+        if self.derivatives is not None or mapped.all():
+            return narrow()
+        if not mapped.any():
+            return wide()
+        return [one if is_map else other for is_map, one, other in zip(mapped.tolist(), narrow(), wide(), strict=True)]
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, _Bands]:
@@ -134,29 +135,37 @@ class WindowEdges:
         """Mean cycles per radius of the rays at the rim, away from the axis, in steps, (beam,)."""
         slopes, (along_x, along_y) = self.stack.slopes, self._to_middle
         r2 = np.square(slopes.x) + np.square(slopes.y)
-        rim = r2 > RIM**2
+        rim = self.geometry.to_middle(slopes.across).rim
         outward = ((along_x * slopes.x + along_y * slopes.y)[:, rim] / r2[rim]).mean(axis=1)
         return np.asarray(np.rint(outward / CURVATURE_STEP) * CURVATURE_STEP)
 
     def _bands(self, curvature: np.ndarray) -> _Bands:
         """Return the bands of waves that are smoothed with these curvatures, (beam,)."""
-        slopes, bend, cycles = self.stack.slopes, curvature[:, None], self._window_cycles
-        rest = [np.abs(part - bend * at) for part, at in zip(self._to_middle, (slopes.x, slopes.y), strict=True)]
-        along, r = np.maximum(*np.abs(self._to_middle)), np.hypot(slopes.x, slopes.y)
-        rim = np.median(np.maximum(*rest)[:, r > RIM], axis=1)
+        slopes, bend, cycles, mapped = self.stack.slopes, curvature[:, None], self.geometry.cycles, self.stack.mapped
+        along, curved = self._along, bool(curvature.any())
+        rest, rim = along, self.geometry.to_middle(slopes.across).rim
+        if curved:
+            off = [np.abs(part - bend * at) for part, at in zip(self._to_middle, (slopes.x, slopes.y), strict=True)]
+            rest = np.maximum(*off)
+        at_rim = _medians(rest[:, rim])
         if self.derivatives is not None:
-            return self._carried(rim, cycles + self._reach(along))
+            return self._carried(at_rim, cycles + self._reach(along))
         # Light from the edge matters near the middle of the window, and other light in the whole window.
-        near = np.where(curvature != 0, cycles, np.minimum(cycles, NEAR_CYCLES)) + RIM_CYCLES * rim
+        near = np.where(curvature != 0, cycles, np.minimum(cycles, NEAR_CYCLES)) + RIM_CYCLES * at_rim
         passband = near + EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
-        seen = np.where(along <= (cycles + SPREAD_CYCLES)[:, None], np.abs(bend) * r, 0).max(axis=1)
-        passband = np.maximum(passband, seen)
+        if curved:
+            bent = np.abs(bend) * np.hypot(slopes.x, slopes.y)
+            passband = np.maximum(passband, np.where(along <= (cycles + SPREAD_CYCLES)[:, None], bent, 0).max(axis=1))
         stopband = passband + _transitions(self._ripples(curvature)[0])
-        reach = self._reach(np.where(np.abs(bend) * r > stopband[:, None], 0, along))
-        detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * np.median(along[:, r > RIM], axis=1)
-        spread = np.where(self.stack.mapped, detail * (self.tolerance / 0.01) ** MAPPED_EXPONENT, SPREAD_CYCLES)
+        reach = self._reach(np.where(bent > stopband[:, None], 0, along) if curved else along)
+        spread: np.ndarray | float = SPREAD_CYCLES
+        if mapped.any():
+            detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * _medians(along[:, rim])
+            spread = np.where(mapped, detail * (self.tolerance / 0.01) ** MAPPED_EXPONENT, SPREAD_CYCLES)
         density = self._masks + np.maximum(cycles + reach + spread, near + stopband)
-        return _Bands(np.maximum(density, np.where(self.stack.mapped, self._widest, 0)), passband, near)
+        if mapped.any():
+            density = np.maximum(density, np.where(mapped, self._widest, 0))
+        return _Bands(density, passband, near)
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> _Bands:
         """Return the bands of light that carries derivatives.
@@ -178,7 +187,7 @@ class WindowEdges:
     def _widest(self) -> np.ndarray:
         """Cycles per radius with which the narrow edges of the check do not extend beyond EDGE_REACH, (beam,)."""
         widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
-        return np.asarray(widest + self._window_cycles / 2)
+        return np.asarray(widest + self.geometry.cycles / 2)
 
     @cached_property
     def _masks(self) -> np.ndarray:
@@ -195,25 +204,21 @@ class WindowEdges:
         """
         share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
         last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
-        ordered = np.partition(along, np.unique(last), axis=1)
-        return np.asarray(np.take_along_axis(ordered, last[:, None], axis=1)[:, 0])
+        ordered = np.partition(along, sorted({*last.tolist()}), axis=1)
+        found: np.ndarray = ordered[np.arange(len(last)), last]
+        return found
 
     @cached_property
-    def _window_cycles(self) -> np.ndarray:
-        """Cycles per radius of the Fourier kernel at the sides of the window."""
-        stack = self.stack
-        found: np.ndarray = self.half * stack.radius / (stack.wavelength * stack.distance)
-        return found
+    def _along(self) -> np.ndarray:
+        """Cycles per radius of the paths to the middle of the window, the larger of both axes, (beam, ray)."""
+        return np.asarray(np.maximum(*map(np.abs, self._to_middle)))
 
     @cached_property
     def _to_middle(self) -> tuple[np.ndarray, np.ndarray]:
         """Cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
-        stack, slopes, window = self.stack, self.stack.slopes, self.window
-        radius, index, distance = (part[:, None] for part in (stack.radius, stack.index, stack.distance))
-        x, y = radius * slopes.x - window.centre[0], radius * slopes.y - window.centre[1]
-        scale = index / np.sqrt(x * x + y * y + distance * distance)
-        cycles = (stack.radius / stack.vacuum_wavelength)[:, None]
-        return (slopes.along_x + x * scale) * cycles, (slopes.along_y + y * scale) * cycles
+        slopes = self.stack.slopes
+        path = self.geometry.to_middle(slopes.across)
+        return (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
 
     def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ripples of the soft edges of the samples and of the finer samples, which fall in steps, (beam,)."""
@@ -228,7 +233,7 @@ class WindowEdges:
 
     def _narrow(self, density: np.ndarray, ripple: float) -> list[SoftAperture]:
         """Return soft apertures that are as narrow as a density of samples allows."""
-        stopband = np.maximum(density - self._window_cycles / 2, density / 2)
+        stopband = np.maximum(density - self.geometry.cycles / 2, density / 2)
         stopband = 2.0 ** (np.floor(EDGES * np.log2(stopband)) / EDGES)
         return self._soft(CARRIED_PASSBAND * stopband, stopband, np.full(len(stopband), ripple))
 
@@ -255,6 +260,14 @@ class _Bands:
         """Return these bands for chosen beams, and others for all other beams."""
         pairs = (self.density, other.density), (self.passband, other.passband), (self.around, other.around)
         return _Bands(*(np.where(chosen, own, their) for own, their in pairs))
+
+
+def _medians(values: np.ndarray) -> np.ndarray:
+    """Return the medians of rows; `np.median` takes several times as long."""
+    last = values.shape[1] // 2
+    first = (values.shape[1] - 1) // 2
+    ordered = np.partition(values, sorted({first, last}), axis=1)
+    return np.asarray((ordered[:, first] + ordered[:, last]) / 2)
 
 
 def _transitions(ripples: np.ndarray) -> np.ndarray:

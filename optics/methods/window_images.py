@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from optics.elements.light_stack import LightStack
+from optics.methods.axis_kernel import window_kernel
+from optics.methods.remaining_factor import RemainingFactor
 from optics.methods.sine_stack import SineStack
-from optics.methods.slow_factor import Path, cross_term, remaining_factor, window_kernel
+from optics.methods.slow_factor import Path, cross_term
 from optics.methods.window_check import window_errors
 from optics.methods.window_sums import intensity_of, window_field
 from optics.numerics.grid import Grid, sample_positions
@@ -52,12 +54,14 @@ def window_image_errors(
 
 def _fourier(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str) -> tuple[np.ndarray, np.ndarray]:
     """Return `_along` for rows and columns. Further PSFs with the same samples share them."""
-    window, key = path.window, ("fourier", path.window, len(nodes), np.asarray(path.wavelength).tobytes(), dtype)
-    if key not in samples.known:
+    window = path.window
+
+    def both() -> tuple[np.ndarray, np.ndarray]:
         down = _along(path, samples, 1, nodes, dtype)
         same = window.shape[0] == window.shape[1] and window.centre[0] == window.centre[1]
-        samples.known[key] = down, down if same else _along(path, samples, 0, nodes, dtype)
-    found: tuple[np.ndarray, np.ndarray] = samples.known[key]
+        return down, down if same else _along(path, samples, 0, nodes, dtype)
+
+    found: tuple[np.ndarray, np.ndarray] = samples.known.get(("fourier", path.key, len(nodes), dtype), both)
     return found
 
 
@@ -79,4 +83,4 @@ def _node_factors(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str)
     """
     s, t = samples.at[:, None, None, None, :], samples.at[:, None, None, :, None]
     u, v = nodes[None, None, :, None, None], nodes[None, :, None, None, None]
-    return remaining_factor(path, samples, (s, t), (u, v), dtype)
+    return RemainingFactor(path, samples, (s, t), dtype).at((u, v))

@@ -11,8 +11,9 @@ import numpy as np
 from optics.apertures.aperture import SoftAperture
 from optics.elements.light_stack import LightStack
 from optics.methods.pupil_sampling import MOST_ACROSS
-from optics.methods.sine_stack import SineGeometry, SineStack, rim_sines
+from optics.methods.sine_stack import SineStack
 from optics.methods.window_edges import FINER, WindowEdges
+from optics.methods.window_geometry import WindowGeometry, window_geometry
 from optics.methods.window_rank import Derivatives, WindowRays, window_ranks
 from optics.numerics.grid import Grid
 
@@ -42,15 +43,15 @@ class WindowPlan:
     derivatives: Derivatives | None = None
     smoothed: bool = False
 
-    @property
-    def half(self) -> float:
-        """Distance [m] from the middle of the window within which interpolation points lie."""
-        return max(self.window.own_half_width, self.window.dx)
+    @cached_property
+    def geometry(self) -> WindowGeometry:
+        """Light without reliefs and wavefronts, and the window."""
+        return window_geometry(self.stack, self.window)
 
     @cached_property
     def edges(self) -> WindowEdges:
         """Soft edges, and the densities of samples that they need."""
-        return WindowEdges(self.stack, self.window, self.half, self.tolerance, self.derivatives, self.smoothed)
+        return WindowEdges(self.stack, self.geometry, self.tolerance, self.derivatives, self.smoothed)
 
     @cached_property
     def counts(self) -> np.ndarray:
@@ -86,7 +87,7 @@ class WindowPlan:
 
     @cached_property
     def _rays(self) -> WindowRays:
-        return WindowRays.from_stack(self.stack, self.window)
+        return WindowRays.from_slopes(self.stack.slopes, self.geometry)
 
     @cached_property
     def _elsewhere(self) -> np.ndarray:
@@ -97,8 +98,8 @@ class WindowPlan:
     @cached_property
     def _ranks(self) -> tuple[np.ndarray, np.ndarray]:
         steepest = np.minimum(self._rims[1], 1 - 1e-9)  # finite points, also for pupils without a rank
-        geometry = SineGeometry(self.stack.distance, self.window.centre, steepest, self._elsewhere)
-        return window_ranks(self.stack, geometry, self._rays, self.window, self.tolerance, self.derivatives)
+        factor = self.geometry.ray_factor(self.stack.slopes.across, steepest, self._elsewhere)
+        return window_ranks(self.geometry, factor, self._rays, self.tolerance, self.derivatives)
 
     def samples(self, places: np.ndarray) -> tuple[SineStack, SineStack]:
         """Return the samples of some pupils, which have the same count, and the finer samples of the check.
@@ -155,5 +156,4 @@ class WindowPlan:
         return self._sines(self.edges.finer_edges)
 
     def _sines(self, edges: list[SoftAperture]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        outermost = (1 + np.array([edge.reach for edge in edges])) * self.stack.radius
-        return rim_sines(outermost, self.window.centre, self.stack.distance)
+        return self.geometry.rims(np.array([edge.reach for edge in edges]))

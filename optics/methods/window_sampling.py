@@ -13,12 +13,13 @@ from functools import lru_cache
 import numpy as np
 
 from optics.elements.beam import Beam
+from optics.methods.axis_kernel import axis_factor
 from optics.methods.carrier import on_window
 from optics.methods.problem import Problem
 from optics.methods.pupil_edge import PupilEdge
 from optics.methods.sine_samples import SineSamples
 from optics.methods.sine_stack import SineStack, single_stack
-from optics.methods.slow_factor import Path, axis_factor, fourier_kernel, slow_factor
+from optics.methods.slow_factor import Path, fourier_kernel, slow_factor
 from optics.methods.window_images import window_image_errors, window_images
 from optics.methods.window_plan import TIGHTEST, WindowPlan
 from optics.methods.window_rank import Derivatives
@@ -117,7 +118,13 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
         return None
     pupil, finer = (_single(samples) for samples in plan.samples(np.array([0])))
     return WindowSampling(
-        pupil, finer, int(plan.ranks[0]), bool(plan.crossed[0]), plan.half, float(plan.seconds[0]), float(plan.bytes[0])
+        pupil,
+        finer,
+        int(plan.ranks[0]),
+        bool(plan.crossed[0]),
+        plan.geometry.half,
+        float(plan.seconds[0]),
+        float(plan.bytes[0]),
     )
 
 
@@ -152,7 +159,7 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
 
     def along(axis: int) -> np.ndarray:
         place = sample_positions(path.window.shape[1 - axis], path.window.dx)
-        factor = axis_factor(path, pupil, axis, pupil.at, place[:, None]).astype(complex_dtype)
+        factor = axis_factor(path, pupil, axis, pupil.at[None, :], place[:, None]).astype(complex_dtype)
         return fourier_kernel(place, pupil.at, nodes, path.wavelength, dtype) * np.tile(factor, rank)
 
     return WindowSums(kernel.astype(complex_dtype), along(1), along(0), by_distance)

@@ -16,6 +16,7 @@ fourier         centred Fourier sums of any size and period
 fourier_matrices  Fourier sums as products of matrices
 grid            sample positions
 interpolation   linear, Lagrange, B-splines; tabulated functions
+kept_values     values that are computed once and kept, up to a number of them
 matrices        matrix products of Dr.Jit tensors
 number_types    checks of users' arrays: half precision, masked elements, PyTorch's lazy conjugation and negation
 precision       float32 and float64 in Dr.Jit

@@ -8,6 +8,7 @@ exit_pupil: test_exit_pupil.py, test_exit_pupil_off_axis.py
 exit_pupils: test_exit_pupils.py
 fine_detail: test_fine_detail.py, eye/test_scattered_light.py
 human_eye: test_human_eye.py
+light_geometry: methods/test_kept_plans.py
 light_stack: test_light_stack.py
 pupil_polynomials: test_light_stack.py
 phase_pupil: test_phase_pupil.py

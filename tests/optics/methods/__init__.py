@@ -1,6 +1,7 @@
 """Tests that fail when a module of optics/methods is broken. The oracles are closed forms that all methods satisfy.
 
 angular_spectrum: test_angular_spectrum.py, test_textbook.py, test_oracles_waves.py, test_even_pupils.py
+axis_kernel: test_sine_stack.py, test_diffraction_kernel.py
 carrier: point_spread/test_field.py
 derivative_cells: point_spread/test_gradients.py
 diffraction_kernel: test_diffraction_kernel.py
@@ -15,6 +16,7 @@ window_check: test_window_sampling.py
 window_rank: test_window_sampling.py, test_torch_stacks.py
 window_sampling: test_window_sampling.py
 window_edges: test_window_edges.py
+window_geometry: test_kept_plans.py, test_window_sampling.py
 window_plan: test_window_sampling.py, point_spread/test_coarse_batch.py
 window_images: test_sine_stack.py, point_spread/test_coarse_batch.py
 window_stack: test_torch_stacks.py
@@ -23,6 +25,7 @@ low_rank: test_low_rank.py, test_textbook.py
 pixelated_spectrum: elements/test_pixel_relief.py
 problem: point_spread/test_planner.py
 sampled_path: test_sampled_path.py
+remaining_factor: test_sine_stack.py, test_diffraction_kernel.py
 row_blocks: test_row_blocks.py
 spectrum_sampling: test_row_blocks.py, test_even_pupils.py
 pupil_sampling: test_textbook.py, elements/test_pixel_relief.py

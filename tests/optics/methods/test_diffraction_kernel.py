@@ -10,8 +10,10 @@ from optics import Grid, PointSource
 from optics.elements.beam import Beam
 from optics.elements.light_stack import LightStack
 from optics.methods import slow_factor
+from optics.methods.axis_kernel import axis_kernel
 from optics.methods.diffraction_kernel import FAR, diffraction_kernel, near_field
-from optics.methods.slow_factor import Path, axis_kernel, remaining_factor
+from optics.methods.remaining_factor import RemainingFactor
+from optics.methods.slow_factor import Path
 from optics.methods.window_images import window_image_errors, window_images
 from optics.methods.window_plan import WindowPlan
 from validation.reference import relative_l2
@@ -80,7 +82,7 @@ def test_the_factors_of_the_sums_are_the_whole_kernel():
     )  # (stack, place, sample)
     s, t = samples.at[:, None, :], samples.at[:, :, None]
     place = np.full((1, 1, 1), u), np.full((1, 1, 1), v)
-    found = across * down.swapaxes(1, 2) * remaining_factor(path, samples, (s, t), place)
+    found = across * down.swapaxes(1, 2) * RemainingFactor(path, samples, (s, t)).at(place)
     parts = [diffraction_kernel(WAVE, stack.distance[0], samples.points_at(s, t), at) for at in (place, (0.0, 0.0))]
     exact, middle = (size * np.exp(2j * np.pi * waves) for size, waves in parts)
     np.testing.assert_allclose(found, exact / middle, rtol=1e-9)

@@ -10,8 +10,11 @@ import optics
 from optics import Grid, PointSource
 from optics.elements.beam import Beam
 from optics.elements.light_stack import LightStack
-from optics.methods import sine_stack, slow_factor
-from optics.methods.slow_factor import Path, axis_kernel, cross_term, remaining_factor, window_kernel
+from optics.methods import axis_kernel as axis_kernel_module
+from optics.methods import sine_stack
+from optics.methods.axis_kernel import axis_kernel, window_kernel
+from optics.methods.remaining_factor import RemainingFactor
+from optics.methods.slow_factor import Path, cross_term
 from optics.methods.window_images import window_images
 from optics.methods.window_plan import WindowPlan
 from optics.numerics.grid import sample_positions
@@ -65,7 +68,7 @@ def test_interpolated_paths_and_kernels_are_exact(monkeypatch):
     place = sample_positions(65, window.dx)[None]
     exact = axis_kernel(path, samples, 0, place, "float64")
     np.testing.assert_allclose(window_kernel(path, samples, 0, "float64"), exact, atol=1e-6)
-    monkeypatch.setattr(slow_factor, "SMOOTH", 3)
+    monkeypatch.setattr(axis_kernel_module, "SMOOTH", 3)
     assert np.abs(window_kernel(path, samples, 0, "float64") - exact).max() > 1e-4
 
 
@@ -87,7 +90,7 @@ def test_the_whole_kernel_is_the_product_of_its_factors():
         axis_kernel(path, samples, axis, np.array([[at]]), "float64")[:, 0, 5::9] for axis, at in enumerate((u, v))
     )
     place = np.full((1, 1, 1), u), np.full((1, 1, 1), v)
-    remaining = remaining_factor(path, samples, (s, t), place)
+    remaining = RemainingFactor(path, samples, (s, t)).at(place)
     found = across[:, None, :] * down[:, :, None] * remaining
     np.testing.assert_allclose(found, kernel(u, v) / kernel(0, 0), atol=1e-9)
 
@@ -101,7 +104,7 @@ def test_the_cross_term_is_most_of_the_remaining_factor():
     s, t = rng.uniform(-0.15, 0.15, (2, 1, 500))
     place = rng.uniform(-8e-6, 8e-6, (2, 1, 500))
     path = Path(stack.wavelength, stack.distance, window)
-    remaining = remaining_factor(path, samples, (s, t), tuple(place))
+    remaining = RemainingFactor(path, samples, (s, t)).at(tuple(place))
     a, b = cross_term(path, samples, (s, t), tuple(place))
     apart, without = (remaining * np.exp(-1j * np.angle(remaining.mean())) - at for at in (1 + a * b, 1))
     assert np.linalg.norm(apart) < 0.6 * np.linalg.norm(without)

@@ -16,6 +16,7 @@ fourier: test_fourier.py
 fourier_matrices: test_fourier.py
 grid: test_grid.py
 interpolation: test_interpolation.py
+kept_values: test_kept_values.py
 matrices: test_fourier.py
 number_types: test_number_types.py, sim/test_number_types.py
 precision: test_precision.py

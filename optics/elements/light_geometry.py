@@ -1,0 +1,105 @@
+"""Sources, ideal lenses and media of several beams: the part of the light that reliefs and wavefronts do not change.
+
+Users often compute many PSFs that differ in the relief or wavefront only. Their geometry is then kept, together with
+the results of planning that depend on nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from optics.numerics.read_only import read_only
+
+__all__ = ["FEW", "MANY", "LightGeometry", "disk_points", "light_geometry"]
+
+FEW, MANY = 21, 53  # choices: points across the pupil at which slopes are evaluated, without and with fine detail
+
+
+@dataclass(frozen=True)
+class LightGeometry:
+    """Numbers of several beams, (beam,).
+
+    radius: radii of the pupils [m].
+    distance: distances of the window behind the pupils [m].
+    vacuum_wavelength: wavelengths in vacuum [m].
+    behind, before: refractive indices behind and before the pupils.
+    focal: focal lengths of ideal lenses [m]; infinite without a lens.
+    source: distances of sources on the axis [m]; infinite for parallel or oblique light.
+    """
+
+    radius: tuple[float, ...]
+    distance: tuple[float, ...]
+    vacuum_wavelength: tuple[float, ...]
+    behind: tuple[float, ...]
+    before: tuple[float, ...]
+    focal: tuple[float, ...]
+    source: tuple[float, ...]
+
+    @cached_property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """All fields as arrays (beam,)."""
+        rows = self.radius, self.distance, self.vacuum_wavelength, self.behind, self.before, self.focal, self.source
+        return tuple(read_only(np.array(row, float)) for row in rows)
+
+    @cached_property
+    def wavelength(self) -> np.ndarray:
+        """Wavelengths in the media behind the pupils [m], (beam,)."""
+        return read_only(self.arrays[2] / self.arrays[3])
+
+    @cached_property
+    def spheres(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Spherical waves: their indices (negative for waves that converge) and the distances of their centres [m]."""
+        *_, behind, before, focal, source = self.arrays
+        known = (-np.sign(focal) * behind, np.abs(focal)), (before, source)
+        return [(read_only(index), read_only(r)) for index, r in known if np.isfinite(r).any()]
+
+    def waves(self, x: np.ndarray, y: np.ndarray) -> np.ndarray | float:
+        """Return the paths of all spherical waves at points (x, y) [m], in waves, up to a constant, (beam, y, x).
+
+        x, y: points, (beam, y, x).
+        """
+        total: np.ndarray | float = 0.0
+        r2, per_wave = x * x + y * y if self.spheres else 0.0, 1 / self.arrays[2][:, None, None]
+        for index, distance in self.spheres:
+            centre = distance[:, None, None]
+            total = total + (index[:, None, None] * per_wave) * r2 / (np.sqrt(r2 + centre * centre) + centre)
+        return total
+
+    def slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the gradients of the paths of all spherical waves along x and y at `disk_points`, (beam, point)."""
+        if across not in self._slopes:
+            _, x, y = disk_points(across)
+            radius = self.arrays[0][:, None]
+            r, outward = np.hypot(x, y) * radius, np.zeros((len(radius), len(x)))
+            for index, distance in self.spheres:
+                outward = outward + index[:, None] * radius / np.hypot(r, distance[:, None])
+            self._slopes[across] = read_only(outward * x), read_only(outward * y)
+        return self._slopes[across]
+
+    @cached_property
+    def _slopes(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """Slopes for FEW and MANY points across the pupil."""
+        return {}
+
+
+def light_geometry(beams: Sequence[tuple[float, ...]]) -> LightGeometry:
+    """Return the geometry of beams, each given by the fields of `LightGeometry`. That of a single beam is kept."""
+    return _kept(beams[0]) if len(beams) == 1 else LightGeometry(*zip(*beams, strict=True))
+
+
+@lru_cache(maxsize=64)
+def _kept(beam: tuple[float, ...]) -> LightGeometry:
+    return LightGeometry(*((value,) for value in beam))
+
+
+@lru_cache(maxsize=4)
+def disk_points(across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return positions along an axis, and points (x, y) of the square grid inside the unit disk."""
+    grid = np.linspace(-1, 1, across)
+    x, y = np.meshgrid(grid, grid)
+    inside = np.hypot(x, y) <= 1
+    return read_only(grid), read_only(x[inside]), read_only(y[inside])

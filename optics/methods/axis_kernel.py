@@ -1,0 +1,148 @@
+"""The diffraction kernel along one axis of the window, relative to its value at the middle of the window.
+
+It is the Fourier kernel times the slow factor along this axis. It depends on one sine and one position.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from optics.methods.sine_samples import SineSamples
+from optics.methods.sine_stack import SineGeometry, SineStack, even_weights
+from optics.methods.slow_factor import Path, slow_parts
+from optics.numerics.array_library import turned
+from optics.numerics.grid import sample_positions
+from optics.numerics.interpolation import chebyshev_points
+
+__all__ = ["AxisFactor", "AxisRows", "axis_factor", "axis_kernel", "window_kernel"]
+
+SMOOTH = 12  # choice: number of sines, and of positions, from which smooth phases are interpolated
+
+
+@dataclass(frozen=True, eq=False)
+class AxisFactor:
+    """The slow factor along x (0) or y (1), relative to its value at the middle of the window.
+
+    Along the other axis, the sine is that of the centre plus `elsewhere`. The points of the pupil, and the factor at
+    the middle of the window, are computed once.
+
+    sines: sines along the axis, minus that of the pupil's centre. They have as many axes as the positions.
+    """
+
+    path: Path
+    samples: SineSamples | SineGeometry
+    axis: int
+    sines: np.ndarray
+
+    def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return amplitude and phase [waves] at positions [m] along the axis, relative to the middle of the window.
+
+        The positions have the type of the sines.
+        """
+        points, directions, none, middle = self._middle
+        size, waves = slow_parts(self.path, points, directions, (places, none) if self.axis == 0 else (none, places))
+        size /= middle[0]
+        waves -= middle[1]
+        return size, waves
+
+    @cached_property
+    def _middle(
+        self,
+    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """Points of the pupil, their directions, the middle of the window, and the slow factor there."""
+        kind, elsewhere = self.sines.dtype, self.samples.elsewhere
+        none = np.zeros((1,) * self.sines.ndim, kind)
+        other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
+        other = other.astype(kind)
+        directions = (self.sines, other) if self.axis == 0 else (other, self.sines)
+        x, y = self.samples.points_at(*directions)
+        points = x.astype(kind), y.astype(kind)
+        return points, directions, none, slow_parts(self.path, points, directions, (none, none))
+
+
+def axis_factor(
+    path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
+) -> np.ndarray:
+    """Return the `AxisFactor` at positions [m] relative to the middle of the window, complex.
+
+    Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
+    that kernel.
+
+    sines, places: sines and positions along the axis, which broadcast.
+    """
+    sines = sines.reshape((1,) * (places.ndim - sines.ndim) + sines.shape)
+    return np.asarray(turned(*AxisFactor(path, samples, axis, sines).at(places), "float64"))
+
+
+def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, dtype: str) -> np.ndarray:
+    """Return the Fourier kernel times `axis_factor`, (stack, place, sample), complex.
+
+    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window.
+
+    places: positions [m] along the axis, relative to the middle of the window, (stack, place).
+    dtype: "float32" or "float64".
+    """
+    return np.asarray(turned(*_whole(path, samples, axis, samples.at, places), dtype))
+
+
+def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
+    """Return `axis_kernel` for all columns (0) or rows (1) of the window, (stack, place, sample).
+
+    The phase is smooth, and is interpolated from a few sines and positions.
+    """
+    at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
+    if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
+        return axis_kernel(path, samples, axis, place[None, :], dtype)
+    nodes = chebyshev_points(SMOOTH)
+    sides = [part[:, [0, -1]] for part in (at, place[None, :])]
+    sines, few = (side.mean(axis=1)[:, None] + np.diff(side) / 2 * nodes for side in sides)
+    to_sines, to_places = (even_weights(count, SMOOTH) for count in (at.shape[1], len(place)))
+    size, waves = (to_places @ part @ to_sines.T for part in _whole(path, samples, axis, sines, few))
+    return np.asarray(turned(size, waves, dtype))
+
+
+@dataclass(eq=False)
+class AxisRows:
+    """Rows of the `axis_kernel` for positions of the window. Those of a single pupil are computed once.
+
+    path, samples, axis, dtype: see `axis_kernel`.
+    """
+
+    path: Path
+    samples: SineStack
+    axis: int
+    dtype: str
+
+    def __post_init__(self) -> None:
+        count = self.path.window.shape[1 - self.axis]
+        self._known = np.zeros(count, bool)
+        self._rows = np.empty((count, self.samples.at.shape[1]), np.result_type(self.dtype, np.complex64))
+
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """Return the kernel at positions of the window with the indices `places`, (stack, place, sample)."""
+        if len(self.samples.at) > 1:
+            return self._computed(places)
+        known = self._known[places]
+        if not known.all():
+            missing = np.unique(places[~known])
+            self._rows[missing] = self._computed(missing[None, :])[0]
+            self._known[missing] = True
+        return self._rows[places]
+
+    def _computed(self, places: np.ndarray) -> np.ndarray:
+        window = self.path.window
+        at = (places - window.shape[1 - self.axis] // 2) * window.dx
+        return axis_kernel(self.path, self.samples, self.axis, at, self.dtype)
+
+
+def _whole(
+    path: Path, samples: SineStack, axis: int, sines: np.ndarray, places: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return amplitude and phase [waves] of `axis_kernel`, (stack, place, sine)."""
+    sines, places = sines[:, None, :], places[:, :, None]
+    size, waves = AxisFactor(path, samples, axis, sines).at(places)
+    wavelength, _ = path.numbers(3)
+    return size, waves - places * sines / wavelength

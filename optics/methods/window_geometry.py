@@ -1,0 +1,152 @@
+"""The part of a plan for a window that depends neither on reliefs, wavefronts and masks nor on the tolerance.
+
+Users often compute many PSFs of one window whose wavefronts differ. The geometry of a single beam is therefore kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from optics.elements.light_geometry import LightGeometry, disk_points
+from optics.elements.light_stack import LightStack
+from optics.methods.remaining_factor import RemainingFactor
+from optics.methods.sine_stack import SineGeometry, rim_sines
+from optics.methods.slow_factor import Path
+from optics.numerics.grid import Grid
+from optics.numerics.kept_values import KeptValues
+
+__all__ = ["PathSlopes", "PlannedRays", "WindowGeometry", "window_geometry"]
+
+RAYS = 100  # choice: number of rays that determine the rank
+BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
+RIM = 0.85  # choice: distance from the axis [radii] beyond which rays count as rays of the edge
+KEPT = 32  # choice, limited by memory: arrays that are kept for one window
+
+
+class PathSlopes(NamedTuple):
+    """Paths from points of the pupils to the middle of a window.
+
+    along_x, along_y: gradients of the paths, (beam, point).
+    cycles: cycles per radius for a gradient of 1, (beam, 1).
+    rim: indices of the points near the rim.
+    """
+
+    along_x: np.ndarray
+    along_y: np.ndarray
+    cycles: np.ndarray
+    rim: np.ndarray
+
+
+class PlannedRays(NamedTuple):
+    """Points of the pupils whose rays determine the rank.
+
+    some: which of the `disk_points` they are.
+    at: points (x, y) [m] relative to the middle of the window, (beam, ray).
+    scale: distance to the window [m] for a slope of 1, (beam, ray).
+    blur: distance [m] by which diffraction spreads the light, (beam, 1).
+    directions: sines of the lines from the middle of the window, relative to those of the pupil's centre, (beam, ray).
+    sine2: sum of their squares.
+    """
+
+    some: slice
+    at: tuple[np.ndarray, np.ndarray]
+    scale: np.ndarray
+    blur: np.ndarray
+    directions: tuple[np.ndarray, np.ndarray]
+    sine2: np.ndarray
+
+
+@dataclass(frozen=True)
+class WindowGeometry:
+    """Light without reliefs, wavefronts and masks, and a window."""
+
+    light: LightGeometry
+    window: Grid
+
+    @cached_property
+    def half(self) -> float:
+        """Distance [m] from the middle of the window within which interpolation points lie."""
+        return max(self.window.own_half_width, self.window.dx)
+
+    @cached_property
+    def path(self) -> Path:
+        return Path(self.light.wavelength, self.light.arrays[1], self.window)
+
+    @cached_property
+    def cycles(self) -> np.ndarray:
+        """Cycles per radius of the Fourier kernel at the sides of the window, (beam,)."""
+        radius, distance, *_ = self.light.arrays
+        return np.asarray(self.half * radius / (self.light.wavelength * distance))
+
+    def to_middle(self, across: int) -> PathSlopes:
+        """Return the paths from `disk_points` to the middle of the window."""
+
+        def computed() -> PathSlopes:
+            (x, y), length = self._apart(across, slice(None))
+            radius, _, wavelength, index, *_ = self.light.arrays
+            scale, r = index[:, None] / length, np.hypot(*disk_points(across)[1:])
+            return PathSlopes(x * scale, y * scale, (radius / wavelength)[:, None], np.flatnonzero(r > RIM))
+
+        found: PathSlopes = self._known.get(("paths", across), computed)
+        return found
+
+    def rays(self, across: int) -> PlannedRays:
+        """Return some of the `disk_points`, which are spread evenly over the disks."""
+
+        def computed() -> PlannedRays:
+            some = slice(None, None, max(1, len(disk_points(across)[1]) // RAYS))
+            (x, y), length = self._apart(across, some)
+            radius, distance, _, index, *_ = self.light.arrays
+            cx, cy = self.window.centre
+            middle = np.sqrt(np.square(distance) + cx**2 + cy**2)[:, None]
+            s, t = x / length + cx / middle, y / length + cy / middle
+            blur = BLUR * (self.light.wavelength * distance / (2 * radius))[:, None]
+            return PlannedRays(some, (x, y), length / index[:, None], blur, (s, t), s * s + t * t)
+
+        found: PlannedRays = self._known.get(("rays", across), computed)
+        return found
+
+    def _apart(self, across: int, some: slice) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+        """Return some of the `disk_points` relative to the middle of the window, and their distances from it [m]."""
+        _, *points = disk_points(across)
+        radius, distance = (part[:, None] for part in self.light.arrays[:2])
+        x, y = (radius * at[some] - centre for at, centre in zip(points, self.window.centre, strict=True))
+        return (x, y), np.sqrt(x * x + y * y + np.square(distance))
+
+    def rims(self, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the `rim_sines` of soft edges that extend by `reach` radii beyond the rim, (beam,)."""
+        radius, distance, *_ = self.light.arrays
+        found: tuple[np.ndarray, np.ndarray, np.ndarray] = self._known.get(
+            ("rims", reach.tobytes()), lambda: rim_sines((1 + reach) * radius, self.window.centre, distance)
+        )
+        return found
+
+    def ray_factor(self, across: int, steepest: np.ndarray, elsewhere: np.ndarray) -> RemainingFactor:
+        """Return the remaining factor for `rays`. Further arguments: see `SineGeometry`."""
+
+        def computed() -> RemainingFactor:
+            geometry = SineGeometry(self.light.arrays[1], self.window.centre, steepest, elsewhere)
+            return RemainingFactor(self.path, geometry, self.rays(across).directions)
+
+        key = "factor", across, steepest.tobytes(), elsewhere.tobytes()
+        found: RemainingFactor = self._known.get(key, computed)
+        return found
+
+    @cached_property
+    def _known(self) -> KeptValues:
+        return KeptValues(KEPT)
+
+
+def window_geometry(stack: LightStack, window: Grid) -> WindowGeometry:
+    """Return the geometry of light and a window. That of a single beam is kept."""
+    light = stack.geometry
+    return _kept(light, window) if len(stack.beams) == 1 else WindowGeometry(light, window)
+
+
+@lru_cache(maxsize=32)
+def _kept(light: LightGeometry, window: Grid) -> WindowGeometry:
+    return WindowGeometry(light, window)
