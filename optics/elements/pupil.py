@@ -202,7 +202,8 @@ class Pupil:
         return {}
 
     @cached_property
-    def _level(self) -> Pupil:
+    def level(self) -> Pupil:
+        """The same pupil without its relief."""
         return replace(self, height=None)
 
     def index_step(self, wavelength: float) -> Scalar:
@@ -245,7 +246,7 @@ class Pupil:
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
-        level = self._level if self.pixels else self
+        level = self.level if self.pixels else self
         return all_slopes(level, same, number(source.distance), source.plain.angle, self.pieces(same))
 
     def pieces(self, wavelength: float) -> int:

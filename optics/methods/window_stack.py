@@ -15,8 +15,8 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.pupil_path import lens_path
 from optics.elements.source import PointSource
+from optics.methods.pixel_nodes import WindowSamples
 from optics.methods.sampled_path import sampled_height, sampled_wavefront
-from optics.methods.sine_samples import SineSamples
 from optics.methods.sine_stack import single_stack
 from optics.methods.slow_factor import Path
 from optics.methods.window_check import window_errors
@@ -78,7 +78,7 @@ class WindowStack:
         waves = [wavelength / self.pupil.index_behind(wavelength) for wavelength in self.wavelengths]
         return [Path(wave, number(self.distance), self.window) for wave in waves]
 
-    def _light(self, samples: SineSamples) -> Iterator[Array]:
+    def _light(self, samples: WindowSamples) -> Iterator[Array]:
         """Yield the light behind the pupil times the areas of the samples, (source, η, ξ), for each wavelength."""
         pupil, (x, y, _) = self.pupil, samples.layout
         height, ahead = (found(pupil, samples, self.convert) for found in (sampled_height, sampled_wavefront))
@@ -93,7 +93,7 @@ class WindowStack:
                 light = light * turned(1.0, path / wavelength, self.dtype)
             yield light if pupil.mask is None else light * like(light.real, amplitude)
 
-    def _straight(self, samples: SineSamples, wavelength: float) -> Array:
+    def _straight(self, samples: WindowSamples, wavelength: float) -> Array:
         """Return the waves behind the ideal lens times the areas of the samples, (source, η, ξ).
 
         If no number of lens and sources carries a derivative, NumPy computes the waves.
@@ -152,7 +152,7 @@ class _LensLight:
 
 
 @cached_arrays(MOST_BYTES, lambda waves: waves.nbytes)
-def _fixed_waves(lens: _LensLight, samples: SineSamples) -> np.ndarray:
+def _fixed_waves(lens: _LensLight, samples: WindowSamples) -> np.ndarray:
     """Return the waves behind a lens at samples, times their areas. Pupils often have the same lens and sources."""
     found: np.ndarray = lens.waves(*samples.layout)
     return found

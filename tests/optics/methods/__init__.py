@@ -22,6 +22,7 @@ window_images: test_sine_stack.py, point_spread/test_coarse_batch.py
 window_stack: test_torch_stacks.py
 window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py
+pixel_nodes: test_pixel_nodes.py
 pixelated_spectrum: elements/test_pixel_relief.py
 problem: point_spread/test_planner.py
 sampled_path: test_sampled_path.py
