@@ -165,10 +165,9 @@ class LightStack:
 
         x, y: points [m], (beam, y, x).
         """
-        steps, radius = np.arange(self._polynomials[0].shape[1]), self.radius[:, None]
-        across, down = (at.reshape(len(at), -1)[:, None] / radius[..., None] for at in (x, y))
-        found: np.ndarray = (down ** steps[:, None])[:, :, None] * (across ** steps[:, None])[:, None]
-        return found
+        scale, count = (1 / self.radius)[:, None, None], self._polynomials[0].shape[1]
+        across, down = (_powers((at * scale).reshape(len(self.beams), -1), count) for at in (x, y))
+        return down[:, :, None] * across[:, None]
 
     def polynomial_waves(self, powers: np.ndarray) -> np.ndarray:
         """Return the paths of polynomial reliefs and wavefronts, in waves, up to a constant, (beam, point)."""
@@ -219,6 +218,14 @@ class LightStack:
                     )
                     along[place] += ((ahead - behind) / (2 * step))[inside]
         return StackSlopes(across, x, y, along_x, along_y)
+
+
+def _powers(values: np.ndarray, count: int) -> np.ndarray:
+    """Return the powers 0 to count - 1 of values (beam, point), (beam, power, point)."""
+    found = np.ones((len(values), count, values.shape[1]))
+    for power in range(1, count):
+        np.multiply(found[:, power - 1], values, out=found[:, power])
+    return found
 
 
 @lru_cache(maxsize=16)

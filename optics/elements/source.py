@@ -43,6 +43,8 @@ class PointSource:
     @property
     def plain(self) -> PointSource:
         """The same source without derivatives."""
+        if all(type(part) is float for part in (self.distance, *self.angle)):
+            return self
         x, y = map(number, self.angle)
         return PointSource(number(self.distance), (x, y))
 

@@ -17,7 +17,9 @@ from optics.numerics.array_library import turned
 from optics.numerics.grid import sample_positions
 from optics.numerics.interpolation import chebyshev_points
 
-__all__ = ["AxisFactor", "AxisRows", "axis_factor", "axis_kernel", "window_kernel"]
+__all__ = ["AxisFactor", "AxisRows", "Pair", "axis_factor", "axis_kernel", "window_kernel"]
+
+Pair = tuple[np.ndarray, np.ndarray]
 
 SMOOTH = 12  # choice: number of sines, and of positions, from which smooth phases are interpolated
 
@@ -53,17 +55,16 @@ class AxisFactor:
 
         The positions have the type of the sines.
         """
-        points, directions, none, middle = self._middle
+        points, directions, middle = self.pupil
+        none = np.zeros((1,) * self.sines.ndim, self.sines.dtype)
         size, waves = slow_parts(self.path, points, directions, (places, none) if self.axis == 0 else (none, places))
         size /= middle[0]
         waves -= middle[1]
         return size, waves
 
     @cached_property
-    def _middle(
-        self,
-    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray], np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """Points of the pupil, their directions, the middle of the window, and the slow factor there."""
+    def pupil(self) -> tuple[Pair, Pair, Pair]:
+        """Points of the pupil, their directions, and the slow factor at the middle of the window."""
         kind, elsewhere = self.sines.dtype, self.samples.elsewhere
         none = np.zeros((1,) * self.sines.ndim, kind)
         other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
@@ -71,7 +72,7 @@ class AxisFactor:
         directions = (self.sines, other) if self.axis == 0 else (other, self.sines)
         x, y = self.samples.points_at(*directions)
         points = x.astype(kind), y.astype(kind)
-        return points, directions, none, slow_parts(self.path, points, directions, (none, none))
+        return points, directions, slow_parts(self.path, points, directions, (none, none))
 
 
 def axis_factor(path: Path, samples: HasDirections, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -11,14 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
-from optics.methods.axis_kernel import AxisFactor
+from optics.methods.axis_kernel import AxisFactor, Pair
 from optics.methods.sine_stack import SineGeometry
 from optics.methods.slow_factor import Path, slow_parts
 from optics.numerics.array_library import turned
 
 __all__ = ["RemainingFactor"]
-
-Pair = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +38,8 @@ class RemainingFactor:
         Directions and positions have the same number of axes and broadcast.
         """
         window = self.rounded(window[0]), self.rounded(window[1])
+        if len({part.shape for part in (*self.directions, *window)}) == 1:
+            return self._paired(window)
         return self.divided(window, [factor.at(place) for factor, place in zip(self.along, window, strict=True)])
 
     def rounded(self, values: np.ndarray) -> np.ndarray:
@@ -56,6 +56,30 @@ class RemainingFactor:
             size /= part[0]
             waves -= part[1]
         return np.asarray(turned(size, waves, self.dtype))
+
+    def _paired(self, window: Pair) -> np.ndarray:
+        """Return the factor for one position per point. All three slow factors are evaluated together."""
+        (u, v), none, (points, directions, middle) = window, np.zeros_like(window[0]), self._three
+        at = np.stack([u, u, none], axis=1), np.stack([v, none, v], axis=1)
+        size, waves = slow_parts(self._pupil[0], points, directions, at)
+        size, waves = size / middle[0], waves - middle[1]
+        total = size[:, 0] / size[:, 1] / size[:, 2], waves[:, 0] - waves[:, 1] - waves[:, 2]
+        return np.asarray(turned(*total, self.dtype))
+
+    @cached_property
+    def _three(self) -> tuple[Pair, Pair, Pair]:
+        """Points, directions and slow factors at the middle: for the factor itself, along x and along y.
+
+        The shapes are (pupil, 3, ...).
+        """
+        _, points, directions = self._pupil
+        own, shape = (points, directions, self._middle), directions[0].shape
+        parts = [own, *(factor.pupil for factor in self.along)]
+
+        def stacked(kind: int, axis: int) -> np.ndarray:
+            return np.stack([np.broadcast_to(part[kind][axis], shape) for part in parts], axis=1)
+
+        return (stacked(0, 0), stacked(0, 1)), (stacked(1, 0), stacked(1, 1)), (stacked(2, 0), stacked(2, 1))
 
     @cached_property
     def along(self) -> tuple[AxisFactor, AxisFactor]:

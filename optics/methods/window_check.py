@@ -29,6 +29,7 @@ __all__ = ["window_errors"]
 
 CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_sampling.py
 UNSEEN = 0.05  # choice: error that both sums may share, relative to the tolerance
+ROUNDING = {dtype: float(np.finfo(dtype).eps) for dtype in ("float32", "float64")}
 ACROSS = 10  # choice: number of rows and of columns in which the check computes the PSF
 SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
 INTERPOLATED = 0.5  # choice: largest error of the interpolated kernel of the check, relative to the tolerance
@@ -51,15 +52,17 @@ def window_errors(
     dtype = str(field.real.dtype)
     key = "check", path.key, dtype, float(tolerance)
     check: _CheckSums = samples.known.get(key, lambda: _CheckSums(samples, path, dtype, INTERPOLATED * tolerance))
-    total = np.square(images, dtype=np.float64).sum((1, 2))
-    rows, columns, chance = _drawn(np.where((total > 0)[:, None, None], images, 1))
+    total, beams = np.square(images, dtype=np.float64).reshape(len(images), -1).sum(1), np.arange(len(images))
+    lit = images if (total > 0).all() else np.where((total > 0)[:, None, None], images, 1)
+    rows, columns, chance = _drawn(lit)
     exact = check.intensity(field, rows, columns)
-    drawn = images[np.arange(len(images))[:, None, None], rows[:, :, None], columns[:, None, :]]
-    squared = np.mean(np.square(drawn - exact) / chance, (1, 2))
+    drawn = images[beams[:, None, None], rows[:, :, None], columns[:, None, :]]
+    squares = np.stack([np.square(drawn - exact), np.square(exact)]) / chance
+    squared, bright = squares.reshape(2, len(images), -1).mean(2)
     # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the darker of the two
-    bright = np.minimum(total, np.mean(np.square(exact) / chance, (1, 2)))
+    bright = np.minimum(total, bright)
     total = np.where(total > 0, np.where(squared > 0.01 * total, bright, total), np.nan)
-    rounding = float(np.finfo(field.real.dtype).eps)
+    rounding = ROUNDING[dtype]
     # Below the goal of the interpolation, the difference may be its own error, which both sums do not share.
     unlike = np.where(check.apart > INTERPOLATED * tolerance, check.apart, 0)
     return np.asarray(CAUTION * (np.sqrt(squared / total) + unlike) + UNSEEN * tolerance + rounding)
@@ -206,30 +209,39 @@ def _remaining(
 def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return rows and columns of each PSF, and the probability with which each of their crossings is drawn.
 
-    Rows and columns are drawn at even steps of their cumulative probabilities. These are a mixture of four
-    distributions. The first is uniform. The second is proportional to the square root of the intensity, like the error
-    of the intensity if the error of the amplitude is the same everywhere. The third favours the brightest samples and
-    their neighbours, and the last the sides of the window, where phases change fastest.
-
     The shapes are (stack, row), (stack, column) and (stack, row, column).
     """
-    found, roots, squares = [], np.sqrt(images), np.square(images)
-    for along in (2, 1):
-        root, bright = (part.sum(axis=along).astype(np.float64) for part in (roots, squares))
-        bright[:, 1:-1] = bright[:, :-2] + bright[:, 1:-1] + bright[:, 2:]
-        size = root.shape[1]
-        sides = np.zeros(size)
-        sides[[0, -1]] = 0.5
-        of_light = (part / part.sum(axis=1, keepdims=True) for part in (root, bright))
-        shares = np.full(size, 1 / size), *of_light, sides
-        chance = sum(weight * share for weight, share in zip(SHARES, shares, strict=True))
-        count = min(ACROSS, size)
-        if count == size:
-            found.append((np.broadcast_to(np.arange(count), root.shape), np.full(root.shape, 1 / count)))
-            continue
-        levels = np.cumsum(chance, axis=1)
-        wanted = (np.arange(count) + 0.5) / count * levels[:, -1:]
-        place = (levels[:, None, :] < wanted[:, :, None]).sum(axis=2).clip(max=size - 1)
-        found.append((place, np.take_along_axis(chance, place, axis=1)))
-    (rows, down), (columns, across) = found
+    count, light = len(images), (np.sqrt(images), np.square(images))
+    of_rows, of_columns = ([part.sum(axis=along) for part in light] for along in (2, 1))
+    if images.shape[1] == images.shape[2]:
+        places, chance = _along_axis(*map(np.concatenate, zip(of_rows, of_columns, strict=True)))
+        rows, columns, down, across = places[:count], places[count:], chance[:count], chance[count:]
+    else:
+        (rows, down), (columns, across) = _along_axis(*of_rows), _along_axis(*of_columns)
     return rows, columns, down[:, :, None] * across[:, None, :]
+
+
+def _along_axis(root: np.ndarray, bright: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of a few rows, or columns, and the probability with which each is drawn, (stack, row).
+
+    Rows are drawn at even steps of their cumulative probability. This is a mixture of four distributions. The first is
+    uniform. The second is proportional to the square root of the intensity, like the error of the intensity if the
+    error of the amplitude is the same everywhere. The third favours the brightest samples and their neighbours, and the
+    last the sides of the window, where phases change fastest.
+
+    root, bright: sums over each row of the square root of the intensity, and of its square, (stack, row).
+    """
+    root, bright = root.astype(np.float64), bright.astype(np.float64)
+    size = root.shape[1]
+    count = min(ACROSS, size)
+    if count == size:
+        return np.broadcast_to(np.arange(count), root.shape), np.full(root.shape, 1 / count)
+    bright[:, 1:-1] = bright[:, :-2] + bright[:, 1:-1] + bright[:, 2:]
+    uniform, of_root, of_bright, of_sides = SHARES
+    chance = root * (of_root / root.sum(axis=1))[:, None] + bright * (of_bright / bright.sum(axis=1))[:, None]
+    chance += uniform / size
+    chance[:, [0, -1]] += of_sides / 2
+    levels = chance.cumsum(axis=1)
+    wanted = (np.arange(count) + 0.5) / count * levels[:, -1:]
+    place = (levels[:, None, :] < wanted[:, :, None]).sum(axis=2).clip(max=size - 1)
+    return place, chance[np.arange(len(chance))[:, None], place]

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from optics.elements.light_stack import LightStack
 from optics.methods.axis_kernel import window_kernel
+from optics.methods.mirrored_matrix import MirroredMatrix, mirroring_share
 from optics.methods.remaining_factor import RemainingFactor
 from optics.methods.sine_stack import SineStack
 from optics.methods.slow_factor import Path, cross_term
 from optics.methods.window_check import window_errors
-from optics.methods.window_sums import intensity_of, window_field
+from optics.methods.window_sums import intensity_of, weighted
 from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
@@ -30,18 +33,18 @@ def window_images(
     path = Path(stack.wavelength, stack.distance, window)
     nodes = max(window.own_half_width, window.dx) * chebyshev_points(rank)
     field = samples.arriving(stack, dtype)
-    down, across = _fourier(path, samples, nodes, dtype)
+    if rank > 1:
+        field = weighted(field, _node_factors(path, samples, nodes, dtype))
+    terms = _terms(path, samples, nodes, crossed, dtype)
+    if isinstance(terms[0][0], MirroredMatrix):
+        parts = [down @ (across @ field.swapaxes(1, 2)).swapaxes(1, 2) for down, across in terms]
+        return np.asarray(intensity_of(parts[0] if len(parts) == 1 else parts[0] + parts[1]))
+    [(down, across)] = terms
     if not crossed:
-        if rank == 1:
-            return np.asarray(intensity_of(down @ field @ across.swapaxes(1, 2)))
-        kernel = _node_factors(path, samples, nodes, dtype)
-        return np.asarray(intensity_of(window_field(field, kernel, down, across)))
-    at, (u, v) = samples.at[:, None, :], (sample_positions(n, window.dx)[None, :, None] for n in window.shape[::-1])
-    a, b = (part.astype(field.dtype) for part in cross_term(path, samples, (at, at), (u, v)))
-    both = field @ np.concatenate([across, across * a], axis=1).swapaxes(1, 2)
+        return np.asarray(intensity_of(down @ field @ across.swapaxes(1, 2)))
+    both = field @ across.swapaxes(1, 2)
     first, second = both[..., : window.shape[1]], both[..., window.shape[1] :]
-    summed = np.concatenate([down, down * b], axis=2) @ np.concatenate([first, second], axis=1)
-    return np.asarray(intensity_of(summed))
+    return np.asarray(intensity_of(down @ np.concatenate([first, second], axis=1)))
 
 
 def window_image_errors(
@@ -52,16 +55,31 @@ def window_image_errors(
     return window_errors(finer, path, finer.arriving(stack, str(images.dtype)), images, tolerance)
 
 
-def _fourier(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return `_along` for rows and columns. Further PSFs with the same samples share them."""
+def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dtype: str) -> list[tuple[Any, Any]]:
+    """Return pairs of `_along` for rows and columns, which PSFs with the same samples share.
+
+    With `cross_term`, there is a second pair. It is the second one of a list of mirrored matrices. Plain matrices are
+    joined to one pair, (pupil, y, 2 · sample) and (pupil, 2 · x, sample), because a large product takes less time.
+    """
     window = path.window
 
-    def both() -> tuple[np.ndarray, np.ndarray]:
+    def computed() -> list[tuple[Any, Any]]:
         down = _along(path, samples, 1, nodes, dtype)
         same = window.shape[0] == window.shape[1] and window.centre[0] == window.centre[1]
-        return down, down if same else _along(path, samples, 0, nodes, dtype)
+        across = down if same else _along(path, samples, 0, nodes, dtype)
+        terms: list[tuple[Any, Any]] = [(down, across)]
+        if crossed:
+            at, (x, y) = samples.at[:, None, :], (sample_positions(n, window.dx) for n in window.shape[::-1])
+            a, b = cross_term(path, samples, (at, at), (x[None, :, None], y[None, :, None]))
+            terms.append((down * b.astype(down.dtype), across * a.astype(across.dtype)))
+        if mirroring_share(window, np.array(across.shape[2])) < 1:
+            return [(MirroredMatrix.from_matrix(a), MirroredMatrix.from_matrix(b)) for a, b in terms]
+        if crossed:
+            downs, acrosses = zip(*terms, strict=True)
+            return [(np.concatenate(downs, axis=2), np.concatenate(acrosses, axis=1))]
+        return terms
 
-    found: tuple[np.ndarray, np.ndarray] = samples.known.get(("fourier", path.key, len(nodes), dtype), both)
+    found: list[tuple[Any, Any]] = samples.known.get(("terms", path.key, len(nodes), crossed, dtype), computed)
     return found
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from optics.apertures.aperture import SoftAperture
 from optics.elements.light_stack import LightStack
+from optics.methods.mirrored_matrix import mirroring_share
 from optics.methods.pupil_sampling import MOST_ACROSS
 from optics.methods.sine_stack import SineStack
 from optics.methods.window_edges import FINER, WindowEdges
@@ -25,7 +26,7 @@ STEPS = 8  # choice: numbers of samples per octave; equal ones share arrays
 ELSEWHERE = 8  # choice: number of steps between 0 and the largest sine
 SHIFT = (math.sqrt(5) - 1) / 2  # choice: shift of the finer samples of the check in pitches, see `window_check`
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
-PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 4e-4, 1.5e-8, 3e-8, 1.5e-10
+PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 4e-4, 1.5e-8, 3e-8, 8.5e-11
 MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of the slow factor
 
 
@@ -163,6 +164,7 @@ def plan_costs(window: Grid, rank: Any, across: Any, finer: Any, crossed: Any = 
     """
     (height, width), inner = window.shape, rank * across
     products = (inner * inner * width + height * inner * width) * np.where(crossed, 2, 1)
+    products = products * mirroring_share(window, inner)
     samples = across**2 + finer**2
     entries = np.where(rank == 1, 0, inner * inner)
     seconds = PER_PSF + samples * PER_SAMPLE + entries * PER_ENTRY + products * PER_PRODUCT

@@ -24,7 +24,7 @@ from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, padded_for_packets
 
-__all__ = ["WindowSums", "intensity_of", "pupil_gradient", "recorded_field", "window_field"]
+__all__ = ["WindowSums", "intensity_of", "pupil_gradient", "recorded_field", "weighted", "window_field"]
 
 
 def window_field(pupil: Any, kernel: Any, down: Any, across: Any) -> Any:
@@ -34,7 +34,7 @@ def window_field(pupil: Any, kernel: Any, down: Any, across: Any) -> Any:
     kernel: slow factor, (..., b, a, η, ξ), complex.
     down, across: Fourier kernels along y and x, (..., y, b·η) and (..., x, a·ξ), complex.
     """
-    return down @ _weighted(pupil, kernel) @ across.swapaxes(-1, -2)
+    return down @ weighted(pupil, kernel) @ across.swapaxes(-1, -2)
 
 
 def pupil_gradient(cotangent: Any, kernel: Any, down: Any, across: Any) -> Any:
@@ -50,7 +50,7 @@ def pupil_gradient(cotangent: Any, kernel: Any, down: Any, across: Any) -> Any:
     return (split * kernel.conj()).sum((-4, -3))
 
 
-def _weighted(pupil: Any, kernel: Any) -> Any:
+def weighted(pupil: Any, kernel: Any) -> Any:
     """Return pupil[η, ξ] · kernel[b, a, η, ξ] as matrices (..., b·η, a·ξ)."""
     rows, columns, height, width = kernel.shape[-4:]
     if rows == columns == 1:

@@ -287,6 +287,8 @@ def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
 
 
 def _number(name: str, value: Any, carried: bool = False) -> float:
+    if type(value) is float:
+        return value  # fast path, as in `without_derivative`
     if not carried:
         without_derivative(name, value)
     value = full_precision(name, value)

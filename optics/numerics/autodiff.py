@@ -72,6 +72,8 @@ def grad_enabled(value: Array) -> bool:
 
 def carries_derivative(value: Any) -> bool:
     """Return whether the gradient of `value`, an array of Dr.Jit or a tensor of PyTorch, is enabled."""
+    if type(value) is float:
+        return False  # fast path: planning calls this thousands of times
     return of_torch(value) or (is_differentiable(value) and grad_enabled(value))
 
 
