@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +35,10 @@ from optics.numerics.quadrature import gauss_legendre
 
 __all__ = ["PixelNodes", "PixelPlan", "WindowSamples", "pixel_plan"]
 
-QUADRATURE_SHARE = 0.2  # choice: part of the tolerance that quadrature errors may take, see test_pixel_nodes.py
+QUADRATURE_SHARE = 0.7  # choice: part of the tolerance that quadrature errors may take, see test_pixel_nodes.py
+PARTS = 0.25, 0.5, 0.75  # choice: open parts of pixels that the edge of the aperture cuts
+LARGEST = 50.0  # largest phase [rad] of the table of errors, for which all numbers of nodes are too small
+PHASES = np.linspace(0, LARGEST, 4001)
 POINTS = 40  # choice: number of points of the pupil that determine the rank
 
 
@@ -173,7 +176,7 @@ def pixel_plan(problem: Problem) -> PixelPlan | None:
 def _across(problem: Problem) -> int | None:
     """Return the number of nodes along a pixel with which the mean error of integrals over pixels is small enough.
 
-    The edge of the aperture is assumed to halve the pixels that it cuts.
+    Pixels that the edge of the aperture cuts have larger errors. See `_squared_errors`.
     """
     assert problem.pixelated is not None
     level = LightStack((replace(problem.light, pupil=problem.light.pupil.level),))
@@ -182,9 +185,9 @@ def _across(problem: Problem) -> int | None:
     rays = np.stack([slopes.along_x + path.along_x, slopes.along_y + path.along_y]).ravel() * path.cycles[0, 0]
     side = geometry.cycles[0] * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
     cycles = np.abs(np.add.outer(rays, side)) + problem.detail * problem.radius
-    phase = np.pi * cycles * problem.pixelated.widest
+    phase = np.minimum(np.pi * cycles * problem.pixelated.widest, LARGEST)
     for count in range(1, MOST_NODES):
-        whole, cut = (np.mean(np.square(np.abs(_wrong(count, phase, open_to)))) for open_to in (1.0, 0.5))
+        whole, cut = (np.interp(phase, PHASES, table).mean() for table in _squared_errors(count))
         # Errors along x and y are independent. The relative error of the intensity is twice that of the amplitude.
         wrong = 2 * math.sqrt(2 * (whole + problem.pixelated.cut_share * cut))
         if wrong < QUADRATURE_SHARE * problem.tolerance:
@@ -192,16 +195,18 @@ def _across(problem: Problem) -> int | None:
     return None
 
 
-def _wrong(count: int, phase: np.ndarray, open_to: float) -> np.ndarray:
-    """Return the errors of the integrals of e^{2i phase t} over t from 0 to `open_to`.
+@lru_cache(maxsize=MOST_NODES)
+def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return squared errors of the integrals of e^{2iφt} over [0, 1], and on average over parts, for φ in PHASES.
 
-    The weights of `count` Gauss-Legendre nodes in [0, 1] integrate the interpolating polynomial over this part.
+    The weights of `count` Gauss-Legendre nodes in [0, 1] integrate the interpolating polynomial over each part.
     """
-    at, _ = gauss_legendre(count)
-    t, size = gauss_legendre(MOST_NODES)
-    weight = open_to * lagrange_basis(open_to * t, at) @ size
-    exact = open_to * np.exp(1j * open_to * phase) * np.sinc(open_to * phase / np.pi)
-    return exact - sum(w * np.exp(2j * phase * place) for w, place in zip(weight, at, strict=True))
+    (at, _), (t, size), found = gauss_legendre(count), gauss_legendre(MOST_NODES), []
+    for part in (1.0, *PARTS):
+        weight = part * lagrange_basis(part * t, at) @ size
+        exact = part * np.exp(1j * part * PHASES) * np.sinc(part * PHASES / np.pi)
+        found.append(np.square(np.abs(exact - np.exp(2j * np.outer(PHASES, at)) @ weight)))
+    return found[0], np.mean(found[1:], axis=0)
 
 
 def _rank(problem: Problem, pupil: PixelNodes) -> int | None:
