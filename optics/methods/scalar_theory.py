@@ -16,7 +16,6 @@ import numpy as np
 
 from optics.apertures.aperture import Aperture, Nodes
 from optics.elements.pupil import Pupil
-from optics.numerics.precision import precision
 
 __all__ = ["IN_FOCUS", "ROUND", "light_spread", "scalar_theory_error", "steepest_sine"]
 
@@ -76,10 +75,8 @@ def light_spread(pupil: Pupil) -> float:
     """
     if pupil.mask is None:
         return _open_spread(pupil.aperture)
-    types = precision("float64")
     nodes = pupil.aperture.nodes(CYCLES + pupil.mask.bandwidth(LEVEL, pupil.radius) * pupil.radius, DIGITS)
-    passed = pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y))
-    return _spread(nodes, nodes.weight * np.abs(passed.numpy()))
+    return _spread(nodes, nodes.weight * np.abs(pupil.amplitude(nodes.x, nodes.y)))
 
 
 @lru_cache(maxsize=128)

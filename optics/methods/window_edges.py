@@ -222,9 +222,16 @@ class WindowEdges:
 
     def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ripples of the soft edges of the samples and of the finer samples, which fall in steps, (beam,)."""
-        share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0) ** RIPPLE_EXPONENT
-        share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
+        share = self._ripple_share
+        if curvature.any():
+            share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
         return RIPPLES[0] * share, RIPPLES[1] * share
+
+    @cached_property
+    def _ripple_share(self) -> np.ndarray:
+        """Ripples of soft edges, relative to those at a tolerance of 0.01, (beam,)."""
+        share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0)
+        return np.asarray(share**RIPPLE_EXPONENT)
 
     def _wide(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
         """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""

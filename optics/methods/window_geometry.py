@@ -24,7 +24,7 @@ __all__ = ["PathSlopes", "PlannedRays", "WindowGeometry", "window_geometry"]
 RAYS = 100  # choice: number of rays that determine the rank
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
 RIM = 0.85  # choice: distance from the axis [radii] beyond which rays count as rays of the edge
-KEPT = 32  # choice, limited by memory: arrays that are kept for one window
+KEPT = 64  # choice, limited by memory: number of values that are kept for one window
 
 
 class PathSlopes(NamedTuple):
@@ -91,7 +91,7 @@ class WindowGeometry:
             scale, r = index[:, None] / length, np.hypot(*disk_points(across)[1:])
             return PathSlopes(x * scale, y * scale, (radius / wavelength)[:, None], np.flatnonzero(r > RIM))
 
-        found: PathSlopes = self._known.get(("paths", across), computed)
+        found: PathSlopes = self.known.get(("paths", across), computed)
         return found
 
     def rays(self, across: int) -> PlannedRays:
@@ -107,7 +107,7 @@ class WindowGeometry:
             blur = BLUR * (self.light.wavelength * distance / (2 * radius))[:, None]
             return PlannedRays(some, (x, y), length / index[:, None], blur, (s, t), s * s + t * t)
 
-        found: PlannedRays = self._known.get(("rays", across), computed)
+        found: PlannedRays = self.known.get(("rays", across), computed)
         return found
 
     def _apart(self, across: int, some: slice) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
@@ -120,7 +120,7 @@ class WindowGeometry:
     def rims(self, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the `rim_sines` of soft edges that extend by `reach` radii beyond the rim, (beam,)."""
         radius, distance, *_ = self.light.arrays
-        found: tuple[np.ndarray, np.ndarray, np.ndarray] = self._known.get(
+        found: tuple[np.ndarray, np.ndarray, np.ndarray] = self.known.get(
             ("rims", reach.tobytes()), lambda: rim_sines((1 + reach) * radius, self.window.centre, distance)
         )
         return found
@@ -133,11 +133,12 @@ class WindowGeometry:
             return RemainingFactor(self.path, geometry, self.rays(across).directions)
 
         key = "factor", across, steepest.tobytes(), elsewhere.tobytes()
-        found: RemainingFactor = self._known.get(key, computed)
+        found: RemainingFactor = self.known.get(key, computed)
         return found
 
     @cached_property
-    def _known(self) -> KeptValues:
+    def known(self) -> KeptValues:
+        """Values that depend on the geometry and on their key."""
         return KeptValues(KEPT)
 
 
@@ -147,6 +148,6 @@ def window_geometry(stack: LightStack, window: Grid) -> WindowGeometry:
     return _kept(light, window) if len(stack.beams) == 1 else WindowGeometry(light, window)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=16)
 def _kept(light: LightGeometry, window: Grid) -> WindowGeometry:
     return WindowGeometry(light, window)

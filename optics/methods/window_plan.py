@@ -92,7 +92,7 @@ class WindowPlan:
         return WindowRays.from_slopes(self.stack.slopes, self.geometry)
 
     @cached_property
-    def _elsewhere(self) -> np.ndarray:
+    def elsewhere(self) -> np.ndarray:
         """Sines for `SineGeometry`, in steps of a share of the largest sine, so that PSFs can share arrays, (beam,)."""
         step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
         return np.asarray(np.rint(self._rays.mean_sine / step) * step)
@@ -100,7 +100,7 @@ class WindowPlan:
     @cached_property
     def _ranks(self) -> tuple[np.ndarray, np.ndarray]:
         steepest = np.minimum(self._rims[1], 1 - 1e-9)  # finite points, also for pupils without a rank
-        factor = self.geometry.ray_factor(self.stack.slopes.across, steepest, self._elsewhere)
+        factor = self.geometry.ray_factor(self.stack.slopes.across, steepest, self.elsewhere)
         return window_ranks(self.geometry, factor, self._rays, self.tolerance, self.derivatives)
 
     def samples(self, places: np.ndarray) -> tuple[SineStack, SineStack]:
@@ -115,7 +115,7 @@ class WindowPlan:
         found = []
         for many, shift, (half, steepest, _), edges in sets:
             at = (half[places] / (many - shift))[:, None] * (np.arange(-many, many + 1) + shift)
-            geometry = self.stack.distance[places], self.window.centre, steepest[places], self._elsewhere[places]
+            geometry = self.stack.distance[places], self.window.centre, steepest[places], self.elsewhere[places]
             own = tuple(edges[k] for k in places), self.stack.radius[places], self.edges.curvature[places]
             found.append(SineStack(*geometry, at, *own))
         return found[0], found[1]

@@ -120,16 +120,16 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
     plan = WindowPlan(problem.stack, problem.window, np.array([problem.tolerance]), needs)
     if not plan.counts[0]:
         return None
-    pupil, finer = (_single(samples) for samples in plan.samples(np.array([0])))
-    return WindowSampling(
-        pupil,
-        finer,
-        int(plan.ranks[0]),
-        bool(plan.crossed[0]),
-        plan.geometry.half,
-        float(plan.seconds[0]),
-        float(plan.bytes[0]),
-    )
+    edges, rank = (plan.edges.edges[0], plan.edges.finer_edges[0]), (int(plan.ranks[0]), bool(plan.crossed[0]))
+    key = "sampling", int(plan.counts[0]), *rank, *edges, plan.elsewhere.tobytes()
+
+    def computed() -> WindowSampling:
+        pupil, finer = (_single(samples) for samples in plan.samples(np.array([0])))
+        costs = float(plan.seconds[0]), float(plan.bytes[0])
+        return WindowSampling(pupil, finer, *rank, plan.geometry.half, *costs)
+
+    found: WindowSampling = plan.geometry.known.get(key, computed)
+    return found
 
 
 def _single(stack: SineStack) -> SineSamples:

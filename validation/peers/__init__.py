@@ -5,6 +5,7 @@ functions and propagators that a code can prepare once are prepared before timin
 
 work_precision    proof: error against time of these codes and ours
 population_speed  proof: PSFs per CPU second of whole populations
+new_wavefronts    times of single PSFs in that proof
 optimisation_costs  proof: CPU times of PSFs with gradients, for the design of pupils
 design_cases      pupils of that proof, with a matrix Fourier transform in PyTorch
 peer_claims       proof: claims of other codes' tests and of textbooks

@@ -1,13 +1,18 @@
 """The chart of populations: rows follow their definitions; phase and scale agree with Fresnel's integral."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import optics
-from validation.peers import population_speed
+from validation.peers import new_wavefronts, population_speed
 from validation.reference import relative_l2
+
+
+def defocused(rng):
+    return optics.Pupil(1e-3, wavefront=optics.Zernike({(2, 0): rng.uniform(0.1, 0.2)}), thin_lens_focal_length=22e-3)
 
 
 def test_rows_of_a_small_population(tmp_path, monkeypatch, capsys):
@@ -15,6 +20,9 @@ def test_rows_of_a_small_population(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(population_speed, "GOAL", 0.0)
     monkeypatch.setattr(population_speed, "FEW", 2)
     monkeypatch.setattr(population_speed, "AGAIN", 1)
+    monkeypatch.setattr(new_wavefronts, "cases", lambda: iter([new_wavefronts.Case("defocus", defocused, 33, 1.0)]))
+    monkeypatch.setattr(new_wavefronts, "TIMED", 1)
+    monkeypatch.setattr(new_wavefronts, "BEFORE", 0)
     monkeypatch.setattr(
         sys,
         "argv",
@@ -25,6 +33,7 @@ def test_rows_of_a_small_population(tmp_path, monkeypatch, capsys):
     page = (tmp_path / "population_speed.md").read_text()
     assert page.startswith("# Whole populations")
     assert page.count("\npsf ") == 3
+    assert page.count("\ndefocus                        33 x 33 ") == 1
     assert (tmp_path / "population_speed.png").stat().st_size > 10_000
 
 
@@ -36,6 +45,18 @@ def test_errors_that_exceed_what_was_predicted_are_broken(monkeypatch):
     wrong = {i: 1.1 * population_speed.exact(population[i]) for i in range(4)}
     _, broken = population_speed.ours(population, wrong)
     assert any("predicted errors hold for 0.000" in line for line in broken)
+
+
+def test_single_psfs_with_too_large_errors_are_broken(monkeypatch):
+    def wrong(case, pupil, own=new_wavefronts._psf, **changed):
+        found = own(case, pupil, **changed)
+        return replace(found, tensor=1.1 * found.psf) if "dtype" in changed else found
+
+    monkeypatch.setattr(new_wavefronts, "_psf", wrong)
+    monkeypatch.setattr(new_wavefronts, "TIMED", 1)
+    monkeypatch.setattr(new_wavefronts, "BEFORE", 0)
+    _, broken = new_wavefronts.table(iter([new_wavefronts.Case("defocus", defocused, 33)]))
+    assert "defocus, 33 x 33: error 9" in broken[0]
 
 
 @pytest.mark.parametrize("parts", [1, 4])
