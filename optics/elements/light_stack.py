@@ -134,7 +134,7 @@ class LightStack:
 
     @cached_property
     def mapped(self) -> np.ndarray:
-        """True for beams whose relief or wavefront is no polynomial and may have fine detail, (beam,)."""
+        """True for beams whose relief or wavefront is not a polynomial and may have fine detail, (beam,)."""
         return read_only(np.isin(np.arange(len(self.beams)), self._polynomials[1]))
 
     @cached_property

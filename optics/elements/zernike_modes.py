@@ -44,7 +44,7 @@ def _jacobi(order: int, highest: int, t: Any) -> Iterator[Any]:
 
 
 def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: Any) -> Any:
-    """Return Σ w Z_n^m at (x, y). Many wavefronts have the same samples, so the polynomials are cached for them.
+    """Return Σ w Z_n^m at (x, y). The polynomials are cached, since many wavefronts are evaluated at the same points.
 
     weights, x, y: arrays of NumPy or PyTorch, in float64. Positions carry no derivatives.
     """
@@ -60,7 +60,10 @@ def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: 
 def _modes(
     named: tuple[tuple[int, int], ...], x: bytes, columns: tuple[int, ...], y: bytes, rows: tuple[int, ...]
 ) -> np.ndarray:
-    """Return the polynomials at (x, y), (mode, point). Positions are float64."""
+    """Return the polynomials at (x, y), (mode, point).
+
+    x, y: memory of float64 arrays with the shapes `columns` and `rows`.
+    """
     at = np.frombuffer(x).reshape(columns), np.frombuffer(y).reshape(rows)
     size = np.broadcast_shapes(columns, rows)
     # Modes share the polynomials of the radius and the powers of x + iy.

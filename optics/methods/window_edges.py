@@ -2,8 +2,8 @@
 
 Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
 width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
-diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. The softer edge only
-changes light far from the geometrical rays of the edge, where there is little light.
+diffracted at the edge of the pupil spreads further. A soft edge keeps this light out of the window. Softening the edge
+changes light only far from the geometrical rays of the edge, where there is little light.
 
 If most light of a strongly curved wave misses the window, the wave itself is smoothed with the edge (`curved_disk`).
 This removes light in directions far from the window. The number of samples is then almost independent of the
@@ -60,7 +60,7 @@ class WindowEdges:
     """Soft edges of several pupils for one window.
 
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: needs of derivatives; None if none are requested.
+    derivatives: additional needs of the PSFs if derivatives are requested, else None.
     smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
     """
 
@@ -112,7 +112,7 @@ class WindowEdges:
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, _Bands]:
-        """Curvatures, and the bands of the light."""
+        """Curvatures of the smoothed waves, and the bands of the light."""
         none = np.zeros(len(self.tolerance))
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
@@ -280,7 +280,7 @@ def _medians(values: np.ndarray) -> np.ndarray:
 def _transitions(ripples: np.ndarray) -> np.ndarray:
     """Return the smallest widths of the transition from passband to stopband, in cycles per radius.
 
-    The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to this one.
+    A narrower transition needs a wider soft edge, and the soft edge must not extend beyond EDGE_REACH.
     """
     return np.array([_transition(ripple) for ripple in ripples.tolist()])
 

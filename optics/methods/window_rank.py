@@ -26,8 +26,8 @@ __all__ = [
 ]
 
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
-# Choices: parts of these errors that the rank may take, and with `cross_term`, whose remaining phase depends mostly on
-# the position in the window alone.
+# Choices: part of the tolerance, or of DERIVATIVE_ERROR, that the rank may take, without and with `cross_term`. With
+# this term, the remaining phase depends mostly on the position in the window alone.
 RANK_SHARE, CROSSED_SHARE = 0.3, 0.9
 PLACES = 6  # choice: number of places along a side of the window that determine the rank for derivatives
 OUTSIDE = 1e-3  # choice: weight of rays that miss the window
@@ -65,7 +65,8 @@ class WindowRays:
     def from_slopes(cls, slopes: StackSlopes, geometry: WindowGeometry) -> WindowRays:
         """Return rays from points that are spread evenly over the disks.
 
-        To first order, a ray hits the window at D/n times the slope of the path to its middle, with D the distance.
+        To first order, a ray hits the window at D/n times the slope of its path to the middle of the window, where D is
+        the distance from the ray's point of the pupil to this middle.
         """
         half, planned = geometry.half, geometry.rays(slopes.across)
         blur, pairs = planned.blur, zip((slopes.along_x, slopes.along_y), planned.at, strict=True)

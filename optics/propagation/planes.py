@@ -198,6 +198,7 @@ class PupilSampling:
             frequencies are then part of the pupil's phase.
 
         Raises:
+            ValueError: the pupil has a relief of pixels.
             AccuracyError: more samples are necessary than the limit allows.
         """
         pupil = stop.pupil
@@ -239,6 +240,9 @@ class PupilSampling:
         """Return the field u on the grid times the pupil's transmittance, or its conjugate in backward propagation.
 
         u: None for light from the source.
+
+        Raises:
+            ValueError: a number of the pupil carries a derivative.
         """
         import drjit as dr
 

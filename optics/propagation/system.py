@@ -109,8 +109,8 @@ def propagate_through(
     wavelength: wavelength [m] in vacuum.
     out_dx, out_shape: pitch [m] and shape (y, x) of the output. By default, they equal those of u. They are required if
         u is None.
-    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u. For its
-        smallest value and dtype, see `optics.propagate`.
+    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u. For the
+        smallest tolerance and for dtype, see `optics.propagate`.
     backward: True if u is the field behind the last element, which is propagated back to the plane in front of the
         first element. Propagation and phases are reversed. Light that apertures blocked or that decayed is not
         restored.
@@ -218,7 +218,7 @@ def _start(
     """Return the field in front of the first stop, the output window, and the modulus of the field's brightest sample.
 
     The field is None if a source illuminates the first pupil. Otherwise it is divided by this modulus, because float32
-    cannot represent the power of every field.
+    cannot represent the power of every field. A ValueError names an invalid argument.
     """
     if u is None:
         if out_dx is None or out_shape is None:
@@ -239,7 +239,7 @@ def _start(
 def _stops(elements: Sequence[Element], backward: bool, window: Grid) -> list[Stop]:
     """Return the stops: the pupils, each with the distance in front of it, and the output window as the last stop.
 
-    Distances of adjacent elements of free space are added, which is exact.
+    Distances of adjacent elements of free space are added, which is exact. Pupils that touch raise a ValueError.
     """
     if not elements:
         raise ValueError("elements is empty: must hold at least one Pupil or FreeSpace")
