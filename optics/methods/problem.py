@@ -60,8 +60,7 @@ class Problem:
     masked: True if a mask scatters light where no rays arrive. Approximations then cannot predict their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: True if the PSF carries derivatives.
-    moves: True if derivatives with respect to the distance are requested.
-    resized: True if derivatives with respect to the radius are requested.
+    moves, resized: True if derivatives with respect to the distance or the radius, respectively, are requested.
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     detail_part: largest phase [rad] of neglected detail, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even if the window needs fewer samples.
@@ -125,7 +124,6 @@ class Problem:
         symmetric = found.symmetric and still and beam.pupil.rotationally_symmetric(beam.wavelength)
         even = found.even and still and beam.pupil.mirror_symmetric(beam.wavelength)
         moves, resized = map(carries_derivative, (beam.distance, beam.radius))
-        # A level relief has pixels only if derivatives are requested.
         return replace(found, aperture=beam.aperture, moves=moves, resized=resized, symmetric=symmetric, even=even)
 
     @cached_property

@@ -224,10 +224,7 @@ class SineStack(SineGeometry):
 
 
 class Stackable(Protocol):
-    """Samples of other kinds."""
-
-    def stack(self) -> SineStack:
-        """Return the samples as a stack of one."""
+    def stack(self) -> SineStack: ...
 
 
 @lru_cache(maxsize=16)
