@@ -4,6 +4,7 @@ source            PointSource
 pupil             Pupil: aperture, relief, ideal lens
 phase_pupil       pupils with the same phase at every wavelength
 relief            Relief, HeightMap, BSplineRelief
+spline_map        cubic splines through the samples of a map
 pixel_relief      PixelRelief: stepped reliefs
 fine_detail       spatial frequencies that samples contain
 square_samples    checks of the samples of reliefs, masks and wavefronts

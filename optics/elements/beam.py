@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from optics.apertures.aperture import SoftAperture
+from optics.apertures.aperture import Aperture, SoftAperture
+from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.arguments import of_kind
@@ -41,6 +42,12 @@ class Beam:
     def index(self) -> float:
         """Refractive index of the medium behind the pupil."""
         return self.pupil.index_behind(self.wavelength)
+
+    @property
+    def aperture(self) -> Aperture:
+        """Aperture of the pupil, divided into the pixels of its relief if there are any."""
+        pixels = self.pupil.pixels if self.pupil.bends(self.wavelength) else 0
+        return PixelatedAperture(self.pupil.aperture, pixels) if pixels else self.pupil.aperture
 
     def waves(self, x: Array, y: Array) -> Array:
         """Return the optical path at points (x, y) [m], in vacuum wavelengths. For the arrays, see `Relief.height`."""

@@ -204,7 +204,8 @@ class Pupil:
         return {}
 
     @cached_property
-    def _level(self) -> Pupil:
+    def level(self) -> Pupil:
+        """The same pupil without its relief."""
         return replace(self, height=None)
 
     def index_step(self, wavelength: float) -> Scalar:
@@ -236,8 +237,8 @@ class Pupil:
         It is relative to the path through the centre without relief and wavefront.
         """
         total = source.path(x, y) * like(x, self.index_before(wavelength))
-        if (shorter := lens_path(self, x, y)) is not None:
-            total = total - shorter * like(x, self.index_behind(wavelength))
+        if self.thin_lens_focal_length is not None:
+            total = total - lens_path(self.thin_lens_focal_length, x, y) * like(x, self.index_behind(wavelength))
         if self.bends(wavelength):
             total = total + like(x, self.index_step(wavelength)) * relief_height(self, x, y)
         return total if (ahead := wavefront_ahead(self, x, y)) is None else total - ahead
@@ -247,7 +248,7 @@ class Pupil:
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
-        level = self._level if self.pixels else self
+        level = self.level if self.pixels else self
         return all_slopes(level, same, number(source.distance), source.plain.angle, self.pieces(same))
 
     def pieces(self, wavelength: float) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from optics.numerics.array_library import library, like
-from optics.numerics.autodiff import Array
+from optics.numerics.autodiff import Array, Scalar
 
 if TYPE_CHECKING:
     from optics.elements.pupil import Pupil
@@ -17,15 +17,13 @@ if TYPE_CHECKING:
 __all__ = ["lens_path", "relief_height", "wavefront_ahead"]
 
 
-def lens_path(pupil: Pupil, x: Array, y: Array) -> Array | None:
-    """Return the length [m] by which the ideal lens shortens the path at points (x, y) [m]; None without a lens.
+def lens_path(focal_length: Scalar, x: Array, y: Array) -> Array:
+    """Return the length [m] by which an ideal lens shortens the path at points (x, y) [m].
 
     It is √(r² + f²) - f, a path in vacuum, at the distance r from the axis, for a focal length f > 0. For f < 0, it is
     the negative of the length for |f|. x and y are arrays as in `Relief.height`.
     """
-    if pupil.thin_lens_focal_length is None:
-        return None
-    f, own = like(x, pupil.thin_lens_focal_length), library(x)
+    f, own = like(x, focal_length), library(x)
     r2 = x * x + y * y
     return r2 / (own.sqrt(r2 + f * f) + own.abs(f)) * own.sign(f)
 

@@ -10,13 +10,22 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
 from optics.elements.fine_detail import band_of, power_beyond, reach_of
+from optics.elements.spline_map import (
+    is_open_grid,
+    spline_basis,
+    spline_cell,
+    spline_coefficients,
+    spline_matrix,
+    spline_width,
+)
 from optics.elements.square_samples import map_samples, on_both_sides
 from optics.numerics.arguments import finite, plain_reals, positive
-from optics.numerics.array_library import gather, indices, library, like, matrix_like
+from optics.numerics.array_library import gather, library, like, matrix_like, sparse_product
 from optics.numerics.autodiff import Array, is_differentiable, plain
 from optics.numerics.interpolation import cubic_bsplines, tensor_product
 
@@ -192,24 +201,31 @@ class HeightMap(Relief):
 
     @cached_property
     def _coefficients(self) -> np.ndarray:
-        return np.ascontiguousarray(_spline_coefficients(_spline_coefficients(self._heights).T).T)
+        return spline_coefficients(self._heights)
 
     def _values(self, x: Array) -> Array:
-        """Return the spline coefficients in the array library of `x`: M h Nᵀ for samples h, see `_spline_matrix`."""
+        """Return the spline coefficients in the array library of `x`: M h Nᵀ for samples h, see `spline_matrix`."""
         if not is_differentiable(self.samples) or library(x) is np:
             return like(x, self._coefficients)
-        down, across = map(_spline_matrix, self._heights.shape)
+        down, across = map(spline_matrix, self._heights.shape)
         found = matrix_like(x, down) @ matrix_like(x, self.samples) @ matrix_like(x, np.ascontiguousarray(across.T))
         return like(x, found)
 
     def height(self, x: Array, y: Array) -> Array:
         rows, columns = self._heights.shape
-        if _open_grid(x, y):
-            return _basis(y[:, 0], rows) @ self._coefficients @ _basis(x[0], columns).T
+        if is_open_grid(x, y):
+            return spline_basis(y[:, 0], rows) @ self._coefficients @ spline_basis(x[0], columns).T
         values = self._values(x)
-        (column, across), (row, along) = _cell(x, columns), _cell(y, rows)
-        stride = like(row, _width(columns))
+        (column, across), (row, along) = spline_cell(x, columns), spline_cell(y, rows)
+        stride = like(row, spline_width(columns))
         return tensor_product(lambda i, j: gather(values, (row + i) * stride + column + j), across, along)
+
+    def weighted(self, weights: Any, like_array: Array) -> Array:
+        """Return heights [m] at fixed points, flat, from the result of `spline_weights` for these points.
+
+        like_array: array of NumPy or PyTorch, which determines the library of the result.
+        """
+        return sparse_product(weights, self._values(like_array).reshape(-1))
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
         """Return heights (y, x) at positions in units of the radius; NumPy arrays without derivatives."""
@@ -233,64 +249,6 @@ class HeightMap(Relief):
     @property
     def mirror_symmetric(self) -> bool:
         return not is_differentiable(self.samples) and on_both_sides(self._heights)
-
-
-def _open_grid(x: Array, y: Array) -> bool:
-    """Return whether x is a NumPy row and y a NumPy column. The heights are then a product of matrices."""
-    return library(x) is np and x.ndim == y.ndim == 2 and len(x) == 1 and y.shape[1] == 1
-
-
-def _margin(n: int) -> int:
-    """Return the number of spline coefficients beyond either end of n samples."""
-    return max(3, n // 4)
-
-
-def _width(n: int) -> int:
-    """Return the number of spline coefficients for n samples along an axis."""
-    return n + 2 * _margin(n)
-
-
-def _cell(position: Array, n: int) -> tuple[Array, list[Array]]:
-    """Return the index of the first of the four spline coefficients at a position, and the weights of all four."""
-    own, half, shift = library(position), like(position, n / 2), like(position, _margin(n) - 0.5)
-    place = position * half + half + shift
-    cell = own.clip(own.floor(place), like(position, 1.0), like(position, _width(n) - 3.0))
-    return indices(cell) - 1, cubic_bsplines(place - cell)
-
-
-def _basis(at: np.ndarray, n: int) -> np.ndarray:
-    """Return the B-splines of all coefficients at positions along an axis of n samples, (position, coefficient)."""
-    first, weights = _cell(at, n)
-    basis, place = np.zeros((len(at), _width(n))), np.arange(len(at))
-    for k, weight in enumerate(weights):
-        basis[place, first + k] = weight
-    return basis
-
-
-def _spline_coefficients(samples: np.ndarray) -> np.ndarray:
-    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, also beyond both ends."""
-    from scipy.interpolate import make_interp_spline
-
-    n, margin = len(samples), _margin(len(samples))
-    places = np.arange(-2, n + 2)
-    if n < 4:
-        fitted = np.polynomial.polynomial.polyfit(np.arange(n), samples, n - 1)
-        second = np.polynomial.polynomial.polyder(fitted, 2)
-        value, bend = (np.polynomial.polynomial.polyval(places, curve).T for curve in (fitted, second))
-    else:
-        spline = make_interp_spline(np.arange(n), samples, k=3)
-        value, bend = spline(places), spline(places, nu=2)
-    core = value - bend / 6
-    steps = np.arange(1, margin - 1)[:, None]
-    before = core[0] + (core[0] - core[1]) * steps[::-1]
-    after = core[-1] + (core[-1] - core[-2]) * steps
-    return np.concatenate([before, core, after])
-
-
-@lru_cache(maxsize=16)
-def _spline_matrix(n: int) -> np.ndarray:
-    """Return the matrix of `_spline_coefficients` for n samples, (coefficient, sample)."""
-    return _spline_coefficients(np.eye(n))
 
 
 @lru_cache(maxsize=16)

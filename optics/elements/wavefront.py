@@ -246,6 +246,10 @@ class WavefrontMap(Aberration):
     def ahead(self, x: Array, y: Array) -> Array:
         return self._map.height(x, y)
 
+    def weighted(self, weights: Any, like_array: Array) -> Array:
+        """Return W [m] at fixed points, see `HeightMap.weighted`."""
+        return self._map.weighted(weights, like_array)
+
     def bandwidth(self, level: float) -> float:
         return self._map.bandwidth(level)
 

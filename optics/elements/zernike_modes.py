@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
@@ -20,21 +21,29 @@ def mode(n: int, m: int, x: Any, y: Any) -> Any:
     """Return the Zernike polynomial Z_n^m at (x, y) in units of the circle's radius, arrays of any library.
 
     It is norm(n, m) ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos mθ, sin |m|θ}, with k = (n - |m|)/2 and Jacobi's polynomials P.
-    The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
     """
     sine, cosine = x * 0, x * 0 + 1.0
     for _ in range(abs(m)):
         cosine, sine = cosine * x - sine * y, cosine * y + sine * x
-    t, order = 2 * (x * x + y * y) - 1, abs(m)
-    before, now = x * 0, x * 0 + 1.0
-    for k in range(1, (n - order) // 2 + 1):
+    *_, radial = _jacobi(abs(m), (n - abs(m)) // 2, 2 * (x * x + y * y) - 1)
+    return norm(n, m) * radial * (cosine if m >= 0 else sine)
+
+
+def _jacobi(order: int, highest: int, t: Any) -> Iterator[Any]:
+    """Yield P_k^(0, order)(t) for k from 0 to `highest`.
+
+    The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
+    """
+    before, now = t * 0, t * 0 + 1.0
+    yield now
+    for k in range(1, highest + 1):
         c = 2 * k + order
         if k == 1:
             before, now = now, 1 + (order + 2) / 2 * (t - 1)
-            continue
-        raised = (c - 1) * (c * (c - 2) * t - order**2) * now - 2 * (k - 1) * (k + order - 1) * c * before
-        before, now = now, raised / (2 * k * (k + order) * (c - 2))
-    return norm(n, m) * now * (cosine if m >= 0 else sine)
+        else:
+            raised = (c - 1) * (c * (c - 2) * t - order**2) * now - 2 * (k - 1) * (k + order - 1) * c * before
+            before, now = now, raised / (2 * k * (k + order) * (c - 2))
+        yield now
 
 
 def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: Any) -> Any:
@@ -62,7 +71,19 @@ def _modes(
     """
     at = np.frombuffer(x).reshape(columns), np.frombuffer(y).reshape(rows)
     size = np.broadcast_shapes(columns, rows)
-    return np.stack([np.broadcast_to(mode(n, m, *at), size).ravel() for n, m in named])
+    # Modes share the polynomials of the radius and the powers of x + iy.
+    radial: dict[tuple[int, int], np.ndarray] = {}
+    turns = [np.ones(size, complex)]
+    square = 2 * (at[0] * at[0] + at[1] * at[1]) - 1
+    for order in range(max(abs(m) for _, m in named) + 1):
+        highest = max(((n - order) // 2 for n, m in named if abs(m) == order), default=-1)
+        radial |= {(order + 2 * k, order): own for k, own in enumerate(_jacobi(order, highest, square))}
+        turns.append(turns[-1] * (at[0] + 1j * at[1]))
+    found = np.empty((len(named), *size))
+    for place, (n, m) in enumerate(named):
+        turn = turns[abs(m)]
+        np.multiply(norm(n, m) * radial[n, abs(m)], turn.real if m >= 0 else turn.imag, out=found[place])
+    return found.reshape(len(named), -1)
 
 
 def norm(n: int, m: int) -> float:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
-from optics.methods.sine_samples import SineSamples
-from optics.methods.sine_stack import SineGeometry, SineStack, even_weights
+from optics.methods.sine_stack import SineStack, even_weights
 from optics.methods.slow_factor import Path, slow_parts
 from optics.numerics.array_library import turned
 from optics.numerics.grid import sample_positions
@@ -22,6 +22,17 @@ __all__ = ["AxisFactor", "AxisRows", "Pair", "axis_factor", "axis_kernel", "wind
 Pair = tuple[np.ndarray, np.ndarray]
 
 SMOOTH = 12  # choice: number of sines, and of positions, from which smooth phases are interpolated
+
+
+class HasDirections(Protocol):
+    """Samples of one or several pupils: `SineSamples`, `SineGeometry`, or `PixelNodes`."""
+
+    @property
+    def elsewhere(self) -> float | np.ndarray:
+        """Sines at which the factors along the other axis are evaluated."""
+
+    def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return points (x, y) [m] of the pupils."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +46,7 @@ class AxisFactor:
     """
 
     path: Path
-    samples: SineSamples | SineGeometry
+    samples: HasDirections
     axis: int
     sines: np.ndarray
 
@@ -64,9 +75,7 @@ class AxisFactor:
         return points, directions, slow_parts(self.path, points, directions, (none, none))
 
 
-def axis_factor(
-    path: Path, samples: SineSamples | SineGeometry, axis: int, sines: np.ndarray, places: np.ndarray
-) -> np.ndarray:
+def axis_factor(path: Path, samples: HasDirections, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return the `AxisFactor` at positions [m] relative to the middle of the window, complex.
 
     Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in

@@ -60,7 +60,7 @@ class Problem:
     masked: True if a mask scatters light where no rays arrive. Approximations then cannot predict their error.
     spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
     differentiated: True if the PSF carries derivatives.
-    moves: True if derivatives with respect to the distance are requested.
+    moves, resized: True if derivatives with respect to the distance or the radius, respectively, are requested.
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     detail_part: largest phase [rad] of neglected detail, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even if the window needs fewer samples.
@@ -85,6 +85,7 @@ class Problem:
     even: bool = False
     differentiated: bool = False
     moves: bool = False
+    resized: bool = False
     knots: DerivativeKnots | None = None
     detail_part: float = DETAIL_PART
     all_light: bool = False
@@ -122,7 +123,8 @@ class Problem:
         still = not any(map(carries_derivative, beam.source.angle))
         symmetric = found.symmetric and still and beam.pupil.rotationally_symmetric(beam.wavelength)
         even = found.even and still and beam.pupil.mirror_symmetric(beam.wavelength)
-        return replace(found, moves=carries_derivative(beam.distance), symmetric=symmetric, even=even)
+        moves, resized = map(carries_derivative, (beam.distance, beam.radius))
+        return replace(found, aperture=beam.aperture, moves=moves, resized=resized, symmetric=symmetric, even=even)
 
     @cached_property
     def stack(self) -> LightStack:
@@ -279,11 +281,10 @@ def _differentiated(beam: Beam, window: Grid, tolerance: float, dtype: str, knot
 @lru_cache(maxsize=256)
 def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float = DETAIL_PART) -> Problem:
     pupil, wavelength = beam.pupil, beam.wavelength
-    pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
     return Problem(
         light=beam,
-        aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
+        aperture=beam.aperture,
         radius=pupil.radius,
         wavelength=wavelength / beam.index,
         distance=beam.distance,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -227,9 +228,15 @@ class SineStack(SineGeometry):
         return np.asarray(self.known.get(key, lambda: turned(*self._to_middle(wavelength, *self.points), dtype)))
 
 
+class Stackable(Protocol):
+    def stack(self) -> SineStack: ...
+
+
 @lru_cache(maxsize=16)
-def single_stack(samples: SineSamples) -> SineStack:
+def single_stack(samples: SineSamples | Stackable) -> SineStack:
     """Return the samples of a single pupil as a stack of one. Many PSFs have the same samples, so it is cached."""
+    if not isinstance(samples, SineSamples):
+        return samples.stack()
     numbers = samples.distance, samples.steepest, samples.elsewhere, samples.edge.radius
     distance, steepest, elsewhere, radius = (np.array([value]) for value in numbers)
     edges = (samples.edge.aperture,)

@@ -46,6 +46,7 @@ RIM_CYCLES = 1.2  # choice: cycles of most of the rays of the edge, relative to 
 # relative to those of the rays at the edge, exponent of the tolerance, and cycles per cell between knots.
 CARRIED_RIPPLES, CARRIED_PASSBAND = (0.03, 0.002), 0.35
 CARRIED_CYCLES, CARRIED_RIM_CYCLES, CARRIED_EXPONENT, CELL_CYCLES = 7.6, 5.7, -0.4, 0.375
+CARRIED_STEPS = 6  # choice: densities of such samples per octave; equal ones share all arrays
 EDGES = 4  # choice: number of sharpnesses of the edge per octave; equal ones share tables
 SMOOTHED_RIPPLE = 0.1  # choice: ripple for smoothed waves, whose brightest light it affects, relative to others
 # Choices: step of the curvature in cycles per radius, so that pupils share tables, and the least useful curvature.
@@ -179,6 +180,7 @@ class WindowEdges:
         sharp = CARRIED_CYCLES + CARRIED_RIM_CYCLES * rim + orders + cells * CELL_CYCLES
         sharp = sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT
         density = np.maximum(direct + sharp + self._masks, self._widest)
+        density = 2.0 ** (np.ceil(CARRIED_STEPS * np.log2(density) - 1e-9) / CARRIED_STEPS)
         return _Bands(density, np.zeros_like(density), np.zeros_like(density))
 
     @property

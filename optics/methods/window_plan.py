@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from optics.methods.window_geometry import WindowGeometry, window_geometry
 from optics.methods.window_rank import Derivatives, WindowRays, window_ranks
 from optics.numerics.grid import Grid
 
-__all__ = ["TIGHTEST", "WindowPlan"]
+__all__ = ["MOST_ENTRIES", "TIGHTEST", "WindowPlan", "plan_costs"]
 
 TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
 STEPS = 8  # choice: numbers of samples per octave; equal ones share arrays
@@ -64,7 +65,8 @@ class WindowPlan:
         needed = np.where(suitable, across / self._pitch(self.edges.density), 0)
         within = suitable & (needed < MOST_ACROSS)
         least = np.ceil(np.where(within, needed, 1) - 1e-9)
-        step = np.maximum(1, 2 ** np.floor(np.log2(least / STEPS)))
+        # The densities that derivatives need have steps already.
+        step = 1 if self.derivatives is not None else np.maximum(1, 2 ** np.floor(np.log2(least / STEPS)))
         found = np.where(within, np.ceil(least / step) * step, 0).astype(int)
         finer = 2 * self.finer_count(found) + 1
         fits = np.maximum(self.ranks * (2 * found + 1), finer) <= math.sqrt(MOST_ENTRIES)
@@ -130,14 +132,8 @@ class WindowPlan:
 
     @cached_property
     def _costs(self) -> tuple[np.ndarray, np.ndarray]:
-        across, (height, width) = 2 * self.counts + 1, self.window.shape
-        inner = self.ranks * across
-        products = (inner * inner * width + height * inner * width) * np.where(self.crossed, 2, 1)
-        products = products * mirroring_share(self.window, inner)
-        samples = across**2 + (2 * self.finer_count(self.counts) + 1) ** 2
-        entries = np.where(self.ranks == 1, 0, inner * inner)
-        seconds = PER_PSF + samples * PER_SAMPLE + entries * PER_ENTRY + products * PER_PRODUCT
-        return seconds, 16 * (4 * inner * inner + inner * (height + 2 * width) + samples)
+        across, finer = 2 * self.counts + 1, 2 * self.finer_count(self.counts) + 1
+        return plan_costs(self.window, self.ranks, across, finer, self.crossed)
 
     def _pitch(self, density: np.ndarray) -> np.ndarray:
         """Return the largest spacing of sines at which a pupil has `density` samples per radius everywhere.
@@ -159,3 +155,18 @@ class WindowPlan:
 
     def _sines(self, edges: list[SoftAperture]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.geometry.rims(np.array([edge.reach for edge in edges]))
+
+
+def plan_costs(window: Grid, rank: Any, across: Any, finer: Any, crossed: Any = False) -> tuple[Any, Any]:
+    """Return the predicted time [s] and memory of a PSF; the arguments are numbers or arrays (beam,).
+
+    across, finer: numbers of samples along an axis of the pupil, and of those for the check.
+    crossed: whether the sum includes `cross_term`.
+    """
+    (height, width), inner = window.shape, rank * across
+    products = (inner * inner * width + height * inner * width) * np.where(crossed, 2, 1)
+    products = products * mirroring_share(window, inner)
+    samples = across**2 + finer**2
+    entries = np.where(rank == 1, 0, inner * inner)
+    seconds = PER_PSF + samples * PER_SAMPLE + entries * PER_ENTRY + products * PER_PRODUCT
+    return seconds, 16 * (4 * inner * inner + inner * (height + 2 * width) + samples)

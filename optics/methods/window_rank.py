@@ -13,7 +13,17 @@ from optics.methods.slow_factor import RANKS, cross_term
 from optics.methods.window_geometry import WindowGeometry
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
-__all__ = ["DERIVATIVE_ERROR", "Derivatives", "WindowRays", "window_ranks"]
+__all__ = [
+    "DERIVATIVE_ERROR",
+    "MOST_RANK",
+    "PLACES",
+    "RANK_OF_DISTANCE",
+    "RANK_SHARE",
+    "Derivatives",
+    "WindowRays",
+    "interpolation_errors",
+    "window_ranks",
+]
 
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
 # Choices: part of the tolerance, or of DERIVATIVE_ERROR, that the rank may take, without and with `cross_term`. With
@@ -102,7 +112,8 @@ def window_ranks(
         if rank < least:
             continue
         nodes = half * chebyshev_points(rank)
-        fits = [_errors(*test[:3], nodes, whole) < test[3] for test, whole in zip(tests, exact, strict=True)]
+        pairs = zip(tests, exact, strict=True)
+        fits = [interpolation_errors(*test[:3], nodes, whole) < test[3] for test, whole in pairs]
         found[(found == 0) & np.all(fits, axis=0)] = rank
         if rank == 1 and derivatives is None and not found.all():
             a, b = cross_term(path, factor.samples, directions, rays.window)
@@ -113,7 +124,7 @@ def window_ranks(
     return found, crossed
 
 
-def _errors(
+def interpolation_errors(
     factor: RemainingFactor,
     place: tuple[np.ndarray, np.ndarray],
     weight: np.ndarray,

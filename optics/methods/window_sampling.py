@@ -15,6 +15,7 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.methods.axis_kernel import axis_factor
 from optics.methods.carrier import on_window
+from optics.methods.pixel_nodes import WindowSamples, pixel_plan
 from optics.methods.problem import Problem
 from optics.methods.pupil_edge import PupilEdge
 from optics.methods.sine_samples import SineSamples
@@ -43,8 +44,8 @@ class WindowSampling:
     half_width: distance [m] from the middle of the window within which the interpolation points lie.
     """
 
-    pupil: SineSamples
-    finer: SineSamples
+    pupil: WindowSamples
+    finer: WindowSamples
     rank: int
     crossed: bool
     half_width: float
@@ -108,8 +109,11 @@ class WindowSampling:
 def window_sampling(problem: Problem) -> WindowSampling | None:
     """Return the samples for a coarse tolerance. The result is None if the method is not suitable."""
     fine = problem.tolerance < TIGHTEST or problem.reach is not None or math.isfinite(problem.widest_band)
-    if fine or problem.all_light or problem.pixelated is not None:
+    if fine or problem.all_light:
         return None
+    if problem.pixelated is not None:
+        pixels = pixel_plan(problem)
+        return None if pixels is None else WindowSampling(*pixels[:3], False, *pixels[3:])
     needs = None
     if problem.differentiated:
         needs = Derivatives(problem.moves, 0 if problem.knots is None else len(problem.knots.borders) - 1)
@@ -140,7 +144,7 @@ def _single(stack: SineStack) -> SineSamples:
 
 
 @lru_cache(maxsize=64)
-def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: str) -> WindowSums:
+def _window_sums(pupil: WindowSamples, rank: int, half: float, path: Path, dtype: str) -> WindowSums:
     complex_dtype, nodes = precision(dtype).complex_dtype, half * chebyshev_points(rank)
     column, row = pupil.at[None, :], pupil.at[:, None]
     u, v = nodes[None, :, None, None], nodes[:, None, None, None]

@@ -8,19 +8,21 @@ factor once for each wavelength. The sums over the pupil are stacked matrix prod
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from optics.elements.pupil import Pupil
-from optics.elements.pupil_path import lens_path, relief_height, wavefront_ahead
+from optics.elements.pupil_path import lens_path
 from optics.elements.source import PointSource
-from optics.methods.sine_samples import SineSamples
+from optics.methods.pixel_nodes import WindowSamples
+from optics.methods.sampled_path import sampled_height, sampled_wavefront
 from optics.methods.sine_stack import single_stack
 from optics.methods.slow_factor import Path
 from optics.methods.window_check import window_errors
 from optics.methods.window_sampling import WindowSampling
 from optics.methods.window_sums import intensity_of, window_field
+from optics.numerics.array_cache import cached_arrays
 from optics.numerics.array_library import library, like, turned
 from optics.numerics.autodiff import Array, Scalar, carries_derivative, number
 from optics.numerics.grid import Grid
@@ -28,6 +30,7 @@ from optics.numerics.grid import Grid
 __all__ = ["WindowStack"]
 
 MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of a stack of matrices
+MOST_BYTES = 64e6  # choice, limited by memory: all waves that are cached
 
 
 @dataclass(frozen=True)
@@ -75,42 +78,32 @@ class WindowStack:
         waves = [wavelength / self.pupil.index_behind(wavelength) for wavelength in self.wavelengths]
         return [Path(wave, number(self.distance), self.window) for wave in waves]
 
-    def _light(self, samples: SineSamples) -> Iterator[Array]:
+    def _light(self, samples: WindowSamples) -> Iterator[Array]:
         """Yield the light behind the pupil times the areas of the samples, (source, η, ξ), for each wavelength."""
-        pupil, (x, y, size) = self.pupil, map(self.convert, samples.layout)
-        height, ahead = relief_height(pupil, x, y), wavefront_ahead(pupil, x, y)
+        pupil, (x, y, _) = self.pupil, samples.layout
+        height, ahead = (found(pupil, samples, self.convert) for found in (sampled_height, sampled_wavefront))
         if pupil.mask is not None:
-            size = size * pupil.amplitude(x / pupil.radius, y / pupil.radius)
-        straight = self._straight(samples)
+            amplitude = pupil.amplitude(self.convert(x / pupil.radius), self.convert(y / pupil.radius))
         for wavelength in self.wavelengths:
-            path = like(x, 0.0) * x
-            if height is not None:
-                path = path + like(x, pupil.index_step(wavelength)) * height
+            light = self._straight(samples, wavelength)
+            path = None if height is None else like(height, pupil.index_step(wavelength)) * height
             if ahead is not None:
-                path = path - ahead
-            yield straight(wavelength) * turned(size, path / wavelength, self.dtype)
+                path = -ahead if path is None else path - ahead
+            if path is not None:
+                light = light * turned(1.0, path / wavelength, self.dtype)
+            yield light if pupil.mask is None else light * like(light.real, amplitude)
 
-    def _straight(self, samples: SineSamples) -> Callable[[float], Array]:
-        """Return a function that returns, for a wavelength, the waves behind the ideal lens, (source, η, ξ).
+    def _straight(self, samples: WindowSamples, wavelength: float) -> Array:
+        """Return the waves behind the ideal lens times the areas of the samples, (source, η, ξ).
 
         If no number of lens and sources carries a derivative, NumPy computes the waves.
         """
-        pupil, (x, y, _) = self.pupil, samples.layout
-        numbers = [number for source in self.sources for number in (source.distance, *source.angle)]
-        carried = any(map(carries_derivative, [pupil.thin_lens_focal_length, *numbers]))
-        if carried:
-            x, y = self.convert(x), self.convert(y)
-        shorter, paths = lens_path(pupil, x, y), [source.path(x, y) for source in self.sources]
-        path = library(x).stack(paths)
-
-        def wave(wavelength: float) -> Array:
-            whole = path * (pupil.index_before(wavelength) / wavelength)
-            if shorter is not None:
-                whole = whole - shorter * (pupil.index_behind(wavelength) / wavelength)
-            found = turned(1.0, whole, self.dtype)
-            return found if carried else self.convert(found)
-
-        return wave
+        pupil = self.pupil
+        indices = pupil.index_before(wavelength), pupil.index_behind(wavelength)
+        lens = _LensLight(pupil.thin_lens_focal_length, self.sources, indices, wavelength, self.dtype)
+        if lens.carries_derivatives:
+            return lens.waves(*map(self.convert, samples.layout))
+        return self.convert(_fixed_waves(lens.plain, samples))
 
     def _image(self, light: Array, sampling: WindowSampling, path: Path) -> Array:
         """Return |U|² over the window, (source, y, x), from the light behind the pupil."""
@@ -122,3 +115,44 @@ class WindowStack:
         parts = [light[first : first + many] for first in range(0, len(light), many)]
         images = [intensity_of(window_field(part, kernel, down, across)) for part in parts]
         return images[0] if len(images) == 1 else library(light).concatenate(images)
+
+
+@dataclass(frozen=True)
+class _LensLight:
+    """Light of several sources at one wavelength [m] in vacuum, behind an ideal lens.
+
+    focal_length: focal length [m] in vacuum; None without a lens.
+    indices: refractive indices before and behind the pupil.
+    """
+
+    focal_length: Scalar | None
+    sources: tuple[PointSource, ...]
+    indices: tuple[float, float]
+    wavelength: float
+    dtype: str
+
+    @property
+    def carries_derivatives(self) -> bool:
+        numbers = [number for source in self.sources for number in (source.distance, *source.angle)]
+        return any(map(carries_derivative, [self.focal_length, *numbers]))
+
+    @property
+    def plain(self) -> _LensLight:
+        """The same light without derivatives, whose numbers can be compared."""
+        focal = None if self.focal_length is None else number(self.focal_length)
+        return replace(self, focal_length=focal, sources=tuple(source.plain for source in self.sources))
+
+    def waves(self, x: Array, y: Array, size: Array) -> Array:
+        """Return the waves at points (x, y) [m], with amplitude `size`, (source, y, x)."""
+        before, behind = self.indices
+        found = library(x).stack([source.path(x, y) for source in self.sources]) * (before / self.wavelength)
+        if self.focal_length is not None:
+            found = found - lens_path(self.focal_length, x, y) * (behind / self.wavelength)
+        return turned(size, found, self.dtype)
+
+
+@cached_arrays(MOST_BYTES, lambda waves: waves.nbytes)
+def _fixed_waves(lens: _LensLight, samples: WindowSamples) -> np.ndarray:
+    """Return the waves behind a lens at samples, times their areas. Pupils often have the same lens and sources."""
+    found: np.ndarray = lens.waves(*samples.layout)
+    return found

@@ -2,6 +2,7 @@
 
 accuracy        Plan and AccuracyError: predicted errors of results
 arguments       checks of user input
+array_cache     a cache of large results, limited by memory
 array_library   arrays of NumPy, PyTorch and Dr.Jit
 array_sum_cost  predicted times of Fourier sums of NumPy arrays
 autodiff        Array and Scalar: values that may carry derivatives

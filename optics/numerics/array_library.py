@@ -8,6 +8,8 @@ passes a tensor has imported it.
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ import numpy as np
 from optics.numerics.autodiff import Array, carries_derivative, is_differentiable, plain
 from optics.numerics.precision import padded_for_packets
 
-__all__ = ["fma", "gather", "indices", "library", "like", "matrix_like", "turned"]
+__all__ = ["fma", "gather", "indices", "library", "like", "matrix_like", "sparse_product", "turned"]
 
 
 def library(x: Array) -> Any:
@@ -85,24 +87,70 @@ def fma(a: Array, b: Array, c: Array) -> Array:
     return own.fma(a, b, c) if own.__name__ == "drjit" else a * b + c
 
 
+def sparse_product(matrix: Any, values: Array) -> Array:
+    """Return the product of a sparse matrix of SciPy and a vector of NumPy or PyTorch.
+
+    Derivatives of PyTorch are the product with the transposed matrix. Tensors must be on the processor.
+    """
+    own = library(values)
+    return matrix @ values if own is np else _operations(own).sparse_product.apply(values, matrix)
+
+
 def turned(size: Any, waves: Array, dtype: str) -> Array:
     """Return size · e^{2πi waves} as a complex array of NumPy or PyTorch.
 
     size: real number or array that broadcasts with `waves`.
-    waves: float64 array. Whole waves are subtracted before it is rounded.
+    waves: float64 array. Whole waves are subtracted before it is rounded. Tensors must be on the processor.
     dtype: "float32" or "float64", the type of the real and imaginary parts.
     """
     own = library(waves)
-    angle = (waves - own.round(waves)) * (2 * np.pi)
     if own is np:
-        angle = angle.astype(dtype)
-        found = np.empty(angle.shape, np.result_type(dtype, np.complex64))
-        np.multiply(np.cos(angle), size, out=found.real)
-        np.multiply(np.sin(angle), size, out=found.imag)
-        return found
-    kind = getattr(own, dtype)
-    angle, size = angle.to(kind), size.to(kind) if hasattr(size, "to") else size
-    return own.complex(own.cos(angle) * size, own.sin(angle) * size)
+        return _turned(size, waves, dtype)
+    found = _operations(own).turned.apply(waves, dtype)
+    return found * (size.to(getattr(own, dtype)) if hasattr(size, "to") else size)
+
+
+def _turned(size: Any, waves: np.ndarray, dtype: str) -> np.ndarray:
+    angle = ((waves - np.round(waves)) * (2 * np.pi)).astype(dtype)
+    found = np.empty(angle.shape, np.result_type(dtype, np.complex64))
+    np.multiply(np.cos(angle), size, out=found.real)
+    np.multiply(np.sin(angle), size, out=found.imag)
+    return found
+
+
+@dataclass(frozen=True)
+class _Operations:
+    """Operations of PyTorch that NumPy and SciPy compute, with their derivatives."""
+
+    sparse_product: Any
+    turned: Any
+
+
+@lru_cache(maxsize=1)
+def _operations(torch: Any) -> _Operations:
+    class SparseProduct(torch.autograd.Function):
+        @staticmethod
+        def forward(ctx: Any, values: Array, matrix: Any) -> Array:
+            ctx.matrix = matrix
+            return torch.from_numpy(matrix @ values.detach().numpy())
+
+        @staticmethod
+        def backward(ctx: Any, *gradients: Array) -> tuple[Array, None]:
+            return torch.from_numpy(ctx.matrix.T @ gradients[0].detach().numpy()), None
+
+    class Turned(torch.autograd.Function):
+        @staticmethod
+        def forward(ctx: Any, waves: Array, dtype: str) -> Array:
+            ctx.found = _turned(1.0, waves.detach().numpy(), dtype)
+            return torch.from_numpy(ctx.found)
+
+        @staticmethod
+        def backward(ctx: Any, *gradients: Array) -> tuple[Array, None]:
+            own = gradients[0].detach().resolve_conj().resolve_neg().numpy()
+            slope = ctx.found.real * own.imag - ctx.found.imag * own.real
+            return torch.from_numpy(slope * np.float64(2 * np.pi)), None
+
+    return _Operations(SparseProduct, Turned)
 
 
 def _refuse_mixture(value: Any) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 
 from optics.elements.beam import Beam
 from optics.elements.torch_numbers import torch_numbers
+from optics.methods.pixel_nodes import WindowSamples
 from optics.methods.problem import Problem
-from optics.methods.sine_samples import SineSamples
 from optics.methods.window_plan import TIGHTEST
 from optics.methods.window_sampling import WindowSampling
 from optics.methods.window_stack import WindowStack
@@ -79,5 +79,5 @@ def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method
     )
 
 
-def _across(samples: SineSamples) -> int:
+def _across(samples: WindowSamples) -> int:
     return len(samples.at)

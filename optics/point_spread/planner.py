@@ -120,7 +120,7 @@ WEIGHING = {
     "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
     "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
-OTHERS, OTHERS_WITH_CELLS = 4e-3, 15e-3  # choices: time [s] of planning other methods after "low_rank", see `choose`
+OTHERS, OTHERS_IF_DIVIDED = 4e-3, 15e-3  # choices: time [s] of planning other methods after "low_rank", see `choose`
 
 
 @lru_cache(maxsize=256)
@@ -147,7 +147,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
     coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None
-    others = 0.0 if coarse is None else OTHERS if problem.knots is None else OTHERS_WITH_CELLS
+    others = 0.0 if coarse is None else OTHERS_IF_DIVIDED if problem.divided else OTHERS
     names = sorted({*asked} & {*known}, key=list(WEIGHING).index)
     names.sort(key=lambda name: name != "low_rank" or coarse is None)
     for name in names:

@@ -23,6 +23,7 @@ refractive_index: test_refractive_index.py, test_media.py
 relief: test_relief.py
 source: test_source.py
 spherical_index: test_ball_lens.py
+spline_map: test_relief.py, methods/test_sampled_path.py
 square_samples: test_relief.py, methods/test_even_pupils.py
 torch_numbers: test_derivatives_refused.py, test_torch.py
 turbid_medium: test_turbid_medium.py

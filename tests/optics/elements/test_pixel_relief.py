@@ -147,7 +147,7 @@ class TestMethods:
         np.testing.assert_allclose(seen.psf[0], expected, rtol=0, atol=1e-3 * expected.max())
 
     def test_auto_weighs_all_four(self):
-        plan = self.seen("auto", Circle(), 1e-3).plan
+        plan = self.seen("auto", Circle(), 1e-4).plan
         assert [option.method for option in plan.options] == METHODS
         assert plan.method != "rayleigh_sommerfeld"
         assert "cheapest" in plan.why

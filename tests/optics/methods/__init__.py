@@ -23,8 +23,10 @@ window_stack: test_torch_stacks.py
 mirrored_matrix: test_mirrored_matrix.py
 window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py
+pixel_nodes: test_pixel_nodes.py
 pixelated_spectrum: elements/test_pixel_relief.py
 problem: point_spread/test_planner.py
+sampled_path: test_sampled_path.py
 remaining_factor: test_sine_stack.py, test_diffraction_kernel.py
 row_blocks: test_row_blocks.py
 spectrum_sampling: test_row_blocks.py, test_even_pupils.py

@@ -1,0 +1,229 @@
+"""Nodes within the pixels of a stepped relief, for `low_rank` at coarse tolerances.
+
+The Fourier kernel has positions instead of sines as its variable, because pixels have straight borders. The factors
+along both axes of the window correct most of the difference. A pixel has as few nodes along an axis as the phase of
+lens, wavefront and path requires for an average point of the window. Light behind a relief may arrive anywhere in it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from optics.apertures.pixelated import MOST_NODES
+from optics.elements.beam import Beam
+from optics.elements.light_stack import LightStack
+from optics.methods.problem import Problem
+from optics.methods.pupil_sampling import PixelSamples
+from optics.methods.remaining_factor import RemainingFactor
+from optics.methods.sine_samples import SineSamples
+from optics.methods.sine_stack import SineStack
+from optics.methods.slow_factor import RANKS, Path
+from optics.methods.window_geometry import window_geometry
+from optics.methods.window_plan import MOST_ENTRIES, plan_costs
+from optics.methods.window_rank import MOST_RANK, PLACES, RANK_OF_DISTANCE, RANK_SHARE, interpolation_errors
+from optics.numerics.array_library import turned
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.precision import Precision
+from optics.numerics.quadrature import gauss_legendre
+
+__all__ = ["PixelNodes", "PixelPlan", "WindowSamples", "pixel_plan"]
+
+QUADRATURE_SHARE = 0.7  # choice: part of the tolerance that quadrature errors may take, see test_pixel_nodes.py
+PARTS = 0.25, 0.5, 0.75  # choice: open parts of pixels that the edge of the aperture cuts
+LARGEST = 50.0  # largest phase [rad] of the table of errors, for which all numbers of nodes are too small
+PHASES = np.linspace(0, LARGEST, 4001)
+POINTS = 40  # choice: number of points of the pupil that determine the rank
+
+
+@dataclass(frozen=True)
+class PixelNodes:
+    """Nodes of a pupil of pixels, with the attributes of `SineSamples` that sums over a window use.
+
+    nodes: the nodes.
+    centre: centre (x, y) [m] of the window.
+    distance: distance [m] of the window's plane, by which positions are divided to directions.
+    elsewhere: direction at which factors along the other axis are evaluated, see `axis_kernel.AxisFactor`.
+    """
+
+    nodes: PixelSamples
+    centre: tuple[float, float]
+    distance: float
+
+    @property
+    def elsewhere(self) -> float:
+        return 0.5 * self.nodes.radius / self.distance  # root mean square over a disk
+
+    @property
+    def at(self) -> np.ndarray:
+        """Directions of the nodes along either axis."""
+        return self.nodes.at / self.distance
+
+    @property
+    def grid(self) -> Grid:
+        """Grid of as many directions as there are nodes, with their mean spacing."""
+        count = self.nodes.aperture.count * self.nodes.across
+        return Grid.square(count, 2 * self.nodes.radius / self.distance / count)
+
+    @property
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes (x, y) [m], (y, x)."""
+        x, y = np.meshgrid(self.nodes.at, self.nodes.at)
+        return x, y
+
+    @property
+    def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Nodes x and y [m], and their weights [m²], (y, x)."""
+        return *self.points, self.nodes.aperture.weights(self.nodes.across) * self.nodes.radius**2
+
+    def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the points (x, y) [m] of the pupil in directions (s, t)."""
+        return s * self.distance, t * self.distance
+
+    def light(self, beam: Beam, dtype: str) -> np.ndarray:
+        """Return the result of `field` as a complex NumPy array (y, x), without derivatives."""
+        x, y, weight = self.layout
+        if beam.pupil.mask is not None:
+            weight = weight * beam.pupil.amplitude(x / self.nodes.radius, y / self.nodes.radius)
+        found: np.ndarray = turned(weight, beam.waves(x, y), dtype)
+        return found
+
+    def field(self, beam: Beam, types: Precision) -> Field:
+        """Return the field behind the pupil times the weights of the nodes [m²]."""
+        return self.nodes.field(beam, types)
+
+    def stack(self) -> PixelStack:
+        """Return the nodes as a stack of one."""
+        numbers = self.distance, self.nodes.radius / math.hypot(self.nodes.radius, self.distance), self.elsewhere
+        distance, steepest, elsewhere, radius = (np.array([value]) for value in (*numbers, self.nodes.radius))
+        return PixelStack(
+            distance, self.centre, steepest, elsewhere, self.at[None], (), radius, np.zeros(1), self.nodes
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PixelStack(SineStack):
+    """The nodes of one pupil as a `SineStack`, with directions instead of sines."""
+
+    nodes: PixelSamples
+
+    def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return x / self.distance[0], y / self.distance[0]
+
+    def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return s * self.distance[0], t * self.distance[0]
+
+    def smooth(self, reach: float) -> bool:
+        return False  # the nodes are not evenly spaced, as interpolation from a few points requires
+
+    @cached_property
+    def outermost(self) -> np.ndarray:
+        return np.array([self.nodes.outermost])
+
+    @cached_property
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        x, y = np.meshgrid(self.nodes.at, self.nodes.at)
+        return x[None], y[None]
+
+    def _cosine2(self, dtype: str = "float64") -> np.ndarray:
+        x, y = self.points
+        squared = np.square(self.distance[0])
+        away = np.square(x - self.centre[0]) + np.square(y - self.centre[1])
+        return np.asarray(squared / (squared + away), dtype)
+
+    def _new_sizes(self, dtype: str) -> np.ndarray:
+        weight = self.nodes.aperture.weights(self.nodes.across)[None] * np.square(self.radius[0])
+        return np.asarray(weight * self._cosine2() / self.distance[0], dtype)
+
+
+WindowSamples = SineSamples | PixelNodes
+
+
+class PixelPlan(NamedTuple):
+    """Nodes, finer nodes of the check, rank of the slow factor, half width [m] of its points, time [s] and memory."""
+
+    pupil: PixelNodes
+    finer: PixelNodes
+    rank: int
+    half: float
+    seconds: float
+    bytes: float
+
+
+def pixel_plan(problem: Problem) -> PixelPlan | None:
+    """Return the nodes for a pupil of pixels and a coarse tolerance; None if there would be too many."""
+    aperture = problem.pixelated
+    if aperture is None or problem.knots is not None or problem.resized or (across := _across(problem)) is None:
+        return None
+    pupil, finer = (
+        PixelNodes(PixelSamples(aperture, count, problem.radius), problem.window.centre, problem.distance)
+        for count in (across, across + 1)
+    )
+    rank = _rank(problem, pupil)
+    inner = 0 if rank is None else rank * len(pupil.at)
+    if rank is None or max(inner, len(finer.at)) > math.sqrt(MOST_ENTRIES):
+        return None
+    seconds, needed = plan_costs(problem.window, rank, len(pupil.at), len(finer.at))
+    return PixelPlan(pupil, finer, rank, window_geometry(problem.stack, problem.window).half, seconds, needed)
+
+
+def _across(problem: Problem) -> int | None:
+    """Return the number of nodes along a pixel with which the mean error of integrals over pixels is small enough.
+
+    Pixels that the edge of the aperture cuts have larger errors. See `_squared_errors`.
+    """
+    assert problem.pixelated is not None
+    level = LightStack((replace(problem.light, pupil=problem.light.pupil.level),))
+    slopes, geometry = level.slopes, window_geometry(level, problem.window)
+    path = geometry.to_middle(slopes.across)
+    rays = np.stack([slopes.along_x + path.along_x, slopes.along_y + path.along_y]).ravel() * path.cycles[0, 0]
+    side = geometry.cycles[0] * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
+    cycles = np.abs(np.add.outer(rays, side)) + problem.detail * problem.radius
+    phase = np.minimum(np.pi * cycles * problem.pixelated.widest, LARGEST)
+    for count in range(1, MOST_NODES):
+        whole, cut = (np.interp(phase, PHASES, table).mean() for table in _squared_errors(count))
+        # Errors along x and y are independent. The relative error of the intensity is twice that of the amplitude.
+        wrong = 2 * math.sqrt(2 * (whole + problem.pixelated.cut_share * cut))
+        if wrong < QUADRATURE_SHARE * problem.tolerance:
+            return count
+    return None
+
+
+@lru_cache(maxsize=MOST_NODES)
+def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return squared errors of the integrals of e^{2iφt} over [0, 1], and on average over parts, for φ in PHASES.
+
+    The weights of `count` Gauss-Legendre nodes in [0, 1] integrate the interpolating polynomial over each part.
+    """
+    (at, _), (t, size), found = gauss_legendre(count), gauss_legendre(MOST_NODES), []
+    for part in (1.0, *PARTS):
+        weight = part * lagrange_basis(part * t, at) @ size
+        exact = part * np.exp(1j * part * PHASES) * np.sinc(part * PHASES / np.pi)
+        found.append(np.square(np.abs(exact - np.exp(2j * np.outer(PHASES, at)) @ weight)))
+    return found[0], np.mean(found[1:], axis=0)
+
+
+def _rank(problem: Problem, pupil: PixelNodes) -> int | None:
+    """Return the rank that is sufficient on average over pupil and window; None if it is too large."""
+    half = window_geometry(problem.stack, problem.window).half
+    # Points on a spiral cover a disk evenly.
+    turn, r = np.arange(POINTS) * (math.sqrt(5) - 1), np.sqrt((np.arange(POINTS) + 0.5) / POINTS)
+    x, y = (problem.radius * r * part(np.pi * turn) for part in (np.cos, np.sin))
+    stack, path = pupil.stack(), Path.from_problem(problem)
+    s, t = stack.directions(x[None, None, :], y[None, None, :])
+    factor = RemainingFactor(path, stack, (s, t))
+    side = half * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
+    across, down = (at.reshape(1, -1, 1) for at in np.meshgrid(side, side))
+    place = across, down
+    exact, least = factor.at(place), RANK_OF_DISTANCE if problem.moves else 1
+    for rank in (each for each in RANKS if least <= each <= MOST_RANK):
+        nodes = half * chebyshev_points(rank)
+        if interpolation_errors(factor, place, np.ones(1), nodes, exact)[0] < RANK_SHARE * problem.tolerance / 2:
+            return rank
+    return None

@@ -1,0 +1,118 @@
+"""Heights of reliefs and lengths of wavefronts at samples of the pupil, from arrays that many pupils share.
+
+Polynomials are interpolated from a few points across the pupil. Values of maps of cubic splines are the product of a
+sparse matrix and the coefficients of the splines. Both only depend on the samples, not on the relief or wavefront.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+
+from optics.elements.light_stack import SPHERE_POINTS
+from optics.elements.pixel_relief import PixelRelief
+from optics.elements.pupil import Pupil
+from optics.elements.pupil_path import relief_height, wavefront_ahead
+from optics.elements.pupil_polynomials import HIGHEST_ORDER
+from optics.elements.relief import BSplineRelief, HeightMap
+from optics.elements.spline_map import spline_weights
+from optics.elements.wavefront import WavefrontMap, Zernike
+from optics.methods.pixel_nodes import PixelNodes, WindowSamples
+from optics.methods.sine_stack import even_weights, single_stack
+from optics.numerics.array_cache import cached_arrays
+from optics.numerics.array_library import like, sparse_product
+from optics.numerics.autodiff import Array
+from optics.numerics.interpolation import chebyshev_points
+
+__all__ = ["sampled_height", "sampled_wavefront"]
+
+Convert = Callable[[np.ndarray], Array]
+
+RELIEF_POWERS = 4  # powers of x and of y of a bicubic polynomial
+MOST_BYTES = 128e6  # choice, limited by memory: all sparse matrices that are cached
+
+
+def sampled_height(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Array | None:
+    """Return the height [m] of the relief at samples, (η, ξ); None without a relief.
+
+    The radius of the pupil must not carry a derivative.
+
+    convert: function that converts a NumPy array to the library of the computation, NumPy or PyTorch.
+    """
+    relief = pupil.height
+    if isinstance(relief, PixelRelief) and isinstance(samples, PixelNodes):
+        numbers = like(convert(np.zeros(0)), relief.samples).reshape(-1)
+        return sparse_product(_pixel_weights(samples), numbers).reshape(samples.grid.shape)
+    if isinstance(relief, HeightMap):
+        return _of_map(relief, pupil.radius, samples, convert)
+    powers = RELIEF_POWERS if isinstance(relief, BSplineRelief) else None
+    return _interpolated(partial(relief_height, pupil), powers, samples, convert)
+
+
+def sampled_wavefront(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Array | None:
+    """Return the length [m] by which the wavefront is ahead at samples, (η, ξ); None without an aberration.
+
+    See `sampled_height`.
+    """
+    wavefront = pupil.wavefront
+    if isinstance(wavefront, WavefrontMap):
+        return _of_map(wavefront, wavefront.radius or pupil.radius, samples, convert)
+    powers = wavefront.order + 1 if isinstance(wavefront, Zernike) and wavefront.order <= HIGHEST_ORDER else None
+    return _interpolated(partial(wavefront_ahead, pupil), powers, samples, convert)
+
+
+def _of_map(surface: HeightMap | WavefrontMap, radius: float, samples: WindowSamples, convert: Convert) -> Array:
+    """Return the values of a map, (η, ξ). radius: half the side of the map [m]."""
+    rows, columns = surface.samples.shape
+    weights = _map_weights(samples, radius, rows, columns)
+    return surface.weighted(weights, convert(np.zeros(0))).reshape(samples.grid.shape)
+
+
+def _interpolated(
+    values: Callable[[Array, Array], Array | None], powers: int | None, samples: WindowSamples, convert: Convert
+) -> Array | None:
+    """Return values at samples, (η, ξ), interpolated from a few points of the pupil if possible.
+
+    values: function of positions (x, y) [m].
+    powers: number of powers of x and of y of a polynomial; None for other functions, which are not interpolated.
+    """
+    many, few = len(samples.at), (powers or 0) + SPHERE_POINTS
+    if powers is None or few >= many or isinstance(samples, PixelNodes) or not single_stack(samples).smooth(0.0):
+        x, y = map(convert, samples.points)
+        return values(x, y)
+    found = values(*map(convert, _few_points(samples, few)))
+    weight = convert(even_weights(many, few))
+    return None if found is None else weight @ found @ weight.T
+
+
+def _bytes_of(matrix: Any) -> int:
+    return int(matrix.data.nbytes + matrix.indices.nbytes)
+
+
+@cached_arrays(MOST_BYTES, _bytes_of)
+def _map_weights(samples: WindowSamples, radius: float, rows: int, columns: int) -> Any:
+    """Return the result of `spline_weights` for all samples. radius: half the side of the map [m]."""
+    x, y = samples.points
+    return spline_weights(x / radius, y / radius, rows, columns)
+
+
+@cached_arrays(MOST_BYTES, _bytes_of)
+def _pixel_weights(samples: PixelNodes) -> Any:
+    """Return a sparse matrix (node, pixel) that is 1 for the pixel of each node."""
+    from scipy.sparse import csr_matrix
+
+    count, across = samples.nodes.aperture.count, samples.nodes.across
+    pixel = np.repeat(np.arange(count), across)
+    columns, ends = np.add.outer(pixel * count, pixel).ravel(), np.arange(pixel.size**2 + 1)
+    return csr_matrix((np.ones(pixel.size**2), columns, ends), (pixel.size**2, count**2))
+
+
+@lru_cache(maxsize=64)
+def _few_points(samples: WindowSamples, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return Chebyshev points (x, y) [m] across the samples, (y, x)."""
+    ends = samples.at[[0, -1]]
+    nodes = ends.mean() + np.diff(ends) / 2 * chebyshev_points(count)
+    return samples.points_at(nodes[None, :], nodes[:, None])
