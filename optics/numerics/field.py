@@ -71,4 +71,6 @@ class Field:
 
     def numpy(self) -> np.ndarray:
         self.evaluated()
-        return (self.re.numpy() + 1j * self.im.numpy()).reshape(self.grid.shape).astype(self.types.complex_dtype)
+        found = np.empty(self.grid.shape, self.types.complex_dtype)
+        found.real, found.imag = (part.numpy().reshape(self.grid.shape) for part in (self.re, self.im))
+        return found

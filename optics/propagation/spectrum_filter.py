@@ -12,6 +12,7 @@ from optics.numerics.accuracy import FLOAT_NOISE
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
+from optics.propagation.misalignment import Depths
 from optics.propagation.transfer_function import Passage, TransferFunction, evanescent
 from optics.propagation.transform_sampling import TransformSampling, blurred_back
 
@@ -65,27 +66,30 @@ class ScaledPlane:
         return result if self.brightest == 1 else result * result.dtype.type(self.brightest)
 
 
-def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> PropagatedPlane:
-    """Return a plane (y, x) after propagation."""
+def filtered(
+    given: np.ndarray, how: TransformSampling, types: Precision, depths: Depths | None = None
+) -> PropagatedPlane:
+    """Return a plane (y, x) after propagation, between tilted planes if depths are given."""
     scaled = ScaledPlane.from_plane(given, types)
     plane, total = scaled.u, scaled.power
     if total == 0:
         return PropagatedPlane(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
     space = _free_space(how, types.dtype)
-    if how.step:
-        spectrum = periodic_spectrum(plane, how.period, how.across)
+    factors = None if depths is None else depths.factors(_sags(how), how.passage.wavelength, types)
+    if factors is None:
+        spectrum = _spectrum(plane, how)
     else:
-        spectrum = fourier_sum(plane, how.period, (how.across, how.across), -1)
+        spectrum = sum(factor * _spectrum(plane * weight, how) for weight, factor in factors.leaving)
     grazing = _power(spectrum, space.grazing) / how.period**2
     blurred = blurred_back(spectrum, how)
     spectrum *= space.transfer
     # By Parseval's theorem, missing power was either faded out or is evanescent. If no power is missing, the difference
     # is a rounding error of float32, which is small compared with the remainder of the fade.
     faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
-    if how.step:
-        result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
+    if factors is None:
+        result = _result(spectrum, how)
     else:
-        result = fourier_sum(spectrum, how.period * how.source.dx / how.window.dx, how.window.shape, +1)
+        result = sum(weight * _result(factor * spectrum, how) for weight, factor in factors.arriving)
     arrived = _power(result) * (how.window.dx / how.source.dx) ** 2
     if not arrived:
         return PropagatedPlane(result, math.inf, math.inf)
@@ -97,6 +101,27 @@ def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> Pro
     blurred_by_fade = 2 * how.passage.ripple * (1 + math.sqrt(faded / arrived)) if how.passage.band.fade else 0.0
     error = 2 * math.sqrt(grazing / arrived) + rounding + blurred_by_fade
     return PropagatedPlane(scaled.restored(result), error, 2 * math.sqrt(blurred / arrived))
+
+
+def _spectrum(plane: np.ndarray, how: TransformSampling) -> np.ndarray:
+    """Return the spectrum of a plane (y, x): (fx, fy) in FFT order with a whole `how.step`, else (fy, fx) centred."""
+    if how.step:
+        return periodic_spectrum(plane, how.period, how.across)
+    return fourier_sum(plane, how.period, (how.across, how.across), -1)
+
+
+def _result(spectrum: np.ndarray, how: TransformSampling) -> np.ndarray:
+    """Return the field (y, x) of a spectrum over the window."""
+    if how.step:
+        return periodic_sum(spectrum, how.period, how.step, how.window.shape)
+    return fourier_sum(spectrum, how.back_period, how.window.shape, +1)
+
+
+def _sags(how: TransformSampling) -> np.ndarray:
+    """Return 1 - cos θ for each frequency of a centred spectrum, (fy, fx); 1 for evanescent waves."""
+    f = Grid.square(how.across, how.passage.wavelength / (how.period * how.source.dx)).x
+    s2 = np.minimum(np.add.outer(f * f, f * f), 1)
+    return s2 / (1 + np.sqrt(1 - s2))
 
 
 def evanescent_share(plane: np.ndarray, period: int, dx: float, passage: Passage) -> float:

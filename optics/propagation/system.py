@@ -17,7 +17,8 @@ from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import precision
 from optics.numerics.read_only import ReadOnlyArrays
 from optics.propagation.misalignment import Misaligned
-from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, Stop
+from optics.propagation.plane_step import PlaneField, StepSettings, Stop
+from optics.propagation.planes import PupilSampling
 
 __all__ = ["FreeSpace", "StackResult", "SystemStep", "propagate_through"]
 
