@@ -72,7 +72,7 @@ _CONTENTS = {
     "SpectralBands": "spectra.bands",
     "Spectrum": "spectra.spectrum",
     "Spider": "apertures.shapes",
-    "StackResult": "propagation.system",
+    "StackResult": "propagation.stack_result",
     "ThroughFocus": "point_spread.through_focus",
     "TurbidMedium": "elements.turbid_medium",
     "VectorFocus": "point_spread.converging",

@@ -69,6 +69,11 @@ class Field:
         dr.eval(self.re, self.im)
         return self
 
+    def tensors(self) -> tuple[Array, Array]:
+        """Return the real and the imaginary part as Dr.Jit tensors (y, x)."""
+        re, im = (self.types.Tensor(part, self.grid.shape) for part in (self.re, self.im))
+        return re, im
+
     def numpy(self) -> np.ndarray:
         self.evaluated()
         found = np.empty(self.grid.shape, self.types.complex_dtype)

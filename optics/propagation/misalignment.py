@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,16 @@ from optics.numerics.autodiff import Array, number
 from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["ALIGNED", "Alignment", "Depths", "Misaligned", "path_to_tilted_plane", "seen_from", "slowness"]
+__all__ = [
+    "ALIGNED",
+    "Alignment",
+    "DepthFactors",
+    "Depths",
+    "Misaligned",
+    "path_to_tilted_plane",
+    "seen_from",
+    "slowness",
+]
 
 STEEPEST_TILT = 0.2  # choice [rad]: largest tilt; a thin element at a larger tilt is no longer thin along the axis
 MOST_NODES = 8  # choice: largest number of depths between which fields are interpolated
@@ -171,8 +181,8 @@ ALIGNED = Alignment()
 class DepthFactors:
     """Pairs of weights (y, x) and factors of the spectrum (fy, fx), one pair for each depth of a tilted plane."""
 
-    leaving: list[tuple[np.ndarray, np.ndarray]]
-    arriving: list[tuple[np.ndarray, np.ndarray]]
+    leaving: list[tuple[Any, Any]]
+    arriving: list[tuple[Any, Any]]
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optics.apertures.aperture import EDGE_REACH, LEAST_RIPPLE
+from optics.elements.beam import Beam
+from optics.elements.derivative_knots import carries_derivatives
 from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
 from optics.numerics.accuracy import AccuracyError
+from optics.numerics.autodiff import Scalar, carries_derivative, number
+from optics.numerics.field import Field
 from optics.numerics.fourier import fast_length
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
+from optics.propagation.field_derivatives import mapped
 from optics.propagation.misalignment import ALIGNED, Alignment, Depths, Misaligned, slowness
 from optics.propagation.propagate import (
     WRAP_RIPPLE_PER_TOLERANCE,
@@ -45,6 +51,7 @@ class PlaneField:
     rays: highest frequency [1/m] of geometrical rays in the field.
     kept: frequency [1/m] at which a fade begins that will remove all light at `band`. None: the field needs no fade.
     alignment: position of the plane. Samples are counted from its centre.
+    tracked: the field u with its derivatives; None if it carries none.
     """
 
     u: np.ndarray
@@ -53,6 +60,7 @@ class PlaneField:
     rays: float
     kept: float | None = None
     alignment: Alignment = ALIGNED
+    tracked: Field | None = None
 
     @property
     def half_width(self) -> float:
@@ -72,6 +80,7 @@ class Stop:
     half_width: half width [m] of the pupil with its soft edge, or of the window.
     window: None for a pupil.
     alignment: position of the pupil.
+    along: the distance with its derivative.
     """
 
     distance: float
@@ -79,14 +88,22 @@ class Stop:
     half_width: float
     window: Grid | None = None
     alignment: Alignment = ALIGNED
+    along: Scalar = 0.0
 
     @classmethod
-    def at(cls, element: Pupil | Misaligned, distance: float) -> Stop:
+    def at(cls, element: Pupil | Misaligned, along: Scalar) -> Stop:
+        """Return the stop of a pupil at a distance [m], which may carry a derivative, from the previous stop."""
         if isinstance(element, Misaligned):
             pupil, alignment = element.pupil, Alignment.from_element(element)
         else:
             pupil, alignment = element, ALIGNED
-        return cls(distance, pupil, (1 + EDGE_REACH) * pupil.radius, None, alignment)
+        return cls(number(along), pupil, (1 + EDGE_REACH) * pupil.radius, None, alignment, along)
+
+    def carries_derivatives(self, wavelength: float) -> bool:
+        """Return whether the distance or any number of the pupil carries a derivative."""
+        pupil = self.pupil
+        light = pupil is not None and carries_derivatives(Beam(pupil, PointSource(), wavelength, math.inf))
+        return light or carries_derivative(self.along)
 
     def apart(self, other: Alignment) -> float:
         """Return the distance [m] between both centres along x or along y, whichever is larger."""
@@ -157,25 +174,40 @@ class StepSettings:
             grid = Grid.square(2 * math.ceil(half_width / pitch) + 1, pitch)
         return grid
 
-    def carried(self, field: PlaneField, stop: Stop, grid: Grid) -> PropagationResult:
-        """Return the field after propagation through free space, on the samples of the next stop."""
-        window = grid.moved(stop.alignment.beside(field.alignment))
+    def carried(self, field: PlaneField, stop: Stop, grid: Grid) -> tuple[PropagationResult, Field | None]:
+        """Return the field after propagation through free space, on the samples of the next stop.
+
+        The second result is the same field with its derivatives; None if it carries none.
+        """
+        window, depths, error = grid.moved(stop.alignment.beside(field.alignment)), None, 0.0
         passage = self.passage(field, stop, window)
-        if not (field.alignment.steepness or stop.alignment.steepness):
-            return propagated_field(field.u, field.dx, passage, window, self.tolerance, self.dtype)
+        differentiated = field.tracked is not None or carries_derivative(stop.along)
+        if field.alignment.steepness or stop.alignment.steepness:
+            depths, error = self._depths(field, stop, grid)
+            how = sampling(passage, Grid(field.u.shape, field.dx), window, 0.0)
+            out = propagated_between_depths(field.u, how, depths, self.tolerance, self.dtype)
+            out = replace(out, plan=replace(out.plan, predicted_error=out.plan.predicted_error + error))
+        else:
+            passage = replace(passage, by_transforms=differentiated)
+            out = propagated_field(field.u, field.dx, passage, window, self.tolerance, self.dtype)
+        if not differentiated:
+            return out, None
+        before = field.tracked or Field.from_numpy(field.u, field.dx, precision(self.dtype))
+        return out, mapped(before, out.u, grid, out.linear_map(field.u.shape, depths), stop.along)
+
+    def _depths(self, field: PlaneField, stop: Stop, grid: Grid) -> tuple[Depths, float]:
+        """Return the depths of a step between tilted planes, and the error of the interpolation between them."""
         source, sine, types = Grid(field.u.shape, field.dx), self.steep(field), precision(self.dtype)
-        own, turns = self.tolerance / 4, slowness(sine) / passage.wavelength
-        leaving, error_out = field.alignment.nodes(field.half_width, sine, passage.wavelength, own)
-        arriving, error_in = stop.alignment.nodes(stop.half_width, sine, passage.wavelength, own)
+        wavelength, allowed = self.wavelength / self.medium_n, self.tolerance / 4
+        turns = slowness(sine) / wavelength
+        leaving, error_out = field.alignment.nodes(field.half_width, sine, wavelength, allowed)
+        arriving, error_in = stop.alignment.nodes(stop.half_width, sine, wavelength, allowed)
         depths = Depths(
             (leaving, field.alignment.weights(leaving, source, turns, types)),
             (arriving, stop.alignment.weights(arriving, grid, -turns, types)),
             turns,
         )
-        how = sampling(passage, source, window, 0.0)
-        out = propagated_between_depths(field.u, how, depths, self.tolerance, self.dtype)
-        plan = replace(out.plan, predicted_error=out.plan.predicted_error + error_out + error_in)
-        return replace(out, plan=plan)
+        return depths, error_out + error_in
 
     def passage(self, field: PlaneField, stop: Stop, window: Grid) -> Passage:
         """Return the passage to the next stop.

@@ -9,17 +9,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from optics.apertures.aperture import EDGE_REACH, SoftAperture
 from optics.elements.beam import Beam
+from optics.elements.derivative_knots import derivative_knots
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
+from optics.numerics.autodiff import grad_enabled
+from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
+from optics.propagation.field_derivatives import LinearMap, mapped
 from optics.propagation.misalignment import Alignment, path_to_tilted_plane, seen_from
 from optics.propagation.plane_step import PlaneField, StepSettings, Stop
 from optics.propagation.propagate import lit_part
@@ -27,6 +32,9 @@ from optics.propagation.propagate import lit_part
 __all__ = ["PupilSampling"]
 
 FADE = 0.2  # choice: width of the fade that removes such light, relative to the frequency where it begins
+# Choice: error of derivatives with respect to samples of maps, relative to the amplitude of a cubic spline through a
+# single sample at the highest frequency that is resolved.
+SPLINE_PART = 3.0
 
 
 @dataclass(frozen=True)
@@ -79,6 +87,7 @@ class PupilSampling:
             reaching = settings.reaching(widths, stop.distance)
             arriving, rays = min(field.band, reaching), min(field.rays, reaching)
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
+        turns += _derivative_band(pupil, settings)
         widths = stop.half_width + following.half_width + following.apart(stop.alignment)
         band, kept = settings.reaching(widths, following.distance), None
         if math.isinf(band):
@@ -99,23 +108,45 @@ class PupilSampling:
             )
         return cls(pupil, source, grid, soft, band, rays, kept, stop.alignment, path)
 
-    def transmitted(self, u: np.ndarray | None, settings: StepSettings) -> PlaneField:
-        """Return the field u on the grid times the pupil's transmittance, or its conjugate in backward propagation.
+    def transmitted(self, arrived: PlaneField | None, settings: StepSettings) -> PlaneField:
+        """Return the field on the grid times the pupil's transmittance, or its conjugate in backward propagation.
 
-        u: None for light from the source.
+        arrived: field on the grid in front of the pupil; None for light from the source.
         """
-        import drjit as dr
-
         types = precision(settings.dtype)
         beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)
         x, y = self.alignment.on_element(*self.grid.coordinates(types), types)
         found = beam.at(self.soft, x, y, self.grid, types)
-        if dr.grad_enabled(found.re, found.im):
-            raise ValueError("elements: a system has no derivatives; use psf for a single pupil")
+        if settings.backward:
+            found = Field(found.re, -found.im, self.grid, types)
         transmittance = found.numpy()
-        if u is None:
+        if arrived is None:
             path = self.path + path_to_tilted_plane(self.source, self.alignment, self.grid)
             u = np.exp(2j * np.pi * settings.medium_n / settings.wavelength * path).astype(transmittance.dtype)
-        field = u * (transmittance.conj() if settings.backward else transmittance)
-        field = self.alignment.leaving(field, self.grid.dx, settings.wavelength / settings.medium_n)
-        return PlaneField(lit_part(field), self.grid.dx, self.band, self.rays, self.kept, self.alignment)
+        else:
+            u = arrived.u
+        leaving = partial(self.alignment.leaving, dx=self.grid.dx, wavelength=settings.wavelength / settings.medium_n)
+        field = leaving(u * transmittance)
+        tracked = None if arrived is None else arrived.tracked
+        if tracked is None and grad_enabled([found.re, found.im]):
+            tracked = Field.from_numpy(u, self.grid.dx, types)
+        if tracked is None:
+            field = lit_part(field)
+        else:
+            tracked = tracked * found
+            if self.alignment.steepness:
+                tracked = mapped(tracked, field, self.grid, LinearMap(leaving, leaving))
+        return PlaneField(field, self.grid.dx, self.band, self.rays, self.kept, self.alignment, tracked)
+
+
+def _derivative_band(pupil: Pupil, settings: StepSettings) -> float:
+    """Return the frequency [1/m] up to which derivatives with respect to samples of maps must be resolved.
+
+    The derivative with respect to one sample is a cubic spline (optics.elements.derivative_knots). Its spectrum falls
+    like (πν)⁻⁴, with ν in cycles per cell.
+    """
+    knots = derivative_knots(pupil, settings.wavelength)
+    if knots is None:
+        return 0.0
+    cycles = (SPLINE_PART / settings.tolerance) ** 0.25 / math.pi
+    return knots.splines * cycles / (float(np.diff(knots.borders).min()) * pupil.radius)

@@ -23,9 +23,10 @@ from optics.numerics.arguments import complexes, finite, in_range, shown, vacuum
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, precision
 from optics.numerics.read_only import ReadOnlyArrays
+from optics.propagation.field_derivatives import LinearMap
 from optics.propagation.misalignment import Depths
 from optics.propagation.separable_kernel import SeparableSampling, separable
-from optics.propagation.spectrum_filter import PropagatedPlane, evanescent_share, filtered
+from optics.propagation.spectrum_filter import PropagatedPlane, evanescent_share, filtered, linear_map
 from optics.propagation.transfer_function import EVERYTHING, Passage
 from optics.propagation.transform_sampling import TransformSampling, blur_left, most_spare, sampling
 
@@ -82,6 +83,11 @@ class PropagationResult(ReadOnlyArrays, OnWindow):
         """
         how = self._sampling
         return max(evanescent_share(plane, how.period, how.source.dx, how.passage) for plane in self._source)
+
+    def linear_map(self, shape: tuple[int, int], depths: Depths | None = None) -> LinearMap:
+        """Return the propagation by transforms as a linear map of fields (y, x) of a shape."""
+        assert isinstance(self._sampling, TransformSampling)
+        return linear_map(self._sampling, shape, precision(self.u.real.dtype.name), depths)
 
 
 def propagate(

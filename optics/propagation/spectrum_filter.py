@@ -12,17 +12,19 @@ from optics.numerics.accuracy import FLOAT_NOISE
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
-from optics.propagation.misalignment import Depths
+from optics.propagation.field_derivatives import LinearMap
+from optics.propagation.misalignment import DepthFactors, Depths
 from optics.propagation.transfer_function import Passage, TransferFunction, evanescent
 from optics.propagation.transform_sampling import TransformSampling, blurred_back
 
-__all__ = ["PropagatedPlane", "ScaledPlane", "evanescent_share", "filtered"]
+__all__ = ["PropagatedPlane", "ScaledPlane", "evanescent_share", "filtered", "linear_map"]
 
 # Choice: the evanescent part of the missing light is computed if the missing light exceeds the arriving light by this
 # factor. Smaller amounts hardly affect the predicted error.
 MUCH = 100.0
 
 HELD = (1e-20, 1e30)  # range of the power Σ|u|² for which float32 can represent the terms of the error estimate
+NO_DEPTHS = DepthFactors([(1, 1)], [(1, 1)])  # factors of steps between planes that are not tilted
 ONE = np.ones(1)  # stands for equal weights in a sum
 
 
@@ -101,6 +103,49 @@ def filtered(
     blurred_by_fade = 2 * how.passage.ripple * (1 + math.sqrt(faded / arrived)) if how.passage.band.fade else 0.0
     error = 2 * math.sqrt(grazing / arrived) + rounding + blurred_by_fade
     return PropagatedPlane(scaled.restored(result), error, 2 * math.sqrt(blurred / arrived))
+
+
+def linear_map(
+    how: TransformSampling, shape: tuple[int, int], types: Precision, depths: Depths | None = None
+) -> LinearMap:
+    """Return `filtered` as a linear map of fields (y, x) of this shape.
+
+    Its parameter z is the distance, and its rate omits the carrier exp(ikz).
+    """
+    how, crop = replace(how, step=0), _middle(shape, how.source.shape)
+    transfer = _free_space(how, types.dtype).transfer
+    factors = NO_DEPTHS if depths is None else depths.factors(_sags(how), how.passage.wavelength, types)
+
+    def spectrum(u: np.ndarray) -> np.ndarray:
+        return transfer * sum(factor * _spectrum(u[crop] * weight, how) for weight, factor in factors.leaving)
+
+    def onto_window(arriving: np.ndarray) -> np.ndarray:
+        found: np.ndarray = sum(weight * _result(factor * arriving, how) for weight, factor in factors.arriving)
+        return found
+
+    def rate(u: np.ndarray) -> np.ndarray:
+        turns = (_sags(how) * (-2j * np.pi / how.passage.wavelength)).astype(types.complex_dtype)
+        return onto_window(turns * spectrum(u))
+
+    def adjoint(grad: np.ndarray) -> np.ndarray:
+        size = how.across, how.across
+        back = sum(
+            np.conj(factor) * fourier_sum(np.conj(weight) * grad, how.back_period, size, -1)
+            for weight, factor in factors.arriving
+        )
+        back = back * transfer.conj()
+        found = np.zeros(shape, types.complex_dtype)
+        for weight, factor in factors.leaving:
+            found[crop] += np.conj(weight) * fourier_sum(np.conj(factor) * back, how.period, how.source.shape, +1)
+        return found
+
+    return LinearMap(lambda u: onto_window(spectrum(u)), adjoint, rate)
+
+
+def _middle(shape: tuple[int, int], part: tuple[int, int]) -> tuple[slice, ...]:
+    """Return the index of a part around the centre sample, which is sample n//2 of the whole and of the part."""
+    starts = [n // 2 - m // 2 for n, m in zip(shape, part, strict=True)]
+    return tuple(slice(start, start + m) for start, m in zip(starts, part, strict=True))
 
 
 def _spectrum(plane: np.ndarray, how: TransformSampling) -> np.ndarray:

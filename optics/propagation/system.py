@@ -11,16 +11,18 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion
 from optics.elements.source import PointSource
-from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
+from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, above
 from optics.numerics.arguments import complexes, in_range, of_kind, positive, shape_2d, shown, vacuum_wavelength
-from optics.numerics.grid import Grid, OnWindow
-from optics.numerics.precision import precision
-from optics.numerics.read_only import ReadOnlyArrays
+from optics.numerics.autodiff import Array, Scalar, number
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import opaque, precision
 from optics.propagation.misalignment import Misaligned
 from optics.propagation.plane_step import PlaneField, StepSettings, Stop
 from optics.propagation.planes import PupilSampling
+from optics.propagation.stack_result import StackResult, SystemStep
 
-__all__ = ["FreeSpace", "StackResult", "SystemStep", "propagate_through"]
+__all__ = ["FreeSpace", "propagate_through"]
 
 # Choice: margins of frequencies around geometrical rays [cycles per radius], and the smallest tolerance for which they
 # are tried. At smaller tolerances, all light that can reach the next plane is usually necessary.
@@ -34,59 +36,21 @@ CHANGE_MARGIN, OUTSIDE_MARGINS = 4.0, 2e-3
 class FreeSpace:
     """Free space: a `distance` [m] in a medium with the refractive index medium_n.
 
+    The distance may be a Dr.Jit array that carries a derivative.
+
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
     """
 
-    distance: float
+    distance: Scalar
     medium_n: float = 1.0
 
     def __post_init__(self) -> None:
-        positive("distance", self.distance)
+        positive("distance", self.distance, carried=True)
         in_range("medium_n", self.medium_n, 1.0, 10.0)
 
 
 Element = Pupil | Misaligned | FreeSpace
-
-
-@dataclass(frozen=True)
-class SystemStep:
-    """Power and accuracy of one step: the propagation to the next plane.
-
-    distance: distance [m] of the step, negative for backward propagation.
-    plan: plan of the step. Its predicted error is relative to the light within the next plane's window.
-    power_in, power_out: power [intensity m²] at the start, and power that arrives within the window.
-    evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult). It is a lower bound,
-        because the samples do not represent all waves that cannot reach the next plane.
-    """
-
-    distance: float
-    plan: Plan
-    power_in: float
-    power_out: float
-    evanescent_power: float
-
-
-@dataclass(frozen=True, eq=False)
-class StackResult(ReadOnlyArrays, OnWindow):
-    """A field behind a system.
-
-    u: complex field (y, x) at the pitch dx [m], with the carrier exp(ikz). Sample n//2 is on the axis.
-    steps: power and accuracy of each propagation from plane to plane.
-    predicted_error: relative L2 error of the intensity.
-    window: grid of the samples [m]; `x` and `y` are the positions of its columns and rows.
-    """
-
-    u: np.ndarray
-    dx: float
-    steps: tuple[SystemStep, ...]
-    predicted_error: float
-    window: Grid
-
-    def __repr__(self) -> str:
-        size = " x ".join(map(str, self.u.shape))
-        error = f"predicted error {self.predicted_error:.1e}"
-        return f"<StackResult of {size} samples {self.dx:.3g} m apart, {len(self.steps)} steps, {error}>"
 
 
 def propagate_through(
@@ -139,9 +103,22 @@ def propagate_through(
         vacuum_wavelength(wavelength), _medium(elements), backward, max(each, 10 * FLOAT_NOISE[dtype]), dtype
     )
     found = _converged(stops, field, source or PointSource(), settings, tolerance)
-    power = brightest**2
+    power, u, tracked = brightest**2, found.field.u, found.field.tracked
     steps = (replace(one, power_in=one.power_in * power, power_out=one.power_out * power) for one in found.steps)
-    return StackResult(found.u * found.u.dtype.type(brightest), window.dx, tuple(steps), found.error, window)
+    carried = () if tracked is None else _with_carrier(tracked.scaled(brightest), stops, settings)
+    return StackResult(u * u.dtype.type(brightest), window.dx, tuple(steps), found.error, window, *carried)
+
+
+def _with_carrier(tracked: Field, stops: list[Stop], settings: StepSettings) -> tuple[tuple[Array, Array], Array]:
+    """Return the real and imaginary part, and the intensity, as tensors (y, x) with derivatives.
+
+    tracked: the field, without the derivative of its carrier exp(ikz) with respect to the distances.
+    """
+    types = tracked.types
+    change = sum(opaque(types, stop.along) - number(stop.along) for stop in stops)
+    waves = change * (settings.medium_n / settings.wavelength)
+    carrier = Field.from_waves(1.0, waves, tracked.grid, types)
+    return (tracked * carrier).tensors(), types.Tensor(tracked.intensity, tracked.grid.shape)
 
 
 @dataclass(frozen=True)
@@ -152,7 +129,7 @@ class _Passed:
     complete: True if all light is included that can reach the next plane.
     """
 
-    u: np.ndarray
+    field: PlaneField
     steps: tuple[SystemStep, ...]
     error: float
     complete: bool
@@ -164,10 +141,11 @@ def _converged(
     """Return the field with as much diffracted light as the tolerance requires.
 
     Most light follows geometrical rays. The margin of frequencies around them is doubled until the intensity changes by
-    less than the tolerance. If this does not happen, all light is included that can reach the next plane.
+    less than the tolerance. If this does not happen, or if derivatives are requested, all light is included that can
+    reach the next plane.
     """
-    before = None
-    for margin in MARGINS if tolerance >= LEAST_TOLERANCE else ():
+    before, differentiated = None, any(stop.carries_derivatives(settings.wavelength) for stop in stops)
+    for margin in MARGINS if tolerance >= LEAST_TOLERANCE and not differentiated else ():
         try:
             found = _passed(stops, field, source, replace(settings, margin=margin), tolerance)
         except AccuracyError:
@@ -176,7 +154,7 @@ def _converged(
         if found.complete:
             return found
         if before is not None:
-            error = found.error + OUTSIDE_MARGINS + CHANGE_MARGIN * _change(before.u, found.u)
+            error = found.error + OUTSIDE_MARGINS + CHANGE_MARGIN * _change(before.field.u, found.field.u)
             if error <= tolerance:
                 return replace(found, error=error)
         before = found
@@ -202,15 +180,15 @@ def _passed(
             sampling = PupilSampling.for_stop(stop, stops[i + 1], settings, at, field)
             complete = complete and sampling.kept is None
         if field is not None:
-            out = settings.carried(field, stop, sampling.grid if stop.window is None else stop.window)
-            arrived = PlaneField(out.u, out.dx, field.band, field.rays)
+            out, tracked = settings.carried(field, stop, sampling.grid if stop.window is None else stop.window)
+            arrived = PlaneField(out.u, out.dx, field.band, field.rays, tracked=tracked)
             steps.append(SystemStep(stop.distance, out.plan, field.power, arrived.power, out.evanescent_power))
             field = arrived
         if stop.window is None:
-            field = sampling.transmitted(None if field is None else field.u, settings)
+            field = sampling.transmitted(field, settings)
             tilted += stop.alignment.error(settings.steep(field))
     assert field is not None
-    return _Passed(field.u, tuple(steps), _error(steps, tolerance, settings, tilted), complete)
+    return _Passed(field, tuple(steps), _error(steps, tolerance, settings, tilted), complete)
 
 
 def _start(
@@ -245,7 +223,8 @@ def _stops(elements: Sequence[Element], backward: bool, window: Grid) -> list[St
     if not elements:
         raise ValueError("elements is empty: must hold at least one Pupil or FreeSpace")
     stops: list[Stop] = []
-    sign, distance, touching = -1 if backward else 1, 0.0, False
+    sign, touching = -1 if backward else 1, False
+    distance: Scalar = 0.0
     for element in reversed(elements) if backward else elements:
         if isinstance(element, FreeSpace):
             distance, touching = distance + sign * element.distance, False
@@ -256,7 +235,7 @@ def _stops(elements: Sequence[Element], backward: bool, window: Grid) -> list[St
         else:
             stops.append(Stop.at(element, distance))
             distance, touching = 0.0, True
-    return [*stops, Stop(distance, None, window.half_width, window)]
+    return [*stops, Stop(number(distance), None, window.half_width, window, along=distance)]
 
 
 def _medium(elements: Sequence[Element]) -> float:
