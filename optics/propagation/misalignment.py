@@ -146,21 +146,6 @@ class Alignment:
         found: np.ndarray = np.add.outer(self.slope[1] * rows, self.slope[0] * columns)
         return found
 
-    def leaving(self, u: np.ndarray, dx: float, wavelength: float) -> np.ndarray:
-        """Return a field u (y, x) on the tilted plane times 1 - tan α sin θ, an approximation of the obliquity factor.
-
-        wavelength: wavelength [m] in the medium.
-        """
-        if not self.steepness:
-            return u
-        from scipy import fft
-
-        sines = (fft.fftfreq(n, dx).astype(u.real.dtype) * wavelength for n in u.shape)
-        along_y, along_x = (sine * slope for sine, slope in zip(sines, self.slope[::-1], strict=True))
-        factor = 1 - np.add.outer(along_y, along_x)
-        found: np.ndarray = fft.ifft2(fft.fft2(u) * factor, overwrite_x=True)
-        return found
-
     def error(self, sine: float) -> float:
         """Return the relative error of the intensity due to approximations of the tilt; `sine`: largest sin θ."""
         return self.steepness * sine**2 * (self.steepness + sine)
@@ -191,24 +176,39 @@ class Depths:
 
     leaving, arriving: depths [m], (node,), and one array of weights (y, x) per node, see `Alignment.weights`.
     turns: waves per depth [1/m], (1 - c)/λ, by which the carrier exp(ikcζ) is slower than exp(ikζ).
+    slope: tangents of the tilt along x and y of the plane that the light leaves.
     """
 
     leaving: tuple[np.ndarray, list[np.ndarray]]
     arriving: tuple[np.ndarray, list[np.ndarray]]
     turns: float
+    slope: Point
 
-    def factors(self, sags: np.ndarray, wavelength: float, types: Precision) -> DepthFactors:
+    def factors(self, sines: np.ndarray, wavelength: float, types: Precision) -> DepthFactors:
         """Return the weights, and factors exp(±2πi ζ [turns - sags/λ]) for propagation to and from depths ζ.
 
-        sags: 1 - cos θ of each frequency, (fy, fx).
+        The factors of leaving light include 1 - tan α sin θ, an approximation of the obliquity factor.
+
+        sines: sin θ of each frequency along an axis of the spectrum.
         wavelength: wavelength [m] in the medium.
         """
-        slow, found = self.turns - sags / wavelength, []
+        slow, found = self.turns - sags(sines) / wavelength, []
         for sign, (nodes, weights) in ((-1, self.leaving), (1, self.arriving)):
             found.append(
                 [(w, turned(1.0, sign * at * slow, types.dtype)) for at, w in zip(nodes, weights, strict=True)]
             )
-        return DepthFactors(*found)
+        oblique = (1 - np.add.outer(self.slope[1] * sines, self.slope[0] * sines)).astype(types.dtype)
+        return DepthFactors([(weight, factor * oblique) for weight, factor in found[0]], found[1])
+
+
+def sags(sines: np.ndarray) -> np.ndarray:
+    """Return 1 - cos θ for each frequency of a spectrum, (fy, fx); 1 for evanescent waves.
+
+    sines: sin θ of each frequency along an axis.
+    """
+    squared = np.minimum(np.add.outer(sines * sines, sines * sines), 1)
+    found: np.ndarray = squared / (1 + np.sqrt(1 - squared))
+    return found
 
 
 def slowness(sine: float) -> float:

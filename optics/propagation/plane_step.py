@@ -206,6 +206,7 @@ class StepSettings:
             (leaving, field.alignment.weights(leaving, source, turns, types)),
             (arriving, stop.alignment.weights(arriving, grid, -turns, types)),
             turns,
+            field.alignment.slope,
         )
         return depths, error_out + error_in
 

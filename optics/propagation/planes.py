@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from optics.numerics.autodiff import grad_enabled
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.propagation.field_derivatives import LinearMap, mapped
 from optics.propagation.misalignment import Alignment, path_to_tilted_plane, seen_from
 from optics.propagation.plane_step import PlaneField, StepSettings, Stop
 from optics.propagation.propagate import lit_part
@@ -125,8 +123,7 @@ class PupilSampling:
             u = np.exp(2j * np.pi * settings.medium_n / settings.wavelength * path).astype(transmittance.dtype)
         else:
             u = arrived.u
-        leaving = partial(self.alignment.leaving, dx=self.grid.dx, wavelength=settings.wavelength / settings.medium_n)
-        field = leaving(u * transmittance)
+        field = u * transmittance
         tracked = None if arrived is None else arrived.tracked
         if tracked is None and grad_enabled([found.re, found.im]):
             tracked = Field.from_numpy(u, self.grid.dx, types)
@@ -134,8 +131,6 @@ class PupilSampling:
             field = lit_part(field)
         else:
             tracked = tracked * found
-            if self.alignment.steepness:
-                tracked = mapped(tracked, field, self.grid, LinearMap(leaving, leaving))
         return PlaneField(field, self.grid.dx, self.band, self.rays, self.kept, self.alignment, tracked)
 
 

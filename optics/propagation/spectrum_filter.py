@@ -13,7 +13,7 @@ from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
 from optics.propagation.field_derivatives import LinearMap
-from optics.propagation.misalignment import DepthFactors, Depths
+from optics.propagation.misalignment import DepthFactors, Depths, sags
 from optics.propagation.transfer_function import Passage, TransferFunction, evanescent
 from optics.propagation.transform_sampling import TransformSampling, blurred_back
 
@@ -77,7 +77,7 @@ def filtered(
     if total == 0:
         return PropagatedPlane(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
     space = _free_space(how, types.dtype)
-    factors = None if depths is None else depths.factors(_sags(how), how.passage.wavelength, types)
+    factors = None if depths is None else depths.factors(_sines(how), how.passage.wavelength, types)
     if factors is None:
         spectrum = _spectrum(plane, how)
     else:
@@ -114,7 +114,7 @@ def linear_map(
     """
     how, crop = replace(how, step=0), _middle(shape, how.source.shape)
     transfer = _free_space(how, types.dtype).transfer
-    factors = NO_DEPTHS if depths is None else depths.factors(_sags(how), how.passage.wavelength, types)
+    factors = NO_DEPTHS if depths is None else depths.factors(_sines(how), how.passage.wavelength, types)
 
     def spectrum(u: np.ndarray) -> np.ndarray:
         return transfer * sum(factor * _spectrum(u[crop] * weight, how) for weight, factor in factors.leaving)
@@ -124,7 +124,7 @@ def linear_map(
         return found
 
     def rate(u: np.ndarray) -> np.ndarray:
-        turns = (_sags(how) * (-2j * np.pi / how.passage.wavelength)).astype(types.complex_dtype)
+        turns = (sags(_sines(how)) * (-2j * np.pi / how.passage.wavelength)).astype(types.complex_dtype)
         return onto_window(turns * spectrum(u))
 
     def adjoint(grad: np.ndarray) -> np.ndarray:
@@ -162,11 +162,9 @@ def _result(spectrum: np.ndarray, how: TransformSampling) -> np.ndarray:
     return fourier_sum(spectrum, how.back_period, how.window.shape, +1)
 
 
-def _sags(how: TransformSampling) -> np.ndarray:
-    """Return 1 - cos θ for each frequency of a centred spectrum, (fy, fx); 1 for evanescent waves."""
-    f = Grid.square(how.across, how.passage.wavelength / (how.period * how.source.dx)).x
-    s2 = np.minimum(np.add.outer(f * f, f * f), 1)
-    return s2 / (1 + np.sqrt(1 - s2))
+def _sines(how: TransformSampling) -> np.ndarray:
+    """Return sin θ for each frequency along an axis of a centred spectrum."""
+    return Grid.square(how.across, how.passage.wavelength / (how.period * how.source.dx)).x
 
 
 def evanescent_share(plane: np.ndarray, period: int, dx: float, passage: Passage) -> float:
