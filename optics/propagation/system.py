@@ -87,7 +87,8 @@ def propagate_through_batch(
     systems: lists of elements, each as in `propagate_through`. The first element of each is a pupil.
 
     Raises:
-        ValueError, AccuracyError: see `propagate_through`. The message states the index of the system.
+        ValueError: an argument is invalid, see `propagate_through`. The message states the index of the system.
+        AccuracyError: no sampling meets the tolerance for one of the systems.
         BackendError: see `optics.psf`.
     """
     if isinstance(systems, str) or not isinstance(systems, Sequence):

@@ -11,7 +11,7 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion
 from optics.numerics.arguments import complexes, in_range, positive, shape_2d
-from optics.numerics.autodiff import Scalar, number
+from optics.numerics.autodiff import Scalar, number, of_torch
 from optics.numerics.grid import Grid
 from optics.propagation.misalignment import Misaligned
 from optics.propagation.plane_step import PlaneField, Stop
@@ -33,6 +33,8 @@ class FreeSpace:
     medium_n: float = 1.0
 
     def __post_init__(self) -> None:
+        if of_torch(self.distance):
+            raise ValueError("distance requires a derivative of PyTorch: must be a number or a Dr.Jit array")
         positive("distance", self.distance, carried=True)
         in_range("medium_n", self.medium_n, 1.0, 10.0)
 

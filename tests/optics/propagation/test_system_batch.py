@@ -83,7 +83,7 @@ def test_periods_between_planes_are_whole_numbers_of_both_pitches(monkeypatch):
     monkeypatch.setattr(propagate, "filtered", recorded)
     propagate_through([*lenses(0)[:2], *lenses(1, 0.01)], **WHERE, tolerance=3e-3)
     between = [how for how in found if how.window.shape != (64, 64)]
-    assert len(found) == 3 and len(between) == 2
+    assert (len(found), len(between)) == (3, 2)
     assert all(how.back_period.is_integer() and how.window.shape[0] > 100 for how in between)
     # The pitch is at most a few per cent smaller than necessary.
     monkeypatch.setattr(plane_step.StepSettings, "matched", lambda self, field, stop, grid: grid)
