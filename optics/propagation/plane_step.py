@@ -32,6 +32,7 @@ from optics.propagation.propagate import (
     PropagationResult,
     propagated_between_depths,
     propagated_field,
+    step_map,
 )
 from optics.propagation.transfer_function import EVERYTHING, Passage, kept_band, kept_square, limited_band
 from optics.propagation.transform_sampling import kept_light, sampling
@@ -193,7 +194,7 @@ class StepSettings:
         if not differentiated:
             return out, None
         before = field.tracked or Field.from_numpy(field.u, field.dx, precision(self.dtype))
-        return out, mapped(before, out.u, grid, out.linear_map(field.u.shape, depths), stop.along)
+        return out, mapped(before, out.u, grid, step_map(out, field.u.shape, depths), stop.along)
 
     def _depths(self, field: PlaneField, stop: Stop, grid: Grid) -> tuple[Depths, float]:
         """Return the depths of a step between tilted planes, and the error of the interpolation between them."""

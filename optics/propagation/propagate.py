@@ -38,6 +38,7 @@ __all__ = [
     "propagate",
     "propagated_between_depths",
     "propagated_field",
+    "step_map",
 ]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
@@ -83,11 +84,6 @@ class PropagationResult(ReadOnlyArrays, OnWindow):
         """
         how = self._sampling
         return max(evanescent_share(plane, how.period, how.source.dx, how.passage) for plane in self._source)
-
-    def linear_map(self, shape: tuple[int, int], depths: Depths | None = None) -> LinearMap:
-        """Return the propagation by transforms as a linear map of fields (y, x) of a shape."""
-        assert isinstance(self._sampling, TransformSampling)
-        return linear_map(self._sampling, shape, precision(self.u.real.dtype.name), depths)
 
 
 def propagate(
@@ -172,6 +168,16 @@ def propagated_between_depths(
     how = replace(how, step=0)
     planes = [filtered(u, how, precision(dtype), depths)]
     return PropagationResult(planes[0].u, how.window.dx, _plan(how, planes, tolerance, dtype), how.window, u[None], how)
+
+
+def step_map(result: PropagationResult, shape: tuple[int, int], depths: Depths | None) -> LinearMap:
+    """Return the propagation of a result, by transforms, as a linear map of fields (y, x) of a shape.
+
+    depths: depths of a step between tilted planes.
+    """
+    how = result._sampling
+    assert isinstance(how, TransformSampling)
+    return linear_map(how, shape, precision(result.u.real.dtype.name), depths)
 
 
 def _field(u: np.ndarray) -> np.ndarray:

@@ -49,8 +49,8 @@ class StackResult(ReadOnlyArrays, OnWindow):
     steps: tuple[SystemStep, ...]
     predicted_error: float
     window: Grid
-    field_parts: tuple[Array, Array] | None = None
-    _intensity: Array | None = field(default=None, repr=False)
+    field_parts: tuple[Array, Array] | None
+    _intensity: Array | None = field(repr=False)
 
     @property
     def tensor(self) -> np.ndarray | Array:

@@ -27,7 +27,8 @@ MARGINS, LEAST_TOLERANCE = (4.0, 8.0, 16.0, 32.0), 5e-3
 # Choice: smallest tolerance for which the first margin is tried. Below, it was never sufficient.
 LEAST_FOR_FIRST = 0.03
 # Choice: predicted error of a margin, divided by the change from half the margin, and an allowance for light that needs
-# more than both margins, for example between opposite rims of two pupils. It was at most 6e-4 in 80 random systems.
+# more than both margins, for example between opposite rims of two pupils. The
+# error was at most 0.37 times the predicted one in 44 random systems.
 CHANGE_MARGIN, OUTSIDE_MARGINS = 2.0, 2e-3
 
 
@@ -142,7 +143,7 @@ class _Light:
         found = _converged(stops, field, source or PointSource(), settings, self.tolerance)
         power, u, tracked = brightest**2, found.field.u, found.field.tracked
         steps = (replace(one, power_in=one.power_in * power, power_out=one.power_out * power) for one in found.steps)
-        carried = () if tracked is None else _with_carrier(tracked.scaled(brightest), stops, settings)
+        carried = (None, None) if tracked is None else _with_carrier(tracked.scaled(brightest), stops, settings)
         scaled = u * u.dtype.type(brightest)
         return StackResult(scaled, window.dx, tuple(steps), found.error, window, *carried), found.first_margin
 
