@@ -79,7 +79,7 @@ def page(store: Store) -> Page:
 
 
 def joining(store: Store) -> int | None:
-    """Return the first generation of phase II, in which relief and index join; None if no group has a phase II."""
+    """Return the first generation of phase II, from which relief and index evolve too; None without a phase II."""
     return min((row.generation for row in store.rows if row.phase > 0), default=None)
 
 
@@ -233,7 +233,10 @@ def message_of_reliefs(store: Store) -> str:
 
 
 def longer(row: Row, store: Store) -> np.ndarray:
-    """Return the optical path through the relief minus its minimum, over the pupil's square [µm]; NaN outside."""
+    """Return the optical path through the relief minus its minimum, over the pupil's square [µm].
+
+    It is NaN outside the aperture.
+    """
     unit = next((one.relief_height for one in store.run_metadata if one.group == row.group), 0.0)
     heights, inside = relief_heights(optics.Pupil(1.0, relief_of(np.array(row.relief.split(), float))))
     path = 1e6 * unit * (row.refractive_index - 1) * heights

@@ -64,6 +64,7 @@ class Seen:
 class Row:
     """The best eye at one light level.
 
+    illuminance: light level [lx]
     criterion: one of CRITERIA
     eye: "best": the rhabdom and the F-number were chosen, too; "fixed": they have the values of FIXED
     parameter: eye parameter D Δφ [wavelengths]; NaN if no eye meets the criterion
@@ -108,7 +109,8 @@ def least_parameter(one: Seen, illuminance: float) -> float:
     """Return the smallest eye parameter [wavelengths] with which an ommatidium detects the lattice's finest grating.
 
     The finest grating has the frequency 1/(√3 Δφ). An ommatidium detects it if the amplitude of its signal, in photons,
-    is at least the standard deviation of the number of photons (Snyder 1977). NaN: no parameter in PARAMETERS is enough
+    is at least the standard deviation of the number of photons (Snyder 1977). The result is NaN if no parameter within
+    PARAMETERS is large enough.
     """
     parameters = np.geomspace(*PARAMETERS, 4000)
     contrast = np.interp(LAW / parameters, one.cycles, one.contrast, right=0.0)
@@ -119,8 +121,8 @@ def least_parameter(one: Seen, illuminance: float) -> float:
 def information(one: Seen, parameter: float, illuminance: float) -> float:
     """Return the information [bits/sr] about a scene in the photons of a hexagonal lattice of ommatidia.
 
-    See docs/results/best_facet.md for the formula. The integral over the lattice's cell of frequencies is taken over
-    polar coordinates in a twelfth of the hexagon, by Gauss's rule.
+    See docs/results/best_facet.md for the formula. The frequencies that the lattice resolves form a hexagon. The
+    integral over them is computed in polar coordinates over a twelfth of the hexagon, by Gauss's rule.
 
     parameter: eye parameter [wavelengths]
     """
@@ -159,7 +161,11 @@ def most_informative(one: Seen, illuminance: float) -> tuple[float, float]:
 
 
 def computed(eyes: Sequence[tuple[float, float]], lights: Sequence[float] = LIGHTS) -> list[Row]:
-    """Return the best of these eyes (rhabdom [m], F-number), and that with the values of FIXED, at each light level."""
+    """Return, by each criterion and at each light level, the best of these eyes, and the best eye with FIXED values.
+
+    eyes: (rhabdom [m], F-number) of each eye
+    lights: light levels [lx]
+    """
     known = {one: seen(*one) for one in {*eyes, FIXED}}
     rows = []
     for light, (eye, tried) in product(lights, (("fixed", (FIXED,)), ("best", eyes))):

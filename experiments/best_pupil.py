@@ -207,7 +207,7 @@ def _range(apertures: Sequence[float]) -> str:
 
 
 def shades(noises: Sequence[float]) -> tuple[float, float, float]:
-    """Return the smallest, the middle and the largest noise, which the figure shows."""
+    """Return the noises that the figure shows: the second smallest, the middle and the second largest one."""
     return noises[1], noises[len(noises) // 2], noises[-2]
 
 

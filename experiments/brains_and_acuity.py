@@ -54,7 +54,7 @@ def size(row: Row) -> float:
 
 
 def fitted(rows: Sequence[Row], *sizes: Size) -> PowerLaw | None:
-    """Return the power law of candidates' errors; None if it cannot be fitted."""
+    """Return the power law of candidates' errors over these sizes; None if it cannot be fitted."""
     try:
         return power_law(np.array([error(row) for row in rows]), *(np.array([f(row) for row in rows]) for f in sizes))
     except ValueError:
@@ -194,7 +194,7 @@ def brain(row: Row) -> float:
 
 
 def dots(place: Any, rows: Sequence[Row], sizes: tuple[Size, Size], color: str) -> None:
-    """Draw the error of each candidate over its first size, as a dot whose darkness is its rank in the second size."""
+    """Draw a dot for each candidate: its error over the first size; the darkness is the rank in the second size."""
     across, shade = sizes
     ranks = np.argsort(np.argsort([shade(row) for row in rows])) / max(len(rows) - 1, 1)
     for row, rank in zip(rows, ranks, strict=True):

@@ -79,7 +79,7 @@ def designs() -> list[Design]:
 
 
 def _lives(rows: Iterable[Trained], value: Callable[[Trained], float]) -> dict[tuple[int, int], list[float]]:
-    """Return the values of all training runs of each animal."""
+    """Return the values of the training runs of each animal, without failed ones, by width and brain."""
     found: dict[tuple[int, int], list[float]] = {}
     for row in rows:
         if not row.failed:

@@ -49,7 +49,7 @@ class Row:
     relief: heights of the relief in [0, 1], row by row; empty for perfect lenses
     glass_power: power of the glass relative to the power that focuses; see experiments.glass
     facet_diameter_um: width of the facets of compound eyes; NaN for camera eyes
-    rhabdom_diameter_um: NaN for receptors that are not rhabdoms
+    rhabdom_diameter_um: diameter of the rhabdoms; NaN for receptors that are not rhabdoms
     peaks_nm: peak wavelengths of evolved pigments [nm]; empty if pigments do not evolve
     """
 
@@ -193,6 +193,6 @@ def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
 
 @cache
 def parameters(shape: PolicyConfig) -> int:
-    """Return the number of parameters of a policy of this shape, without loading a trained policy."""
+    """Return the number of values that learning changes in a policy of this shape."""
     with torch.device("meta"):  # no values: drawing the weights would take a hundred times longer
         return sum(tensor.numel() for tensor in learnt(build_policy(shape)).values())

@@ -40,9 +40,9 @@ def contrast(store: Store, name: str, quantity: Callable[[Row], float], less: st
     """Return the difference of a quantity between two groups of searches.
 
     The quantity is averaged over the last generations of each search, and then over the searches of a group. Each draw
-    from the null model has the same number of searches per group as there were runs, and p has the lower limit of a
-    single run. The result is None if the null model was not computed, or if runs of a group ended in different
-    generations.
+    from the null model has the same number of searches per group as there were runs. As for a single run, p is at least
+    2 / (searches of the null model + 1). The result is None if the null model was not computed, or if runs of a group
+    ended in different generations.
 
     name: name of the quantity in the stored null model
     less, more: groups; the difference is that of `more` minus that of `less`
@@ -77,7 +77,8 @@ def _ends(store: Store, group: str) -> set[int]:
 def holm(ps: Sequence[float]) -> list[float]:
     """Return p-values adjusted for the number of tests (Holm 1979).
 
-    Tests whose adjusted p-value is at most α together have the level α.
+    If all tests with an adjusted p-value of at most α are called significant, the probability of one or more false
+    positives is at most α.
     """
     order = sorted(range(len(ps)), key=lambda test: ps[test])
     adjusted, largest = [0.0] * len(ps), 0.0

@@ -37,14 +37,15 @@ class Design:
 
     relative_aperture: pupil diameter / retina width of eyes with a paraboloid of glass; 0: eyes with perfect lenses
     glass_power: power of the glass, 1 in focus (see experiments.glass)
-    vertical_fov_deg: 0: receptors are square
+    vertical_fov_deg: vertical field of view of an eye; 0: that of square receptors
     features: features per eye, the width of its encoder; 0: a quarter of the neurons
     own: settings of this design alone, "section.name=value" separated by spaces
     facet_diameter_um: width of the facets of compound eyes; 0: camera eyes
     rhabdom_diameter_um, f_number: of the ommatidia of compound eyes
 
     Raises:
-        ValueError: a number has more digits than a CSV file stores, so that its stored run would not be recognised.
+        ValueError: a number has more digits than a CSV file stores, so that the stored training run of this design
+            would not be recognised.
     """
 
     task: str
@@ -158,7 +159,7 @@ def evaluate_and_test(
 ) -> Evaluation:
     """Train an animal, then play further episodes in the mode "test"; for use in a worker process.
 
-    In tasks without layouts, these episodes differ from those of the fitness by their starts and objects only.
+    In tasks without layouts, these episodes differ from those of the fitness only in their starts and objects.
     """
     outcome = evaluate_candidate(phenotype, config, seed, policy_path, rung, **how)
     if outcome.failure is not None:
@@ -274,7 +275,7 @@ def _made(experiment: Experiment, chosen: Namespace) -> None:
 
 
 def _train(experiment: Experiment, data: Path, workers: int) -> None:
-    """Train the missing animals; new results may make further training runs unnecessary, or request some."""
+    """Train the missing animals; new results may make further training runs unnecessary, or require some."""
     every = experiment.designs()
     while True:
         needed = every if experiment.needed is None else experiment.needed(read_rows(Trained, data))

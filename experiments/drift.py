@@ -24,7 +24,7 @@ class Drift:
     """Distribution of a quantity under the null model, in one generation.
 
     The quantity is averaged over the candidates of the generation. The end of a phase has an additional row, in which
-    the quantity is averaged over the last LAST generations.
+    the quantity is averaged over the final LAST generations of the phase.
 
     median: median over the searches
     low, high: ends of the range that contains 95 % of the searches
@@ -65,7 +65,6 @@ def drifted(
 
     group: group of runs with which the null model is compared
     quantities: functions of a candidate's row, by name
-
     spread: see `evolve.search.null_model.null_model`
     """
 

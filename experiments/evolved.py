@@ -261,10 +261,12 @@ def _text(path: Path) -> str:
 
 
 def stored(stem: Path) -> Store:
-    """Return the stored contents under this path without a file ending.
+    """Return the stored data of a page.
+
+    stem: path of the files without an ending
 
     Raises:
-        ValueError: the file contains no rows.
+        ValueError: no rows of candidates are stored.
     """
     rows = read_rows(Row, stem.with_suffix(".csv"))
     if not rows:

@@ -62,7 +62,7 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
 def complete_pairs(folder: Path) -> list[tuple[str, Run]]:
     """Return the records of the first complete pairs of searches, each with the name of its group.
 
-    Their number is the largest planned one that the complete pairs reach.
+    The number of pairs is the largest number in LOOKS for which all pairs are complete.
 
     Raises:
         ValueError: a record has other settings than the plan, or too few pairs are complete.

@@ -158,7 +158,7 @@ def _prices_table(rows: Sequence[Trained]) -> str:
 
 
 def _returns(rows: Sequence[Trained], task: str) -> dict[Design, np.ndarray]:
-    """Return the returns of the training runs of each animal of the factorial design, by animal.
+    """Return the returns of the training runs of each animal of the factorial design and of OTHERS, by animal.
 
     Animals with fewer than two training runs are omitted.
     """

@@ -126,7 +126,7 @@ def _runs(claim: Claim, runs: int) -> Iterator[Design]:
 
 
 def needed(rows: Sequence[Trained]) -> list[Design]:
-    """Return the training runs that the claims need up to their next look, in order of the claims.
+    """Return the missing training runs that the claims need up to their next look, in order of the claims.
 
     All animals are trained until the first look.
     """
@@ -141,9 +141,9 @@ def needed(rows: Sequence[Trained]) -> list[Design]:
 
 
 def power(claim: Claim, runs: int) -> float:
-    """Return the probability that an interval with this number of runs excludes 0, if the true difference is relevant.
+    """Return the probability that an interval with this number of runs excludes 0, if the true value is `relevant`.
 
-    It follows from the noncentral t distribution. Opposite signs are not counted.
+    It follows from the noncentral t distribution. Intervals on the wrong side of 0 are not counted.
     """
     freedom = claim.freedom(runs)
     limit = t.ppf((1 + CONFIDENCE) / 2, freedom)

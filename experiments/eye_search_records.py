@@ -13,7 +13,7 @@ __all__ = ["complete_groups"]
 
 
 def complete_groups(folder: Path, seeds: Sequence[int]) -> list[tuple[Search, Run]]:
-    """Return the searches of each kind whose searches are all complete, with their records.
+    """Return the searches of the complete kinds, with their records. A kind is complete if all its searches are.
 
     seeds: seeds of the searches that are expected, except random searches, which have only one seed
 

@@ -65,7 +65,7 @@ def designs() -> list[Design]:
 
 
 def best_octave(rows: Sequence[Trained], seed: int, light: float) -> float:
-    """Return log2 of the best eye parameter among FACETS: where a parabola fitted to fitness is highest.
+    """Return log2 of the eye parameter at which a parabola fitted to fitness is highest.
 
     The parabola is a function of log2 of the eye parameter. It is fitted by least squares to the eyes that were trained
     with this seed in this light, and its maximum is taken within the range of the eyes.

@@ -26,8 +26,8 @@ class Effects:
     """Effects of factors and of their interactions of order two, in units of the residual standard deviation.
 
     of: effect of each set of one or two factors. For one factor, it is the mean at the high level minus the mean at the
-        low level. For two factors, it is half the difference of the first factor's effect between the second factor's
-        levels
+        low level. For two factors, it is half of this: the first factor's effect at the second factor's high level,
+        minus its effect at the low level
     spread: residual standard deviation, in units of the response
     freedom: degrees of freedom of the residual
     """

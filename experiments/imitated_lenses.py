@@ -66,7 +66,7 @@ class Searched:
 
     closed: mean relative aperture in the last generations before glass may change
     aperture: mean relative aperture
-    power, blur: medians
+    power, blur: medians of the power of the glass and of the blur, see experiments.glass
     fitness: mean expected fitness
     strehl: Strehl ratio of the animal with the median blur in the last generation
     """
@@ -110,7 +110,10 @@ def _apertures(animals: Sequence[Phenotype]) -> Floats:
 
 
 def _strehl(animals: Sequence[Phenotype], config: EyeConfig) -> float:
-    """Return the Strehl ratio of the animal nearest to the median blur whose light peaks on the retina, or NaN."""
+    """Return the Strehl ratio of the animal whose blur is nearest to the median.
+
+    Animals whose PSF has no maximum in its window are skipped. If this is the case for all, the result is NaN.
+    """
     blurs = np.array([blur(animal, config) for animal in animals])
     for place in np.argsort(np.abs(blurs - np.median(blurs)), kind="stable"):
         eye = animals[place].eyes(config).eye()

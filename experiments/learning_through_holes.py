@@ -82,10 +82,10 @@ def smoothed(place: Floats, value: Floats, at: Floats) -> Floats:
 
 
 def best_width(rows: Sequence[Row], seed: int = 0) -> tuple[Interval, float]:
-    """Return the peak of the smooth curve of success, with a bootstrap over animals, and a p-value.
+    """Return the width at the peak of the smooth curve of success, and a p-value.
 
-    p is estimated by permutations. It is the probability that a curve explains at least as much of the variance if
-    success does not depend on the width.
+    The width has a 95 % bootstrap interval over animals. p is estimated by permutations. It is the probability that a
+    curve explains at least as much of the variance if success does not depend on the width.
 
     Raises:
         ValueError: there are fewer than three animals.

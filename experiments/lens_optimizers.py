@@ -174,7 +174,11 @@ def by_gradient(watch: Watch, spots: Sequence[float | None]) -> None:
 
 
 def _descend(tried: Callable[[Floats], tuple[float, Floats]], genome: Floats, most: int) -> Floats:
-    """Minimise with L-BFGS-B, in units of its first step."""
+    """Minimise with L-BFGS-B, with genes in units of FIRST_STEP, and return the genome at the end.
+
+    tried: function that returns the loss and its derivatives
+    most: maximum number of evaluations, and of iterations
+    """
 
     def scaled(v: Floats) -> tuple[float, Floats]:
         value, slope = tried(np.clip(FIRST_STEP * v, 0.0, 1.0))

@@ -103,7 +103,7 @@ def exit_code(name: str, work: Callable[[], None]) -> int:
 
 
 def new_figure(width: float, height: float, columns: int = 1, rows: int = 1, **options: Any) -> tuple[Any, Any]:
-    """Return a figure [inches] and its axes, without frame lines at the top and on the right."""
+    """Return a figure of `width` x `height` inches and its axes, without frame lines at the top and on the right."""
     import matplotlib
 
     matplotlib.use("agg")

@@ -107,7 +107,7 @@ def page(store: Store) -> Page:
 
 
 def table(store: Store) -> str:
-    """Return a table of the quantities in the first and in the last generations, and of their null model."""
+    """Return a table of the quantities in the first and in the last generations, and under the null model."""
     first = [row for row in store.rows if row.generation == 0]
     header = ["mean", "first generation", f"last {LAST} generations", "null model"]
     lines = []

@@ -93,7 +93,7 @@ class Origin:
         return cls(**{**found, "earlier": tuple(found.get("earlier", ()))})
 
     def after(self, path: Path) -> Origin:
-        """Return this origin with the commits of the earlier origin in a file."""
+        """Return this origin, with the commits of the origin that a file contains added to `earlier`."""
         if not path.exists():
             return self
         former = Origin.read(path)

@@ -50,11 +50,11 @@ EARLY = 6  # generations over which selection is compared; later candidates are 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement of an evaluation during training with the fitness after it, averaged over generations.
+    """Agreement of an evaluation during training with the fitness after training, averaged over generations.
 
     steps: training steps before the evaluation
     correlation: Spearman's rank correlation within a generation
-    shared: fraction of the fitter half of a generation that is also the fitter half by this evaluation
+    shared: fraction of a generation's fitter half by this evaluation that is also in the fitter half after training
     selected: mean of ln(receptors across / eyes) of the fitter half by this evaluation, minus that of all candidates,
         in the first EARLY generations
     by_fitness: the same for the fitter half after training
@@ -158,10 +158,10 @@ def ranked() -> tuple[Design, ...]:
 
 
 def ranks_table(rows: Sequence[Trained], full: Sequence[Trained]) -> str:
-    """Return a table of rank correlations over animals: fitness of single training runs, and mean of full ones.
+    """Return a table of rank correlations, over animals, of single training runs with means of full training runs.
 
-    The means are over full training runs with other seeds. The single runs are the first 106,496 steps of a full one,
-    or full ones.
+    The fitness of a single run is compared with the mean fitness of full runs that have other seeds. In one column, the
+    single run consists of the first 106,496 steps of a full one. In the other column, it is a full run.
 
     rows, full: stored shorter and full training runs
     """

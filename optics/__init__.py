@@ -10,10 +10,10 @@ elements      source, pupil and relief
 methods       ten ways to evaluate the diffraction integral (read methods/textbook.py first)
 point_spread  psf and plan: choice of the method and check of its result
 propagation   propagation of sampled fields between planes
-eye           Eye: signals of its receptors
 ommatidia     Ommatidium: facet lenses and rhabdoms as waveguides
+eye           Eye: signals of its receptors
 animals       eyes of honeybees, flies, fish, humans and other animals
-torch         psf as a function in a PyTorch graph
+torch         PSFs, camera images and signals of eyes in a PyTorch graph
 """
 
 from importlib import import_module

@@ -56,7 +56,7 @@ def psf(
     device: torch.device | str | None = None,
     **view: Any,
 ) -> torch.Tensor:
-    """Return `optics.psf` as a tensor, differentiable with respect to tensors in the pupil, distances and angle.
+    """Return `optics.psf` as a tensor with gradients to the tensors in the pupil, the distances and the angle.
 
     pupil: a pupil, or a sequence of pupils. Some of its numbers may be tensors that require gradients: the radius, the
         refractive index and the focal length, the samples of a `HeightMap`, `PixelRelief`, `WavefrontMap` or `MaskMap`,
@@ -69,15 +69,15 @@ def psf(
     pixel_means: True for the mean of the PSF over each square pixel of side dx, as a sensor measures it. False for the
         samples of `optics.psf`.
     requires_grad: True to raise a ValueError if no tensor requires a gradient.
-    device: device of the result. None: the device of the tensors that require gradients, or the processor.
+    device: device of the result. None: the device of the tensors that require gradients, or the CPU without any.
     view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.
 
     Returns a tensor (pupil, distance, wavelength, y, x) [1/m²], float32 unless dtype="float64". It has an axis of
     pupils only if a sequence of pupils is passed, and an axis of distances only if a distance is a row. Each gradient
     has the device and the precision of its tensor. Only first derivatives are available.
 
-    At tolerances of 3e-4 or more, the source distances and wavelengths of a pupil share a plan and samples. One call is
-    then much faster than a call for each.
+    At tolerances of 3e-4 or more, the source distances and wavelengths of a pupil share a plan and samples. One call
+    for all of them is then much faster than separate calls.
 
     A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
 
@@ -117,8 +117,8 @@ def _images(
 ) -> torch.Tensor:
     """Return the PSFs of all members of a batch, (member, wavelength, y, x).
 
-    At coarse tolerances, PyTorch computes members with the same pupil and sensor's distance as one stack. Dr.Jit
-    computes all others.
+    On the CPU and at coarse tolerances, PyTorch computes members with the same pupil and sensor distance as one stack.
+    Dr.Jit computes all other members.
     """
     images: dict[int, torch.Tensor] = {}
     if torch_place() == "cpu" and all(tensor.device.type == "cpu" for tensor in numbers.values()):
@@ -140,7 +140,7 @@ def _images(
 def _stacked(
     light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
 ) -> dict[int, torch.Tensor]:
-    """Return the PSFs of those members that a stack computes within the tolerance, (wavelength, y, x), by index."""
+    """Return {index of a member: its PSFs (wavelength, y, x)} for members that stacks compute within the tolerance."""
     found: dict[int, torch.Tensor] = {}
     fixed = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()})
     asked = wavelengths, Grid(view["shape"], view["dx"], view["centre"]), view["dtype"]
@@ -157,7 +157,7 @@ def _stacked(
 
 
 def _completed(view: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the arguments of `optics.psf` for window, tolerance and method, with its defaults."""
+    """Return the arguments of `optics.psf` for window, tolerance, method and dtype: those in `view`, or defaults."""
     known = {name: value.default for name, value in inspect.signature(drjit_psf).parameters.items()}
     named = ("dx", "shape", "tolerance", "method", "dtype", "centre")
     return {name: known[name] for name in named} | dict(view)
@@ -194,7 +194,7 @@ def eye_signals(
 ) -> torch.Tensor:
     """Return the signals of `optics.Eye.see` as a tensor (channel, h, w) with gradients to the tensors in the eye.
 
-    eye: an eye. Numbers of its pupil and its field of view may be tensors, see `psf`.
+    eye: an eye. Its field of view and the numbers of its pupil may be tensors, see `psf`.
     radiance, samples_per_receptor, rng, z: see `optics.Eye.see`. Of these, only the distance z carries a gradient.
     device: device of the result, see `psf`.
 
@@ -224,7 +224,7 @@ def _operation(compute: Callable[[Any], Any], element: Any, device: Any) -> torc
 
 
 def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
-    """Return the pupil of a call that passes heights and arguments of `Pupil`."""
+    """Return the pupil of a call that passes heights and arguments of `Pupil`; ValueError without a radius."""
     if heights is None and given.keys() == {"pupil"}:
         return given["pupil"]
     heights = of_kind("heights", given.get("heights", heights), torch.Tensor, "torch.zeros(4, 4)")
@@ -235,7 +235,7 @@ def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
 
 
 def _guessed(heights: torch.Tensor, stacklevel: int) -> Relief:
-    """Return the relief for a tensor of heights in a former call: 4 x 4 heights are control points.
+    """Return the relief for a tensor of heights: 4 x 4 heights are control points, others are samples of a map.
 
     stacklevel: number of calls from `warnings.warn` to the user's code.
     """

@@ -8,7 +8,7 @@ BatchedRenderer                     renderer of all eyes of all worlds in one wa
 choose_fidelity, Fidelity           rendering accuracy, chosen to match the receptors' noise
 FidelityWarning                     warning that no level of fidelity is accurate enough
 ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in `optics`
-ModelRenderer, Poses                renderer of eyes on any MuJoCo model, and the positions of its geoms in a batch
+ModelRenderer, Poses                renderer of eyes on any MuJoCo model, and poses of the model in a batch of worlds
 Mount, fan, ring, both_sides        positions and directions of eyes on a model
 CompoundEye                         ommatidia with any viewing directions
 hexagonal_patch, whole_head, hexagonal_rows   viewing directions for a CompoundEye
@@ -16,7 +16,7 @@ choose_model_fidelity               rendering accuracy for eyes on a model
 Task                                a user task for a robot with eyes, written for one world at a time
 BatchTask                           a user task written for arrays of all worlds, which runs faster
 check_batch_task                    test whether a batch task follows the protocol of BatchTask
-Outcome, RewardTerms                return value of `judge` in a batch task, and the terms of its reward
+Outcome, RewardTerms                return value of a batch task's `judge`, and the reward terms that it contains
 Physics                             protocol of the physics of a batch of worlds
 ArrayWorlds, SlidingAgents          two implementations of Physics: for any MuJoCo model, and for the built-in agent
 Encounter, Frozen                   several animals in one world that see each other

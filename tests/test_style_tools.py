@@ -1,4 +1,4 @@
-"""The tools that check the style: ruff and mypy over the whole tree."""
+"""The tools that check the style: ruff over the whole tree, and mypy over all packages."""
 
 import subprocess
 import sys

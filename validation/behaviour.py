@@ -63,13 +63,16 @@ EVOLUTION = (
 
 
 def episodes(task: str, mode: str, worlds: int) -> str:
-    """Return the hash of all observations, rewards and infos of 300 random actions, through a perfect lens."""
+    """Return the hash of the outputs of 300 random actions, through a perfect lens.
+
+    Outputs are observations, rewards, their terms, and whether each episode ended.
+    """
     venv = sim.make_vec_env(task, sim.Eyes(n_eyes=2, resolution=(3, 5)), worlds, seed=5, mode=mode, memory=2)
     return _played(venv, STEPS)
 
 
 def user_episodes(task: str, worlds: int) -> str:
-    """Return the hash of observations, rewards and infos of random actions in a user task from `examples/`."""
+    """Return the hash of the same outputs as in `episodes`, for a user task from `examples/`."""
     return _played(sim.make_vec_env(_example(task)(), n_envs=worlds, seed=5, memory=2), USER_STEPS)
 
 

@@ -1,4 +1,7 @@
-"""Parts of fitness: task fitness, which is the mean return of the evaluation episodes, minus costs."""
+"""Parts of fitness: the task fitness, which is the mean return of the evaluation episodes, and the costs.
+
+Fitness is the task fitness minus the costs.
+"""
 
 from __future__ import annotations
 

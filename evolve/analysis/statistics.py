@@ -44,9 +44,11 @@ RESAMPLED_AT_ONCE = 2**20  # maximum number of samples that are drawn at once, w
 class GenerationStatistics:
     """Statistics of the fitness in one generation.
 
+    generation: number of the generation, counted from 0
     evaluated, failed: number of evaluated candidates, and number of failed candidates among them
     best, median: best fitness and median of the population; NaN if all its candidates have failed
-    low, high: the 10 % and 90 % quantiles of the population (linear interpolation); NaN in the same case
+    low, high: the 10 % and 90 % quantiles of the population (linear interpolation); NaN if all its candidates have
+        failed
     best_so_far: best fitness up to and including this generation; NaN before a candidate has succeeded
     """
 
@@ -203,7 +205,8 @@ def bootstrap_interval(
     seed: seed of the resampling
 
     Raises:
-        ValueError: samples are missing, not finite or in half precision, or the level is outside (0, 1).
+        ValueError: `samples` is empty, not one-dimensional, not finite or in half precision, or the level is outside
+            (0, 1).
     """
     values = np.asarray(full_precision("samples", samples), dtype=np.float64)
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():

@@ -55,7 +55,7 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
-        ValueError: the eyes that the task places differ from the animal's.
+        ValueError: the eyes cannot be placed in the user task; see `evolve.learning.animal_task.with_phenotype`.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     medium = config.world.medium

@@ -24,7 +24,7 @@ def seed(text: str) -> int:
 
 
 def every(text: str) -> int:
-    """Return the number of actions between two images, in the text of an argument.
+    """Return the number of actions from one image to the next, in the text of an argument.
 
     Raises:
         ArgumentTypeError: the text is not a whole number from 1 to MOST_EVERY.

@@ -1,6 +1,6 @@
 """Measurement of the speed of this machine.
 
-A few seconds of real training are timed, in the number of processes that the run will have.
+A few seconds of real training are timed, in as many processes at once as the run will have.
 """
 
 from __future__ import annotations

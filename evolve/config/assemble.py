@@ -134,8 +134,8 @@ def _read_back(written: Source) -> RunConfig:
 def _user_settings(source: Source, code: TaskCode | None) -> Source:
     """Return the settings of a user's file or option `--set`. The file may be the config.toml of another run.
 
-    Its format must be one whose settings still have the same meaning. A file cannot select a user task, because only
-    the command line or a call may name code that is executed.
+    The format of such a file must be one whose settings still have the same meaning. A file cannot select a user task,
+    because only the command line or a call may name code that is executed.
     """
     if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(

@@ -111,9 +111,10 @@ def check_gene_use(gene: Gene, use: GeneConfig) -> None:
 
 
 def suggestion(word: Any, known: Iterable[str]) -> str:
-    """Return "did you mean X?" if `word` is similar to the known word X, or to its part after the last dot.
+    """Return "did you mean X?" if `word` is similar to the known word X; else a list of known words, as text.
 
-    Otherwise, return the list of the first MOST_LISTED known words.
+    Two words also count as similar if only their parts after the last dot are. The list contains the first MOST_LISTED
+    known words, and states the number of the others.
     """
     known, word = list(known), str(word)
     by_last = {name.rpartition(".")[2]: name for name in known}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from evolve.config.checks import ConfigError
+from evolve.config.settings import WiringConfig
 from evolve.genome.eye_config import VERTICAL_FOVS, EyeConfig
 from evolve.genome.genes import INHERITED
 from optics.spectra.receptor_dynamics import ADAPTATIONS, LEAST_EVENT, MOTION
@@ -18,6 +19,7 @@ OF_CAMERAS = (
     *("sensor_width", "relief_height", "relief_points", "relief_symmetric", "pupil_turned", "square", "vertical_fov"),
     *("receptor_pitch", "rhabdoms", "rhabdom_length", "head_radius", "receptor_width", "temporal_order"),
 )
+GRIDS = ("pool_side", "repeat_side")  # wiring of rows and columns of receptors
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
 # Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. A rhabdom below the lower limit guides almost
 # no light, and one above the upper limit has hundreds of modes.
@@ -83,6 +85,21 @@ def _check_compound(eye: EyeConfig) -> None:
             )
     if eye.compound and not eye.optics:
         raise ConfigError("eye.compound = true: facets are optics; set eye.optics = true", "eye.compound", "eye.optics")
+
+
+def check_wiring(eye: EyeConfig, wiring: WiringConfig) -> None:
+    """Check that settings of the wiring that need rows and columns of receptors are 0 for compound eyes.
+
+    Raises:
+        ConfigError: one of these settings is not 0.
+    """
+    for name in GRIDS if eye.compound else ():
+        if getattr(wiring, name):
+            raise ConfigError(
+                f"wiring.{name} = {getattr(wiring, name)}: must be 0 for compound eyes: ommatidia have no rows and "
+                "columns",
+                *(f"wiring.{name}", "eye.compound"),
+            )
 
 
 def _check_rhabdoms(eye: EyeConfig) -> None:

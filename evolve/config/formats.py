@@ -66,7 +66,7 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
 
 
 def in_own_axes(tree: Mapping[str, Any], number: int) -> Tree:
-    """Return settings in which pupils have the same axes as before.
+    """Return the settings, completed so that pupils keep the axes that the settings' format implies.
 
     In formats 1 and 2, pupils are rotated by 180°. Settings of these formats get `eye.pupil_turned` = True, unless they
     contain this setting.

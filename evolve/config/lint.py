@@ -79,7 +79,7 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
 
     If the spectral genes determine the receptors, each open gene in turn takes values over its range, while the others
     keep their start values. Other combinations of the genes may cause a larger error. In the preset `ultraviolet`,
-    whose peaks lie far apart, it is a third larger.
+    whose peaks lie far apart, the largest error of all combinations is a third larger.
     """
     if config.eye.receptors != INHERITED:
         return [config.eye.receptors]
@@ -112,7 +112,7 @@ def idle_genes(config: RunConfig) -> list[str]:
 
 
 def _idle_glass(uses: Mapping[str, GeneConfig], relief: list[str]) -> list[str]:
-    """Return warnings about open genes of the relief and its material that have no effect because of each other."""
+    """Return warnings about open genes of a relief that does not refract, and of the material of a flat relief."""
     notes, index = [], uses["refractive_index"]
     if not index.open and index.start == 1 and any(uses[name].open for name in (*relief, "dispersion")):
         notes.append("the relief's open genes have no effect: genome.refractive_index is fixed at 1")

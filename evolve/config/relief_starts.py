@@ -20,9 +20,9 @@ Tree = dict[str, Any]
 def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
     """Return the settings `tree`, with the start values of relief genes converted to the number of genes of the eyes.
 
-    If `tree` contains start values of all 4 x 4 genes, or of all genes of a symmetric relief of 4 x 4 points, and the
-    eyes have more genes, the values are converted to the same surface with more genes. If reliefs are symmetric, start
-    values that follow from others are removed.
+    The start values in `tree` may describe a whole relief of 4 x 4 points, by all its genes or by those of a symmetric
+    relief. If the eyes have more points, these values are converted to the same surface with more points. If reliefs
+    are symmetric, start values that follow from others are removed.
 
     Raises:
         ConfigError: `tree` contains start values for more than 4 x 4 genes, and the eyes have more genes than that.

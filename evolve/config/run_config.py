@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from evolve.config.checks import ConfigError, check_gene_use, check_values, quoted
-from evolve.config.eye_checks import check_eye
+from evolve.config.eye_checks import check_eye, check_wiring
 from evolve.config.layout_checks import check_layouts
 from evolve.config.settings import (
     SECTIONS,
@@ -98,6 +98,7 @@ class RunConfig:
             known = ", ".join(MEDIA_OF_WORLDS)
             raise ConfigError(f"world.medium = {self.world.medium!r}: must be one of {known}", "world.medium")
         check_eye(self.eye)
+        check_wiring(self.eye, self.wiring)
         self._check_world()
         for name, gene in self.genes.items():
             check_gene_use(gene, self.genome[name])

@@ -215,7 +215,8 @@ class WiringConfig:
 
     `evolve config schema` describes each field.
 
-    `pool_side` has no effect along an axis with fewer receptors, and `repeat_side` none along an axis with more.
+    `pool_side` has no effect along an axis with at most this number of receptors. `repeat_side` has no effect along an
+    axis on which at least this number of signals is left after averaging. Both must be 0 for compound eyes.
     """
 
     shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")

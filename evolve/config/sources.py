@@ -60,7 +60,7 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
     scale: name of the scale; None: the first of SCALES, if the preset has several scales
 
     Raises:
-        ConfigError: the preset or the scale is unknown, or the preset has only one scale.
+        ConfigError: the preset or the scale is unknown, or `scale` is given although the preset has only one scale.
     """
     if name is None:
         return []

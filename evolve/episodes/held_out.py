@@ -21,8 +21,10 @@ def held_out_episodes(
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the run has no test set, or the user task was not named when the run was opened, or fails.
+        ConfigError: the run has no test set, or the user task was not named when the run was opened, or its module
+            cannot be executed.
         ValueError: `episodes` is below 1, or `seed` is negative.
+        RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: the policy's file cannot be read.
     """

@@ -60,7 +60,8 @@ def record(
         RunError: the candidate does not exist, or its policy is missing or damaged.
         ConfigError: the mode is unknown, the run has no test set, or the user task was not named when the run was
             opened, or its module cannot be executed.
-        ValueError: `radiance_every` is not a whole number from 1 to 1,000,000.
+        ValueError: `radiance_every` is not a whole number from 1 to 1,000,000, or `seed` is negative.
+        RuntimeError: a method of the user task fails at the start of the episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: the policy's file cannot be read.
     """

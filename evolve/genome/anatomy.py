@@ -73,8 +73,8 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     If receptors are too narrow, their number along the width is reduced. `_with_high_receptors` repairs receptors that
     are not high enough. If eyes overlap, they are spread over a larger part of the head. If the searched range of their
     placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number of its
-    receptors, the numbers of eyes and of receptors are instead reduced in the same proportion. Rhabdoms are narrowed to
-    the shorter side of a receptor; all other genes stay within their searched ranges.
+    receptors, the numbers of eyes and of receptors are instead reduced in the same proportion. Rhabdoms become at most
+    as wide as the shorter side of a receptor; all other genes stay within their searched ranges.
 
     For compound eyes, see `evolve.genome.head_surface`.
 
@@ -103,8 +103,8 @@ def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values
     """Return new values of genes, by name, with which receptors are at least `eye.receptor_width` high.
 
     The number of rows is reduced. If the lowest number does not fit and the vertical field of view is a gene, this
-    field grows up to its highest value. If that is not enough, the horizontal field shrinks, which makes a retina of
-    the same width higher. For square receptors, the result is {}.
+    field grows, at most to its highest value. If that is not enough, the horizontal field shrinks, which makes a retina
+    of the same width higher. For square receptors, the result is {}.
     """
     vertical = vertical_fov(values, sizes)
     if vertical is None:

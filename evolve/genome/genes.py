@@ -120,7 +120,7 @@ class Gene:
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Return the gene's value at a coordinate. Values of an integer gene occupy equal intervals.
+        """Return the gene's value at a coordinate. Each value of an integer gene has an interval of the same length.
 
         u: coordinate in [0, 1], which is not checked
         use: use of the gene in a run; the coordinates 0 and 1 correspond to `use.low` and `use.high`

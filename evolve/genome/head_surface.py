@@ -2,8 +2,9 @@
 
 A facet of the width D is a hexagon with the area (√3/2) D². All facets of all eyes have at most the area
 `eye.facet_area` together. Facets touch each other, so the local radius of an eye's surface is R = D/Δφ, where Δφ is the
-interommatidial angle. In an acute zone, Δφ is smaller, and the surface is flatter. Eyes are at most 180 degrees high in
-Mercator's projection, which `sim.hexagonal_rows` uses, because ommatidia would otherwise crowd near the poles.
+interommatidial angle. In an acute zone, Δφ is smaller, and the surface is flatter. `sim.hexagonal_rows` places
+ommatidia in Mercator's projection. Eyes are at most 180 degrees high in this projection, because the ommatidia of
+higher eyes would crowd near the poles.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ SLACK = 1 + 1e-9  # tolerance for rounding errors
 def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     """Return the gene values after the repair of facets that do not fit on the head.
 
-    The repair reduces the numbers of eyes, rows and columns and the width of the facets. For each combination of these
-    four quantities, take the logarithms of their ratios to the genes' values, and sum their squares. Among all
-    combinations that fit and lie within the searched ranges, the repair chooses the one with the smallest sum. No
-    quantity is therefore reduced in preference to the others. Rhabdoms are narrowed to the width of a facet.
+    The repair reduces the numbers of eyes, rows and columns and the width of the facets. The distance of a combination
+    of these four quantities from the genes' values is the sum of the squared logarithms of the four ratios. Among all
+    combinations that fit and lie within the searched ranges, the repair chooses the nearest one. No quantity is
+    therefore reduced in preference to the others. Rhabdoms become at most as wide as a facet.
 
     values: value of each gene, by name
     uses: searched range of each gene, by name

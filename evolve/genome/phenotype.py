@@ -227,7 +227,7 @@ class Phenotype:
         """Return the phenotype from the return value of `to_json`.
 
         Raises:
-            ValueError: a field is unknown, has another type, or lies outside the range of its gene.
+            ValueError: the record is not a mapping, or a field is unknown or invalid; see `checked_fields`.
             TypeError: a field is missing.
         """
         return cls(**checked_fields(record, [f.name for f in fields(cls)]))

@@ -101,8 +101,8 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ValueError: `task` is no `sim.Task`, has no mounts or several kinds of eyes, or its `place` fails or returns
-                another number of mounts.
+            ValueError: `task` is not a `sim.Task`, has no mounts or several kinds of eyes, or its `place` fails or
+                returns another number of mounts.
             OSError: the policy's file cannot be read.
         """
         from evolve.episodes.recorder import trained_policy
@@ -124,8 +124,9 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: the run has no test set, or the user task was not named when the run was opened, or fails.
+            ConfigError: the run has no test set, or the user task's code was not named, or cannot be executed.
             ValueError: `episodes` is below 1, or `seed` is negative.
+            RuntimeError: a method of the user task fails at the start of an episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: the policy's file cannot be read.
         """
@@ -164,8 +165,8 @@ class OpenedRun(Run):
     def drift(self, searches: int = 200) -> pd.DataFrame:
         """Return a table that compares the last generations of the run with simulated searches with random fitness.
 
-        There is a row for each open gene, for the acuity, and for the number of receptors. Each row contains the mean
-        of the run, the median and the 95 % range of the searches, and the p-value of the run's mean.
+        Each row is an open gene, an acuity or the number of receptors. It contains the mean of the run, the median and
+        the 95 % range of the searches, and the p-value of the run's mean. Quantities that do not vary are omitted.
 
         searches: number of searches with random fitness
 
@@ -202,13 +203,12 @@ class OpenedRun(Run):
         return axes
 
     def report(self) -> Path:
-        """Write the report, which is one HTML page, and return its path.
-
-        Without a successful candidate, the page has no episode.
+        """Write the report as one HTML page, without an episode if no candidate has succeeded. Return its path.
 
         Raises:
             RunError: the best candidate's policy is missing or damaged.
             ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+            RuntimeError: a method of the user task fails at the start of an episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """
@@ -226,9 +226,7 @@ class OpenedRun(Run):
         out: Path | str | None = None,
         mode: str = "evaluation",
     ) -> list[Path]:
-        """Play an episode of a candidate, write a page that shows it, and return the paths of the page and other files.
-
-        The files are those of the command `evolve replay`.
+        """Play an episode of a candidate, and write a page that shows it, like `evolve replay`. Return all paths.
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
@@ -241,8 +239,9 @@ class OpenedRun(Run):
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set,
-                or the user task was not named when the run was opened, or fails.
+                or the user task's code was not named when the run was opened, or cannot be executed.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
+            RuntimeError: a method of the user task fails at the start of the episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """
@@ -264,8 +263,9 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, or the user task was not named when the run was opened, or fails.
+            ConfigError: an argument is invalid, or the user task's code was not named, or cannot be executed.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
+            RuntimeError: a method of the user task fails at the start of the episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
         """

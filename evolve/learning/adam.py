@@ -19,8 +19,8 @@ EPSILON = 1e-5  # the value that stable-baselines3 uses in PPO
 class Adam:
     """Adam (Kingma and Ba 2015, algorithm 1), with the interface that stable-baselines3 needs.
 
-    All parameters become views of one vector, and all gradients views of another. They must therefore be changed in
-    place.
+    All parameters become views of one vector, and all gradients views of another. Parameters and gradients must
+    therefore be changed in place.
 
     parameters: parameters to optimise
     lr: step size

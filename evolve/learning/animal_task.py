@@ -27,11 +27,11 @@ def animal_task(
     """Return the run's task with this animal in it, for arrays of worlds.
 
     mode: "training", "evaluation" or "test", which may have different layouts of worlds
-    eyes: eyes that replace the animal's own
+    eyes: eyes that replace the animal's own; None: the animal's own eyes
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
-        ValueError: the eyes that the task places differ from the animal's.
+        ValueError: the eyes cannot be placed in the user task; see `with_phenotype`.
     """
     if (code := config.choice.named_code) is not None:
         task = with_phenotype(executed_task(code, config.world.encoded_textures), phenotype, config, eyes)
@@ -64,10 +64,11 @@ def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes
     The eyes are rendered with the run's setting `eye.rays_per_receptor`. If this setting is "auto", the task's own
     fidelity is used, with the run's number of bands. A medium other than air replaces the task's own.
 
-    eyes: eyes that replace the animal's own
+    eyes: eyes that replace the animal's own; None: the animal's own eyes
 
     Raises:
-        ValueError: the eyes that the task places differ from the animal's.
+        ValueError: the task's `place` fails or returns another number of mounts, or the task has no mounts or several
+            kinds of eyes.
     """
     animal = with_evolved_eyes(task, eyes or phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
     rays, bands = config.eye.rays_per_receptor, config.eye.bands

@@ -39,7 +39,7 @@ class Checkpoint:
 
 
 def save_checkpoint(checkpoint: Checkpoint, path: Path, owner: Mapping[str, Any]) -> None:
-    """Write a checkpoint as safetensors, completely or not at all. Numbers are stored in its metadata.
+    """Write a checkpoint as safetensors, completely or not at all. Numbers are stored in the file's metadata.
 
     owner: the training run from which the checkpoint comes, see `TrainingRung.owners`
 

@@ -46,7 +46,7 @@ def metadata_of(content: bytes) -> dict[str, str]:
 
 
 def owned(owner: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, str]:
-    """Return the metadata of a checkpoint: its owner, `numbers`, and a placeholder that `sealed` replaces."""
+    """Return a checkpoint's metadata: its owner, `numbers`, and a placeholder for the checksum that `sealed` adds."""
     return {ENTRY: json.dumps({**numbers, "owner": owner, "sha256": BLANK})}
 
 
@@ -118,7 +118,10 @@ def _require_owner(found: Any, owner: Mapping[str, Any]) -> None:
 
 
 def _end(content: bytes) -> int:
-    """Return the position [bytes] at which a file's header ends; with a damaged length, it may lie beyond the file."""
+    """Return the position [bytes] at which a file's header ends.
+
+    If the length of the header is damaged, the position may lie beyond the end of the file.
+    """
     return LENGTH_BYTES + int.from_bytes(content[:LENGTH_BYTES], "little")
 
 

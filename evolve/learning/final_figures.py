@@ -28,14 +28,15 @@ def final_episodes(
     """Play evaluation episodes in the mode "test". The same arguments give the same episodes.
 
     A run with `world.layouts = "family"` has a set of layouts for this mode. In other runs with built-in tasks, the
-    episodes take place in the worlds of the evaluation, with other starts.
+    episodes take place in the worlds of the evaluation, but begin in other states than the evaluation's episodes.
 
     seed: seed of the episodes
     episodes: number of episodes; None: `evaluation.episodes`
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
-        ValueError: `episodes` is below 1, or `seed` is negative.
+        ValueError: `episodes` is below 1, `seed` is negative, or the eyes cannot be placed in the user task.
+        RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         TrainingDiverged: the policy's actions, or the returns, are not finite.
         UnfitPolicy: the policy was trained with different eyes.

@@ -1,4 +1,7 @@
-"""Training and evaluation of a candidate. Its fitness is its mean return in the evaluation episodes after training."""
+"""Training and evaluation of a candidate. Its task fitness is its mean return in the evaluation episodes.
+
+The search subtracts the costs of eyes and brain from the task fitness (`evolve.search.loop`).
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ def evaluate(
     progress: Progress | None = None,
     rung: TrainingRung | None = None,
 ) -> Evaluation:
-    """Train one candidate, write its policy, and measure its fitness.
+    """Train one candidate, write its policy, and measure its task fitness.
 
     On one machine, the same arguments give the same outcome, apart from the time. If learning diverges, a failed
     Evaluation is returned. Checkpoints that cannot be used are renamed, and have no effect on the outcome.
@@ -47,6 +50,8 @@ def evaluate(
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ValueError: the eyes cannot be placed in the user task.
+        RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: the policy or a checkpoint cannot be written.
     """

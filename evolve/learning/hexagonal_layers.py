@@ -40,7 +40,7 @@ class HexagonalLayers(nn.Module):
 
     directions: viewing directions, unit vectors (ommatidium, 3)
     channels: number of signals of an ommatidium
-    units: class of the units
+    units: class of the nonlinear units, such as nn.LeakyReLU
 
     The attribute `outputs` is the number of features.
     """
@@ -74,8 +74,8 @@ class HexagonalLayers(nn.Module):
 def neighbourhoods(directions: np.ndarray) -> np.ndarray:
     """Return the indices of the directions in each neighbourhood, (place, 7), with the centre first.
 
-    The six neighbours are in the order of their azimuths around the centre, from right through up to left. Every
-    direction is in at least one neighbourhood. If there are fewer than seven directions, all belong to a single
+    The six neighbours are in counter-clockwise order, as the animal sees them, beginning on the right. Every direction
+    is in at least one neighbourhood. If there are fewer than seven directions, all belong to a single
     neighbourhood.
 
     directions: unit vectors, (ommatidium, 3)

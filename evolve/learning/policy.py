@@ -219,7 +219,7 @@ def save_policy(policy: EyePolicy, path: Path | str) -> None:
 def load_policy(path: Path | str) -> EyePolicy:
     """Return the policy that a file contains; nothing in the file is executed.
 
-    Torch is set to one thread, as in learning: several threads would vary the order of sums, and thereby episodes.
+    Torch is set to one thread, as in learning: several threads would vary the order of sums, and thereby actions.
 
     Raises:
         ValueError: the file does not exist, or is not a policy; for example, it is a pickle or truncated.

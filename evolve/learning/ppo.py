@@ -78,7 +78,7 @@ class Episodes:
 
 
 class AdaptingPPO(PPO):
-    """PPO with normalised signals and rewards. It fails if the numbers of a rollout or an update are not finite.
+    """PPO with normalised signals and rewards. Training ends with an error if its numbers are not finite.
 
     Rewards are divided by their unit, which follows the spread of the discounted returns. At the start of training,
     agents often touch walls, and the costs of contact are about a hundred times larger than all later rewards. Without
@@ -165,10 +165,7 @@ class AdaptingPPO(PPO):
             parameter.div_(change)
 
     def checkpoint(self, curve: list[tuple[int, float]], best: dict[str, torch.Tensor]) -> Checkpoint:
-        """Return the state of training.
-
-        curve, best: learning curve so far, and tensors of the policy at the best evaluation
-        """
+        """Return the state of training, with the learning curve so far and the tensors at the best evaluation."""
         now = {name: tensor.detach().clone() for name, tensor in learnt(self.policy).items()}
         adam = self.policy.optimizer.state_dict()
         return Checkpoint(self.num_timesteps, tuple(curve), float(self.env.unit), now, best, adam)
@@ -233,6 +230,8 @@ def train(
     after `patience` evaluations without a better mean return, or after `total_steps`. The result is the policy at the
     evaluation with the highest mean return, or at the earliest of several.
 
+    seed: seed of initial weights, exploration and mini-batches, and of the evaluation worlds
+    progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
     begun: checkpoint from which to continue; its steps count towards `total_steps`
 
     Raises:
@@ -295,6 +294,6 @@ def batch_task_of(worlds: VecEnv) -> BatchTask:
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
-    """Return mean and standard deviation of each command before training; `learning.first_speed` sets the speed's."""
+    """Return (mean, standard deviation) of each command before training; `learning.first_speed` sets both for speed."""
     speed = (2 * config.first_speed - 1, config.first_speed)
     return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

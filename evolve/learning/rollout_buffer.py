@@ -1,9 +1,10 @@
-"""Rollout buffer for a learner with memory. Each frame is stored once, and encoded once per mini-batch.
+"""Rollout buffer for a learner with memory, which stores each frame once.
 
 The observations of an agent with memory are stacks of the last frames. The buffer of stable-baselines3 (SB3) stores
 these stacks, and thus `memory` copies of each frame, and PPO encodes every copy. For 64 worlds x 64 steps of 2 x 15 x
-15 receptors with 10 frames, this takes 221 MB. In this buffer, a mini-batch consists of segments. A segment is a
-sequence of consecutive steps of one world, whose stacks share most of their frames.
+15 receptors with 3 channels and 10 frames, this takes 221 MB. In this buffer, a mini-batch consists of segments. A
+segment is a sequence of consecutive steps of one world, whose stacks share most of their frames. Each frame of a
+segment is encoded once.
 """
 
 from __future__ import annotations

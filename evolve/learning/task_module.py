@@ -29,8 +29,9 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
 
     Raises:
         ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
-            requires arguments, its model cannot be compiled or cannot have the textures of an older run, or one of its
-            settings is invalid. The message is one line and names file and line of an error in the user's code.
+            requires arguments, its model cannot be compiled (for some models only if `encoded_textures` is False), or
+            one of its settings is invalid. The message is one line; it names file and line of an error in the user's
+            code.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)

@@ -15,7 +15,7 @@ __all__ = ["TrainingEnvs", "worlds_of"]
 
 @dataclass(frozen=True)
 class TrainingEnvs:
-    """Environments for training, selection and fitness, all with the same light.
+    """Environments of one animal for training, selection and fitness.
 
     training: environments in which the policy is trained
     selection: environments of the evaluations during training, which select the best policy
@@ -38,7 +38,7 @@ def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
-        ValueError: the eyes that the task places differ from the animal's.
+        ValueError: the eyes cannot be placed in the user task; see `evolve.learning.animal_task.with_phenotype`.
     """
     memory, settings, episodes = phenotype.memory_frames, config.learning, config.evaluation.episodes
     fine = PreparedTask(animal_task(phenotype, config))

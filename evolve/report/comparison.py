@@ -1,4 +1,4 @@
-"""Comparison of runs: their results, their cost, and the settings in which they differ."""
+"""Comparison of runs: their results, training steps and time, and the settings in which they differ."""
 
 from __future__ import annotations
 

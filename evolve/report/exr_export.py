@@ -39,7 +39,8 @@ def export_run(
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
-        ValueError: `every` is not a whole number from 1 to 1,000,000.
+        ValueError: `every` is not a whole number from 1 to 1,000,000, or `seed` is negative.
+        RuntimeError: a method of the user task fails at the start of the episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file cannot be read or written.
     """
@@ -52,10 +53,11 @@ def export_run(
 def export_episode(run: Run, episode: Episode, directory: Path, doing: Doing = in_silence) -> list[Path]:
     """Write one file for each time at which radiance was recorded, and return the paths.
 
-    A file has two parts for each eye: the spectral radiance in front of the eye (`left.spectral`) and the signals of
-    its receptors (`left.receptors`). Attributes identify the run (`evolve.store.versions.provenance`), the candidate
-    and the time, and state the pose of the eye. File names contain the candidate, the seed of the episode and the time,
-    so that exports of different episodes do not overwrite each other. A list of the files' checksums is also written.
+    A file has two parts for each eye: the spectral radiance in front of the eye (for the eye "left": `left.spectral`)
+    and the signals of its receptors (`left.receptors`). Attributes identify the run
+    (`evolve.store.versions.provenance`), the candidate and the time, and state the pose of the eye. File names contain
+    the candidate, the seed of the episode and the time, so that exports of different episodes do not overwrite each
+    other. A list of the files' checksums is also written.
 
     directory: folder of the files, which is created if it is missing; its parent must exist
 

@@ -19,10 +19,10 @@ SHOWN = 1e-3  # the image extends to this fraction of the maximum
 
 
 def white_acceptance(eye: sim.CompoundEye) -> tuple[np.ndarray, np.ndarray]:
-    """Return the acceptance function of the first ommatidium in white daylight, as a fraction of its maximum.
+    """Return angles off the axis, and the acceptance function of the first ommatidium in white daylight.
 
-    Return the angles of rows and columns off the axis [degrees], (n,), and the fractions (up, right), (n, n). Bands are
-    weighted by daylight and by the mean sensitivity of the eye's channels.
+    The angles [degrees], (n,), are those of rows and of columns. The values of the function, (up, right), (n, n), are
+    fractions of its maximum. Bands are weighted by daylight and by the mean sensitivity of the eye's channels.
     """
     bands, accepted = eye.spectral_bands, eye.acceptance(0)
     weights = bands.weights.mean(axis=0) * daylight(bands.wavelengths)

@@ -105,8 +105,9 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
     """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
 
     The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical acuity
-    unless receptors are square, and the number of positions of receptors. Quantities that do not vary between the
-    searches, or that a run lacks, are omitted. Means are over the last generations that all runs have completed.
+    unless `eye.vertical_fov` is "receptors", and the number of receptor positions in all eyes. Quantities that do not
+    vary between the searches, or that a run lacks, are omitted. Means are over the last generations that all runs have
+    completed.
 
     searches: number of searches
     done: function that is called with the completed fraction of the searches

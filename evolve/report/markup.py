@@ -197,7 +197,7 @@ def asset(name: str) -> str:
 def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
     """Return a complete, self-contained page, encoded as UTF-8.
 
-    The content security policy of the page forbids all other files, styles and scripts.
+    The content security policy of the page allows only its own styles and scripts, and images in data URIs.
 
     scripts: names of the files with scripts, in this module's folder
     """

@@ -158,7 +158,7 @@ def _frame(world: Image.Image, seen: np.ndarray, aspect: float) -> Image.Image:
 
 
 def _eye_height(eyes: int, columns: int, aspect: float) -> float:
-    """Return the largest height of an eye's image [pixels] if all images are arranged in a number of columns.
+    """Return the largest height of an eye's image [pixels] if all images are arranged in `columns` columns.
 
     aspect: width of an image divided by its height
     """

@@ -223,7 +223,7 @@ def _kept(episode: Episode) -> np.ndarray:
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
     """Return (frame, "goal" or "adversary") for each time at which an object was reached, in order of the frames.
 
-    frame: index in `kept` of the first time step from then on
+    frame: index in `kept` of the first time step at or after this time
     """
     found = [
         (int(np.searchsorted(kept, time)), name)

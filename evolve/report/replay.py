@@ -43,9 +43,10 @@ def write_replay(
         RunError: the candidate does not exist, or its policy is missing or damaged.
         ConfigError: the package `rerun` or ffmpeg is needed but not installed, `out` has the ending of an additional
             file, a format or the mode is unknown, `every` is given without "rrd", the run has no test set, or the user
-            task was not named when the run was opened, or fails.
+            task was not named when the run was opened, or its module cannot be executed.
         StrangeFileError: `out` is not a regular file, for example a directory.
-        ValueError: `every` is not a whole number from 1 to 1,000,000.
+        ValueError: `every` is not a whole number from 1 to 1,000,000, or `seed` is negative.
+        RuntimeError: a method of the user task fails at the start of the episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file cannot be read or written.
     """

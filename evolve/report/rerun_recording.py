@@ -6,7 +6,8 @@ recording has the following entities.
 `world` contains `bodies`, the animal's `path` and its `eyes`. Each eye is a camera with an image of its signals.
 
 `signals` contains the same signals as numbers, (channel, y, x). `perfect_lens` contains images of the signals of the
-same receptors behind a perfect lens. `scene` contains images of the scene in front of each eye, on a finer grid.
+same receptors behind a perfect lens, or, for compound eyes, of the signals without noise. `scene` contains images of
+the scene in front of each eye, on a finer grid.
 
 `action`, `reward` with its terms, and other entries of the observation, such as `contact` or `feels`, are numbers over
 time. `outcome` is the outcome of the episode.

@@ -49,7 +49,7 @@ class PreparedRun:
     """Checked settings of a run, which is ready to start. Nothing has been written yet.
 
     config: settings of the run
-    preset: name for the run directory: that of the preset, without the name of the task at its end
+    preset: part of the run directory's name: the name of the preset, without the name of the task at its end
     origin: "RUN:ID", the animal whose genes are the start values; None without such an animal
     """
 
@@ -86,8 +86,8 @@ class PreparedRun:
 def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
 
-    tried: True to build the search and to try the user task in this process. False if the run is only planned: other
-        processes then try the task and measure its pace
+    tried: True to build the search, draw random layouts and try the user task in this process. False if the run is
+        only planned: other processes then try the task and measure its pace
 
     Raises:
         ConfigError: a setting is invalid, the optimizer is unknown, random layouts cannot be drawn or two of them are

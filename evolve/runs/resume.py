@@ -1,6 +1,6 @@
 """Preparation of an interrupted run, after it has been opened and before the next candidate is trained.
 
-`evolve.runs.carry_on` then continues the run, and `evolve.search.loop` tells the optimizer the recorded candidates.
+`evolve.runs.carry_on` then continues the run, and `evolve.search.loop` reports the recorded fitness to the optimizer.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
 
 def _changes(run: Run) -> Iterator[str]:
-    """Yield a note if the software has changed since the first start of the run, which may change its numbers."""
+    """Yield a note if the software has changed since the first start of the run. Numbers may then differ."""
     then, now = recorded(run.path), present()
     changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
     if changed:

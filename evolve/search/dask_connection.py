@@ -31,7 +31,7 @@ class ConnectionLost(Exception):
 
 @dataclass
 class Connection:
-    """Connection to a scheduler, from which a list of the living workers is requested regularly.
+    """Connection to a scheduler, from which a list of the connected workers is requested regularly.
 
     scheduler: the scheduler
     patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]
@@ -101,6 +101,7 @@ class Connection:
     def ask(self, call: Callable[[], Awaitable[Any]], timeout: float = math.inf) -> Any:
         """Return the result of a call of Dask. Exceptions of the call are passed on.
 
+        call: function that returns an awaitable, which is awaited in the thread of Dask's client
         timeout: maximum duration of the call [s]; by default, it is unlimited while there are signs of life
 
         Raises:
@@ -127,7 +128,7 @@ class Connection:
             answer.cancel()
 
     def remove_lost_workers(self) -> None:
-        """Remove workers that have been silent for `patience_s` from the scheduler, which reassigns their candidates.
+        """Make the scheduler remove workers that were silent for `patience_s`; others receive their candidates.
 
         Raises:
             ConnectionLost: the connection was lost.

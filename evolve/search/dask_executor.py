@@ -118,7 +118,7 @@ class DaskExecutor:
             self._withdraw(under_way)
 
     def _round(self, waiting: deque[Job], under_way: dict[Any, _Trial]) -> Iterator[tuple[Job, Evaluation]]:
-        """Submit all waiting jobs, and yield the jobs that are complete."""
+        """Submit all waiting jobs, and yield each complete job with its outcome."""
         while waiting:
             trial = self._trial(waiting[0])
             under_way[self._submit(trial)] = trial

@@ -166,7 +166,7 @@ def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> 
 
 
 def last_generations(config: RunConfig, generations: int) -> list[range]:
-    """Return the last LAST generations of each phase, or all generations of a shorter phase.
+    """Return the final LAST generations of each phase, or all generations of a shorter phase.
 
     A phase consists of the generations between two changes of the set of genes that vary.
 
@@ -181,7 +181,8 @@ def p_value(values: Sequence[float], ends: Floats) -> float:
 
     The value of a single run counts as an additional sample of the null model (Davison and Hinkley 1997, §4.2).
     Therefore, p is at least 2 / (searches + 1). For several runs, their mean is compared with the means of random
-    groups of searches. The number of searches in a group is the number of runs. The lower limit of p is the same.
+    groups of searches. The number of searches in a group is the number of runs. Here, too, p is at least
+    2 / (searches + 1).
 
     values: final value of a quantity in each run
     ends: final values of the quantity in the searches, from `NullModel.ends`, (search,)

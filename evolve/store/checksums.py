@@ -44,7 +44,7 @@ def list_checksums(folder: Path, files: Iterable[Path]) -> None:
 
 
 def harmed(folder: Path) -> str | None:
-    """Return a message about EXR files in a folder whose content differs from their checksums; None if there are none.
+    """Return a message about the EXR files in a folder that do not match their checksums; None if all match.
 
     Deleted files are not reported, because they can be exported again. If a file or the list cannot be read, or if the
     files are larger than MOST_BYTES together, the message says so instead.

@@ -193,7 +193,7 @@ class Run:
         return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
-        """Remove the checkpoints of candidates whose training will not continue; OSError if that is impossible."""
+        """Remove the checkpoints of candidates whose training will not continue; OSError if one cannot be removed."""
         for candidate_id in candidate_ids:
             for path in (self.path / TRAININGS).glob(f"{candidate_id:06d}-*.safetensors"):
                 path.unlink(missing_ok=True)
@@ -269,8 +269,8 @@ class Run:
 def _require_no_run(path: Path) -> None:
     """Check that a run can be created in a directory.
 
-    It must be empty, or contain only files of a process that was killed while it created a run. Such a directory has no
-    config.toml, which is written last.
+    The directory must be empty, or contain only files of a process that was killed while it created a run. It then has
+    no config.toml, which is written last.
     """
     begun = {RunLock.NAME, VERSIONS, CANDIDATES, POLICIES}
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(UNFINISHED)}

@@ -21,7 +21,8 @@ def copy_shipped_run(directory: Path) -> Run:
     """Add the missing files of the shipped run to a directory, and return the run in this directory.
 
     Raises:
-        RunError: the directory contains a file of the run with another content, or only other files.
+        RunError: the directory contains a file of the run with another content, or it contains files, but none of the
+            run's.
         OSError: the directory cannot be written.
     """
     files = dict(_files(resources.files("evolve") / FOLDER))

@@ -1,6 +1,7 @@
-"""Eyes with one lens, of vertebrates and a spider. Each function returns the patch of the retina with the best acuity.
+"""Eyes with one lens, of vertebrates and a spider, as a patch of the retina. `goldfish_lens` returns a lens alone.
 
-The receptors of an `optics.Eye` form a square lattice. Its pitch gives the acuity of the animal's hexagonal lattice.
+The receptors of an `optics.Eye` form a square lattice. Its pitch is chosen so that the finest grating that it resolves
+is the finest grating that the animal's retina resolves.
 """
 
 from __future__ import annotations
@@ -95,9 +96,10 @@ def eagle(receptors_across: int = 60) -> Eye:
 def goldfish_lens(radius: float = 1.4e-3) -> BallLens:
     """Return a ball lens of a fish in water, with Matthiessen's ratio f = 2.5 R at 550 nm.
 
-    The profile is the generalised Luneburg lens. The surface has the index of water. At the core, the lens' proteins
-    add (n_core - n_water)(0.940 + 20,000 nm²/λ²) to the index, the dispersion of serum albumin (Perlmann & Longsworth,
-    J. Am. Chem. Soc. 70, 2719, 1948), scaled to 550 nm. The radius of 1.4 mm is a typical value.
+    The profile is that of the generalised Luneburg lens. The surface has the index of water. The proteins at the core
+    add n_core - n_water to the index at 550 nm. At other wavelengths, this contribution is proportional to 0.940 +
+    20,000 nm²/λ², the dispersion of serum albumin (Perlmann & Longsworth, J. Am. Chem. Soc. 70, 2719, 1948). The radius
+    of 1.4 mm is a typical value.
 
     radius: radius [m] of the lens.
 
@@ -118,8 +120,8 @@ def goldfish(receptors_across: int = 40, radius: float = 1.4e-3) -> Eye:
     """Return a patch of a goldfish's retina behind a ball lens, with an acuity of 60/26 = 2.3 cycles/degree.
 
     Source: Northmore & Dvorak, Vision Research 19, 255, 1979: 13 minutes of arc per half period, in agreement with the
-    separation of cones. The retina is concentric with the lens, so the patch represents any direction. The pupil is
-    0.9 of the lens' width. See `goldfish_lens`.
+    separation of cones. The retina is concentric with the lens, so the patch represents any direction. The pupil has
+    0.9 times the diameter of the lens. See `goldfish_lens`.
 
     receptors_across: receptors along each side of the patch, 1 to 1000.
     radius: radius [m] of the lens.

@@ -37,7 +37,7 @@ class Facet:
     """Measurements of an ommatidium.
 
     diameter: diameter D [m] of the facet.
-    focal_length: focal length f [m] in front of the lens.
+    focal_length: focal length f [m] in front of the lens, in air.
     rhabdom: diameter d [m] of the rhabdom's tip.
     length: length l [m] of the rhabdom.
     proximal: diameter [m] of the rhabdom's far end, if it tapers.
@@ -76,9 +76,9 @@ HONEYBEES = {
 def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
     """Return an eye of a worker honeybee, for the receptors "honeybee".
 
-    Source: Somanathan et al. 2009 (see HONEYBEES). The diameters of rhabdoms follow from the article's Δρ = d/f. The
-    mean interommatidial angle of 2.1° is an estimate for all four species. It assumes that the 5432 facets of *Apis
-    mellifera* cover a hemisphere.
+    Source: Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1. The diameters d of
+    rhabdoms follow from the article's Δρ = d/f. The mean interommatidial angle of 2.1° is an estimate for all four
+    species. It assumes that the 5432 facets of *Apis mellifera* cover a hemisphere.
 
     species: "mellifera", "cerana", "florea" or "dorsata".
     rings: rings of ommatidia around the central one.
@@ -155,9 +155,10 @@ def megalopta(rings: int = 10) -> AppositionEye:
 def cirolana() -> Eye:
     """Return one ommatidium of the marine isopod *Cirolana borealis*, with an acceptance angle of 45°.
 
-    Source: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981: D = 150 µm, Δρ = 45°. Its rhabdom has too many modes
-    to be modelled as a waveguide, and the focus lies below its tip. The eye is therefore a lens in front of a single
-    square receptor of 45°. No source has been read for the focal length of 100 µm, on which the angle does not depend.
+    Source: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981: D = 150 µm, Δρ = 45°. The rhabdom has too many modes
+    to be modelled as a waveguide, and the focus of the lens lies below the rhabdom's tip. The eye is therefore modelled
+    as a lens in front of a single square receptor of 45°. No source has been read for the focal length of 100 µm, which
+    does not affect the acceptance angle.
     """
     focal = 100e-6
     pupil = Pupil(75e-6, thin_lens_focal_length=focal, medium_n=CRUSTACEAN_N)

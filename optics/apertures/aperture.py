@@ -73,7 +73,7 @@ class SoftAperture(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Quadrature nodes x, y and weights over an aperture: flat float64 arrays for Dr.Jit, in units of R and R²."""
+    """Quadrature nodes over an aperture: positions x, y [R] and weights [R²], as flat float64 arrays for Dr.Jit."""
 
     x: np.ndarray
     y: np.ndarray
@@ -150,8 +150,9 @@ class Aperture(ABC):
     def soften(self, passband: float, ripple: float, widest_reach: float = EDGE_REACH) -> SoftAperture:
         """Return the aperture after a low-pass filter.
 
-        The filter leaves frequencies up to `passband` [cycles per R] unchanged. It has the transition width that needs
-        the fewest samples.
+        The filter leaves frequencies up to `passband` [cycles per R] unchanged, to within `ripple`. The soft edge
+        extends at most `widest_reach` [R] beyond the aperture. Within this limit, the filter has the transition width
+        that needs the fewest samples.
 
         Raises:
             ValueError: passband is outside [0, 1e90], ripple is outside [1e-13, 0.5], or widest_reach is not positive.
@@ -162,7 +163,10 @@ class Aperture(ABC):
         return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))
 
     def with_edge(self, passband: float, stopband: float, ripple: float) -> SoftAperture:
-        """Return the aperture after a low-pass filter that ends at `stopband` [cycles per R]; see `soften`."""
+        """Return the aperture after a low-pass filter that falls from `passband` to `stopband` [cycles per R].
+
+        `SoftAperture` describes both frequencies and the ripple. `soften` chooses the stopband itself.
+        """
         return _with_edge(self, SoftEdge(passband, stopband, ripple))
 
     @abstractmethod

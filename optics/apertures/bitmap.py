@@ -26,7 +26,8 @@ class Bitmap(ReadOnlyArrays):
     The pixels fill the square [-1, 1]² in units of R, and their edges are exact. `union` closes all parts outside the
     pupil's circle.
 
-    image: (n, n), (y, x), 1 (or True) for open parts, 0 (or False) for closed ones; rows grow with y.
+    image: array (y, x) of n x n pixels, 1 or True where the shape is open, 0 or False where it is closed. y ascends
+        with the row.
 
     Raises:
         ValueError: image is not square, has more than 512 pixels along a side or more than 4,000 edges, or contains a
@@ -64,7 +65,10 @@ class Bitmap(ReadOnlyArrays):
 
 
 def _runs(image: np.ndarray) -> np.ndarray:
-    """Return the edges between rows as segments (n, 2, 2), each with two ends (x, y). Adjoining edges are merged."""
+    """Return the edges between open and closed pixels of successive rows as segments (n, 2, 2), with two ends (x, y).
+
+    Adjoining edges are merged.
+    """
     n = len(image)
     # Between rows, (n + 1, n): 1 if only the row at larger y is open, -1 if only the other one is.
     changes = np.diff(np.pad(image, ((1, 1), (0, 0))).astype(int), axis=0)

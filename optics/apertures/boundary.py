@@ -74,7 +74,11 @@ class Boundary:
 def boundary(pieces: Outline, contains: Contains) -> Boundary:
     """Return the boundary of the region that `contains` describes.
 
-    pieces: edges of all shapes. The boundary consists of parts of them.
+    pieces: edges of all shapes. The boundary consists of parts of these edges.
+    contains: function that returns a mask of the points (x, y) in the region.
+
+    Raises:
+        ValueError: two edges almost coincide, so that the boundary cannot be computed.
     """
     points = _meeting_points(pieces)
     segments, arcs = _cut_segments(pieces, points), _cut_arcs(pieces, points)
@@ -160,7 +164,9 @@ def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
 
 
 def _near_segment(by_axis: list[np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) near a segment: those within the smaller of its two ranges, of x or of y.
+    """Return the points (n, 2) that may lie on a segment.
+
+    Only one coordinate is compared with the segment: the one along which the segment is shorter.
 
     by_axis: all points sorted by x, and all points sorted by y.
     """
@@ -202,7 +208,10 @@ def _meeting_points(pieces: Outline) -> np.ndarray:
 
 
 def _of_lines(start: np.ndarray, along: np.ndarray, starts: np.ndarray, alongs: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) at which a segment intersects others; each has a start and the vector to its end."""
+    """Return the points (n, 2) at which a segment intersects others.
+
+    Each segment is given by its start and the vector from there to its end.
+    """
     gap = starts - start
     determinant = along[0] * alongs[:, 1] - along[1] * alongs[:, 0]
     crossing = np.abs(determinant) > PARALLEL * np.hypot(*along) * np.hypot(*alongs.T)

@@ -133,8 +133,9 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
     """Return the transmittance of a soft disk at distances ρ from its axis, by quadrature. It is an even function of ρ.
 
     A(ρ) = ∫ g(r) r θ(ρ, r) dr, where g is the kernel and R the radius of the disk. θ = 2 arccos((ρ² + r² - R²)/(2ρr))
-    is the angle over which a circle of radius r about the point lies inside the disk. The arccos varies for r from
-    lower to lower + span. The substitution r = lower + span sin²(πu/2) makes it smooth at both ends.
+    is the angle over which a circle of radius r about the point at ρ lies inside the disk. It varies only for r from
+    |ρ - R| to ρ + R, and like a square root near both ends. The substitution r = |ρ - R| + span sin²(πu/2) makes the
+    integrand smooth.
     """
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
@@ -166,7 +167,7 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
 
 @lru_cache(maxsize=256)
 def _ring_rule(inner: float, outer: float, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the radii of the rings, their weights, and the number of nodes on each ring."""
+    """Return the radii of the circles of nodes, their weights, and the number of nodes on each circle."""
     digits += 0.3  # log10 2: each of the two rules, in radius and in angle, may contribute half the error
     span = outer - inner
     u, weight = gauss_legendre(gauss_legendre_count(cycles * span, digits))

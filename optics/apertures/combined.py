@@ -41,8 +41,8 @@ class Combined(Aperture):
         all others are subtracted from the first.
 
     Raises:
-        ValueError: the rule is unknown, an argument is not a shape, there are too few shapes, the open area is below
-            1e-9 R², or edges almost coincide.
+        ValueError: the rule is unknown, an argument is not a shape, there is no shape (or only one, for a difference),
+            the open area is below 1e-9 R², or edges almost coincide.
     """
 
     rule: str

@@ -26,12 +26,13 @@ BESSEL_STEP = 0.02  # choice: step of the table of J₀
 
 
 def curved_ring(edge: SoftEdge, inner: float, curvature: float, levels: int) -> np.ndarray:
-    """Return a smoothed wave behind a ring, relative to the wave itself, at even steps of r², (levels,), complex.
+    """Return a smoothed wave behind a ring, divided by the wave itself, at `levels` values of r², (levels,), complex.
 
-    The wave e^{iπ c r²} passes the opening between the radii `inner` and 1. Its convolution with the kernel, divided by
-    the wave, is 1 where the kernel changes nothing. Levels are in the middle of the steps from 0 to (1 + reach)².
+    The wave e^{iπ c r²} passes the opening between the radii `inner` and 1, and is convolved with the kernel of the
+    soft edge. The result is 1 where the kernel changes nothing. The values of r² lie in the middle of equal steps from
+    0 to (1 + reach)².
 
-    curvature: c, the cycles per radius at the rim.
+    curvature: c, the local frequency of the wave at the rim in cycles per radius.
     """
     most, outermost, bend = SPARE * edge.stopband, 1 + edge.reach, abs(curvature) / 2
     k, by_k = _rule(0.0, most, most * (1 + outermost))
@@ -49,14 +50,14 @@ def curved_ring(edge: SoftEdge, inner: float, curvature: float, levels: int) -> 
 
 
 def _rule(first: float, last: float, cycles: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes and weights between two radii or frequencies."""
+    """Return nodes and weights between two radii or frequencies for functions with `cycles` cycles between them."""
     at, weight = gauss_legendre(gauss_legendre_count(stepped_up(cycles), DIGITS))
     return first + (last - first) * at, (last - first) * weight
 
 
 @lru_cache(maxsize=16)
 def _weights(levels: int, count: int) -> np.ndarray:
-    """Return interpolation weights of Chebyshev points in the middle of even steps, (level, point)."""
+    """Return the weights (level, point) that interpolate from Chebyshev points to the middle of equal steps."""
     return chebyshev_basis((2 * np.arange(levels) + 1) / levels - 1, count).astype(np.float32)
 
 
@@ -71,6 +72,6 @@ def _bessel_j0(r: np.ndarray, k: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _bessel_table(size: float) -> np.ndarray:
-    """Return J₀ at the multiples of BESSEL_STEP."""
+    """Return J₀ at the first `size` multiples of BESSEL_STEP, from 0 on."""
     parts = np.array_split(BESSEL_STEP * np.arange(int(size)), max(1, int(size) // 1024))
     return np.concatenate([bessel_j(0, part) for part in parts])

@@ -140,15 +140,15 @@ class Outline(ReadOnlyArrays):
 
     @cached_property
     def tangent(self) -> np.ndarray:
-        """Heights of the tops and bottoms of circles, if they lie on or near the arcs.
+        """Heights of the tops and bottoms of the circles to which the arcs belong, even if an arc ends before them.
 
-        Near such a height the position of a crossing changes like a square root.
+        Near such a height, the position of a crossing changes like a square root.
         """
         _, cy, radius, _, _ = self.arcs.T
         return read_only(np.unique(np.concatenate([cy - radius, cy + radius])))
 
     def near(self, x: np.ndarray, y: np.ndarray, half: float) -> np.ndarray:
-        """Return a mask of the squares that the edge may cut. They have the half side `half` and the centres (x, y).
+        """Return a mask of the squares that the edge may cut. The squares have the half side `half` and centres (x, y).
 
         The mask contains all squares that the edge cuts, and few others.
         """

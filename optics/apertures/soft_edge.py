@@ -38,7 +38,8 @@ class SoftEdge:
 
         Let t be the width of the transition, h_x and h_y the half widths, s = h_x + h_y, and b = β/π = reach · t. The
         number of samples is proportional to (h_x + b/t) (h_y + b/t) (2 passband + t)². It is smallest at the only
-        positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband.
+        positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband. If the reach b/t would exceed
+        `widest_reach` at this root, t is b/widest_reach instead.
         """
         b = _beta(ripple) / pi
         (h_x, h_y), s = half_widths, sum(half_widths)

@@ -2,7 +2,8 @@
 
 The method extends `soft_polygon` to arcs; G and H are defined there. Each piece of the edge contributes ∫ G(r) dθ to
 the transmittance, where θ is the angle that the piece subtends at the point. For an arc of radius R, let d be the
-distance of its centre from the point and t the angle along the arc. Within the kernel's reach, the integrand is
+distance of its centre from the point, and t the angle about the centre between the point and a position on the arc.
+Within the kernel's reach, the integrand is
 
     H(r) (R - d cos t) R dt.
 

@@ -30,8 +30,8 @@ def strips(
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield x, y and weights of the nodes in each panel of the enclosed part of a box (left, right, bottom, top).
 
-    The nodes suit integrands that are a wave of `cycles` cycles per unit of length, times a polynomial of this degree
-    in x and in y.
+    The nodes suit integrands that are a wave of `cycles` cycles per unit of length, times a polynomial of the given
+    degree in x and in y. `Aperture.nodes` explains the digits.
     """
     left, right, bottom, top = box
     within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])
@@ -79,8 +79,8 @@ def _panel(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return heights and weights of the nodes between two ends, for a wave of `cycles` cycles between them.
 
-    At a circle's top or bottom, the length of the chord changes like a square root. The substitution of sin² for y
-    makes it smooth.
+    At a circle's top or bottom, the length of the chord changes like a square root of the height. A substitution with
+    sin² makes it smooth.
     """
     span = high - low
     touching = any(abs(end - at) < ROUNDING for at in tangent for end in (low, high))

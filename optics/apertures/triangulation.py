@@ -17,7 +17,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
-    """Return the first two edges that intersect elsewhere than at a shared end, or None for a simple polygon."""
+    """Return the indices of the first two edges that intersect elsewhere than at a shared end; None if none do."""
     n = len(vertices)
     along = np.roll(vertices, -1, axis=0) - vertices
     following = np.roll(along, -1, axis=0)
@@ -84,7 +84,10 @@ def triangles(vertices: np.ndarray) -> np.ndarray:
 
 
 def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bool:
-    """Return whether the corner a, b, c turns left and its triangle contains none of the other remaining corners."""
+    """Return whether the corner a, b, c turns left and its triangle contains no other corner.
+
+    left: indices of the corners of the remaining polygon.
+    """
     corner = vertices[[a, b, c]]
     if _cross(corner[1] - corner[0], corner[2] - corner[1]) < 0:
         return False

@@ -34,7 +34,7 @@ def parabola(u: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class BallLens:
-    """A sphere with the index n(r, λ) = n_surface(λ) + (n_core(λ) - n_surface(λ)) shape(r/R), in one medium.
+    """A sphere with the index n(r, λ) = n_surface(λ) + (n_core(λ) - n_surface(λ)) shape(r/R), in a uniform medium.
 
     All directions are equivalent. On a retina that is concentric with the lens, every receptor therefore has the same
     PSF, apart from the aperture's foreshortening.
@@ -107,7 +107,8 @@ class BallLens:
     def turning(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
         """Return the angle ψ [rad] about the centre between a ray's entry and its exit.
 
-        height: distance [m] at which the ray would pass the centre without the lens, below R and above 0.
+        height: distance [m] at which the ray would pass the centre without the lens, above 0 and below R, an array of
+            any shape. The result has the same shape.
 
         Raises:
             ValueError: a height is not between 0 and R, both excluded, the wavelength is invalid, or a ray is totally
@@ -146,7 +147,7 @@ class BallLens:
         It is a closed-form expression with one integral, which is computed numerically.
 
         Raises:
-            ValueError: the lens does not focus.
+            ValueError: the lens does not focus, or the wavelength is invalid.
         """
         power = _profile(self, wavelength).power()
         if not power > 0:
@@ -164,8 +165,8 @@ class BallLens:
         wavelength: vacuum wavelength [m]. The focal length and `medium_n` of the pupil are those for this wavelength.
 
         Raises:
-            ValueError: the aperture is as large as the lens, the lens does not focus, or the sine of a ray's angle
-                behind the lens exceeds 0.95.
+            ValueError: aperture_radius is not between 0 and R, both excluded, the wavelength is invalid, the lens does
+                not focus, or the sine of a ray's angle behind the lens exceeds 0.95.
         """
         focal, widest = self.focal_length(wavelength), float(self._relative(aperture_radius))
         at, weights = gauss_legendre(RINGS)

@@ -43,7 +43,7 @@ class Beam:
         return self.pupil.index_behind(self.wavelength)
 
     def waves(self, x: Array, y: Array) -> Array:
-        """Return the optical path at points (x, y) [m], in wavelengths. For the arrays, see `Relief.height`."""
+        """Return the optical path at points (x, y) [m], in vacuum wavelengths. For the arrays, see `Relief.height`."""
         return self.pupil.path(x, y, self.wavelength, self.source) * like(x, 1 / self.wavelength)
 
     def behind(self, soft: SoftAperture, grid: Grid, types: Precision) -> Field:

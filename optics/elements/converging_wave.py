@@ -35,9 +35,9 @@ class ConvergingWave:
     on_plane: rim [m] of the pupil on its plane, which lies `distance` in front of the image.
     distance: radius of the sphere [m].
     wavelength: vacuum wavelength [m].
-    position: the point (x, y) [m] on the image plane; None if the object does not contain it.
-    height: position [m] of the image plane relative to the origin, along the light and perpendicular to the plane; None
-        if the object does not contain it.
+    position: the point (x, y) [m] on the image plane; None if the other program's object does not contain it.
+    height: distance [m] from the origin of the object's coordinates to the image plane, perpendicular to the plane and
+        positive in the direction of the light; None if the object does not contain it.
     """
 
     sines: np.ndarray
@@ -60,6 +60,7 @@ class ConvergingWave:
         """Return the wave relative to a sphere around another point.
 
         shift: distance [m] by which the image plane is moved along the light.
+        medium_n: refractive index behind the pupil.
         position: the point (x, y) [m] on the image plane. None: the point on the ray through the pupil's centre.
 
         Raises:
@@ -101,8 +102,13 @@ def is_of_samples(system: Any) -> bool:
 def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave:
     """Return the wave of an object with pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves].
 
+    wavelength: vacuum wavelength [m].
     image_normal: normal of the image plane in the object's coordinates. None: the z axis. The x axis of the image plane
         is the projection of the object's x axis.
+
+    Raises:
+        ValueError: a number of the object or the normal is invalid, no ray has light, or the pupil is obscured or not
+            convex.
     """
     normal = _unit(ON_Z if image_normal is None else image_normal)
     x, y, z, opd, intensity = _alike(system)
@@ -166,7 +172,11 @@ def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWav
 
 
 def _alike(system: Any) -> list[np.ndarray]:
-    """Return pupil_x, pupil_y, pupil_z, opd and intensity (1 if missing) of all rays, one flat array each."""
+    """Return pupil_x, pupil_y, pupil_z, opd and intensity (1 if missing) of all rays, one flat array each.
+
+    Raises:
+        ValueError: the attributes have different lengths, or contain something other than real numbers.
+    """
     found = {name: _flat(name, getattr(system, name)) for name in ("pupil_x", "pupil_y", "pupil_z", "opd")}
     rays = len(found["pupil_x"])
     found["intensity"] = _flat("intensity", getattr(system, "intensity", np.ones(rays)))
@@ -177,7 +187,7 @@ def _alike(system: Any) -> list[np.ndarray]:
 
 
 def _centre(places: np.ndarray, radius: float) -> np.ndarray:
-    """Return the centre of the sphere through the points (3, n)."""
+    """Return the centre of the sphere through the points (3, n); ValueError if its radius is not about `radius`."""
     matrix = np.concatenate([2 * places, np.ones((1, places.shape[1]))]).T
     found = np.linalg.lstsq(matrix, np.sum(places**2, axis=0), rcond=None)[0][:3]
     if not np.isclose(np.linalg.norm(places - found[:, None], axis=0).mean(), radius, rtol=0.05):
@@ -186,7 +196,7 @@ def _centre(places: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
-    """Return the phase [rad], unwrapped first along the brightest column and then along every row."""
+    """Return the phase [rad], unwrapped along the column with the most illuminated samples, then along every row."""
     phase, middle = np.where(lit, np.angle(data), 0.0), int(lit.sum(axis=0).argmax())
     phase[:, middle] = np.unwrap(phase[:, middle])
     right, left = np.unwrap(phase[:, middle:], axis=1), np.unwrap(phase[:, middle::-1], axis=1)[:, ::-1]
@@ -194,7 +204,7 @@ def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
 
 
 def _flat(name: str, values: Any) -> np.ndarray:
-    """Convert a NumPy array, or a tensor that can become one, to a flat float64 array."""
+    """Convert an array of NumPy, or a tensor, to a flat float64 array; ValueError unless it contains real numbers."""
     values = full_precision(name, values)
     plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
     try:
@@ -204,7 +214,7 @@ def _flat(name: str, values: Any) -> np.ndarray:
 
 
 def _one(name: str, value: Any) -> float:
-    """Return a number, or the first number of an array, in the other program's unit."""
+    """Return a number, or the first of an array, in the other program's unit; ValueError if it is 0 or not finite."""
     found = _flat(name, value)
     if value is None or found.size == 0 or not abs(found[0]) > 0 or not np.isfinite(found[0]):
         raise ValueError(f"{name} = {shown(value)}: must be a finite number that is not 0")

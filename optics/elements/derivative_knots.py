@@ -89,7 +89,7 @@ def carries_derivatives(beam: Beam) -> bool:
 
 
 def _maps(pupil: Pupil, wavelength: float) -> Iterator[tuple[str, tuple[tuple[int, int], np.ndarray]]]:
-    """Yield the names, shapes and knots, in units of the pupil's radius, of the maps with requested derivatives."""
+    """Yield names, shapes and knots, in units of the pupil's radius, of the maps whose derivatives are requested."""
     relief, wavefront, mask = pupil.height, pupil.wavefront, pupil.mask
     bent = isinstance(relief, HeightMap) and pupil.bends(wavelength)
     if bent and (carries_derivative(relief.samples) or _index_carries(pupil)):

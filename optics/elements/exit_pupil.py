@@ -98,7 +98,8 @@ class ExitPupil:
         along the plane, which `optics.psf` at another sensor distance would ignore.
 
         origin: point (x, y) [m] of the image plane that becomes the origin of the PSF. Exit pupils of several
-            wavelengths with a common origin include lateral colour. None: the ray through the pupil's centre.
+            wavelengths with a common origin include lateral colour. None: the point that the ray through the pupil's
+            centre hits.
 
         Raises:
             ValueError: an argument is not finite, the shift is longer than half the distance to the pupil, or an origin
@@ -157,7 +158,11 @@ def read_exit_pupil(
 
 
 def _fitted(wave: ConvergingWave, medium_n: float | Dispersion, order: int) -> ExitPupil:
-    """Return the exit pupil with Zernike modes fitted to the samples of a wave."""
+    """Return the exit pupil with Zernike modes fitted to the samples of a wave.
+
+    Raises:
+        ValueError: there are too few samples for the modes, or hardly any in the middle of the pupil.
+    """
     modes = [(n, m) for n in range(order + 1) for m in range(-n, n + 1, 2)]
     if wave.ahead.size < RAYS_PER_MODE * len(modes):
         raise ValueError(f"{wave.ahead.size} samples of the wavefront: must be {RAYS_PER_MODE * len(modes)} or more")

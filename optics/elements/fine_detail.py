@@ -38,8 +38,8 @@ def power_beyond(samples: np.ndarray) -> np.ndarray:
     Entry k contains all components whose frequency along x or along y is at least k/4 cycles per half a side.
 
     The best-fitting bicubic polynomial is subtracted first, because a polynomial bends light and does not scatter it.
-    The cosine transform continues the samples evenly, without jumps at their ends. The ends therefore add no high
-    frequencies.
+    The cosine transform continues the samples by their mirror images, without jumps. The ends of the samples therefore
+    add no high frequencies.
     """
     from scipy.fft import dctn
 

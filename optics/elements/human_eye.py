@@ -173,11 +173,11 @@ def _not_negative(cycles_per_degree: Any) -> np.ndarray:
 
 
 def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
-    """Return the mean contrast of 200 healthy human eyes, at their best focus, over all orientations, in white light:
+    """Return the mean MTF of 200 healthy human eyes at their best focus in white light, averaged over orientations:
 
         M(u, d) = √D(u, d) (1 + (u/u₁)²)^(-0.62),   u₁ = 21.95 - 5.512 d + 0.3922 d²  [cycles per degree], d in mm
 
-    where D is the contrast of a perfect lens at 555 nm. Source: Watson, J. Vision 13(6):18, 2013, eq. 4 and 5, without
+    where D is the MTF of a perfect lens at 555 nm. Source: Watson, J. Vision 13(6):18, 2013, eq. 4 and 5, without
     stray light.
 
     cycles_per_degree: frequencies of 0 or more, an array of any shape. The result has the same shape.

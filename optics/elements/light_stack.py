@@ -108,7 +108,10 @@ class LightStack:
 
     @cached_property
     def _spheres(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Spherical waves: their indices (negative for waves that converge) and the distances of their centres [m]."""
+        """Spherical waves of the lenses and of the sources: index and distance [m] of the centre, (beam,) each.
+
+        The index of a wave that converges is negative.
+        """
         focal = [beam.pupil.thin_lens_focal_length for beam in self.beams]
         lenses = np.array([math.inf if f is None else number(f) for f in focal])
         before = self._indices[1]
@@ -122,7 +125,7 @@ class LightStack:
 
     @cached_property
     def _polynomials(self) -> tuple[np.ndarray, list[int]]:
-        """Coefficients of `powers_of` for each beam, and the beams whose reliefs or wavefronts are no polynomials."""
+        """Coefficients of `powers_of` for each beam, and the beams whose reliefs or wavefronts are not polynomials."""
         steps = self._indices[2].tolist()
         known = [powers_of(beam.pupil, beam.wavelength, step) for beam, step in zip(self.beams, steps, strict=True)]
         size = max([len(one) for one in known if one is not None], default=1)
@@ -134,7 +137,7 @@ class LightStack:
 
     @cached_property
     def mapped(self) -> np.ndarray:
-        """True for beams whose relief or wavefront is no polynomial and may have fine detail, (beam,)."""
+        """True for beams whose relief or wavefront is not a polynomial and may have fine detail, (beam,)."""
         return read_only(np.isin(np.arange(len(self.beams)), self._polynomials[1]))
 
     @cached_property

@@ -215,14 +215,14 @@ class Pupil:
         return self.height is not None and (is_differentiable(step) or step != 0)
 
     def rotationally_symmetric(self, wavelength: float) -> bool:
-        """Return whether the pupil is known to be invariant under rotation, also under all requested derivatives."""
+        """Return True if rotation is known to change neither the pupil nor its requested derivatives."""
         relief_is = not self.bends(wavelength) or self.height.rotationally_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
         mask_is = self.mask is None or self.mask.rotationally_symmetric
         return self.aperture.rotationally_symmetric and relief_is and wavefront_is and mask_is
 
     def mirror_symmetric(self, wavelength: float) -> bool:
-        """Return whether the pupil is invariant under mirroring of x and of y, also under all requested derivatives."""
+        """Return True if mirroring of x or y is known to change neither the pupil nor its requested derivatives."""
         relief_is = not self.bends(wavelength) or self.height.mirror_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
         mask_is = self.mask is None or self.mask.rotationally_symmetric
@@ -262,8 +262,8 @@ class Pupil:
     def scatter(self, wavelength: float, share: float) -> float:
         """Return the frequency [1/m] along x and y beyond which at most a fraction `share` of the light is scattered.
 
-        Jumps of a relief, masks and ripples scatter light away from geometrical rays. For ripples, the frequency is at
-        most that of the ripples plus the one that corresponds to their slopes (Carson's rule).
+        Jumps of a relief, masks and ripples scatter light away from geometrical rays. The result contains the frequency
+        of the ripples. Callers add the frequency that corresponds to the slopes of the rays (Carson's rule).
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))

@@ -77,9 +77,10 @@ def rim_around(lit: np.ndarray, dark: np.ndarray | None = None) -> Rim:
 
     Circle and oval are least-squares fits to all corners of the convex hull. On a grid with an even number of samples,
     a single sample can lie on the rim, so it must not determine the fit. If neither fits, the rim is the hull. If there
-    are dark samples, the hull is extended half way to them, and otherwise up to the circle or oval around all samples.
+    are also dark samples, each edge of the hull is moved outwards: half way to the nearest dark sample or, if none is
+    near, to the circle or oval around all samples.
 
-    dark: positions (2, m) of samples without light.
+    dark: positions (2, m) of samples without light. None: unknown.
 
     Raises:
         ValueError: the samples lie on a line, or the hull is needed and its samples are too far apart.
@@ -154,7 +155,10 @@ def _round(hull: Any) -> tuple[np.ndarray, float, np.ndarray | None, float]:
 
 
 def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Return centre, radius and relative residual of a fitted circle (Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976)."""
+    """Return the centre of a fitted circle, the radius that includes all corners, and the relative residual of the fit.
+
+    Source: Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976.
+    """
     matrix = np.concatenate([2 * corners, np.ones((len(corners), 1))], axis=1)
     middle: np.ndarray = np.linalg.lstsq(matrix, np.sum(corners**2, axis=1), rcond=None)[0][:2]
     r = np.linalg.norm(corners - middle, axis=1)

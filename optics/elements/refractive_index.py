@@ -185,10 +185,10 @@ def medium(name: str) -> Dispersion:
 
 
 def index_of(name: str, value: Any) -> Dispersion:
-    """Return the dispersion curve for a number or a curve; numbers lie in [1, 10] and carry no derivatives.
+    """Return the dispersion curve for a number or a curve, without derivatives.
 
     Raises:
-        ValueError: the index is neither a number nor a curve.
+        ValueError: the index is neither a number in [1, 10] nor a curve, or carries a derivative.
     """
     if isinstance(value, Dispersion):
         if value.is_differentiable:
@@ -205,7 +205,11 @@ def _constant(n: float) -> RefractiveIndex:
 
 
 def material(name: str, value: Any) -> Dispersion:
-    """Return the dispersion curve for a number or a curve; numbers may carry derivatives. Errors: see `index_of`."""
+    """Return the dispersion curve for a number or a curve, which may carry derivatives.
+
+    Raises:
+        ValueError: the index is neither a number in [1, 10] nor a curve.
+    """
     if isinstance(value, Dispersion):
         return value
     _refuse_name(name, value)

@@ -67,12 +67,12 @@ class Relief(ABC):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True if the height depends only on the distance from the axis, also under all requested derivatives."""
+        """True if the height and its requested derivatives depend only on the distance from the axis."""
         return False
 
     @property
     def mirror_symmetric(self) -> bool:
-        """True if the height is invariant under mirroring of x and of y, also under all requested derivatives."""
+        """True if mirroring of x or of y changes neither the height nor its requested derivatives."""
         return self.rotationally_symmetric
 
 
@@ -113,7 +113,7 @@ class BSplineRelief(Relief):
         With curvature = medium_n / ((n - object_n) f), it is the paraxial lens exp(-ik medium_n r²/2f).
 
         On uniform knots the polar form of x² has the control values X_i² - δ²/3, with the Greville abscissae X_i = (2i
-        - 3) a and the knot spacing δ = 2a.
+        - 3) a, the knot spacing δ = 2a and the radius a.
 
         Raises:
             ValueError: an argument is outside its valid range, which the message states.
@@ -167,7 +167,7 @@ class HeightMap(Relief):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: the array is not two-dimensional, empty, of half precision, or not all finite real numbers.
+        ValueError: the array has another number of axes, is empty, of half precision, or not of finite real numbers.
     """
 
     samples: np.ndarray | Array
@@ -219,7 +219,7 @@ class HeightMap(Relief):
         return band_of(self._heights, level)
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return `Relief.detail` of a central square with the half side `part`, in cycles per half side."""
+        """Return `Relief.detail` of a central square with the half side `part`, in cycles per length `part`."""
         return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
     @property

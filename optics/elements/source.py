@@ -20,8 +20,8 @@ class PointSource:
 
     distance: distance [m] in front of the pupil, along the axis. An infinite distance gives a plane wave, and ρ is then
         the path along its direction.
-    angle: (θx, θy) [rad], the direction in which the light travels at the pupil's centre. A thin lens focuses it near
-        f (tan θx, tan θy), with the off-axis aberrations of a single stigmatic lens.
+    angle: (θx, θy) [rad], the direction in which the light travels at the pupil's centre. A thin lens focuses
+        parallel light near f (tan θx, tan θy), with the off-axis aberrations of a single stigmatic lens.
 
     These numbers may carry derivatives.
 

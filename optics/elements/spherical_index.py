@@ -70,6 +70,9 @@ class SphericalIndex:
         """Return the optical path lengths of rays inside the sphere, in units of R times the medium's index.
 
         h: heights of the rays relative to R, an array of any shape. The result has the same shape.
+
+        Raises:
+            ValueError: see `turning`.
         """
         y, end, n, _, radial = self._along(h)
         return np.asarray(2 * end * ((n * n * y / radial) @ gauss_legendre(NODES)[1]))
@@ -84,7 +87,11 @@ class SphericalIndex:
         return float(2 - 2 / self.index(1.0) - 4 * bend @ weights)
 
     def _turning_point(self, h: np.ndarray) -> np.ndarray:
-        """Return (r/R)² at the turning points of rays of relative height h, where n r/R = h."""
+        """Return (r/R)² at the turning points of rays of relative height h, where n r/R = h.
+
+        Raises:
+            ValueError: the index just inside the surface is so low that a ray is totally reflected there.
+        """
         edge = float(self.index(1.0))
         if not (h < edge).all():
             raise ValueError(f"surface_n is {edge:.4g} of medium_n: must be larger, or rays at the rim are reflected")

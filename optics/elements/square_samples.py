@@ -22,7 +22,7 @@ def square_samples(samples: Any, name: str = "height", what: str = "heights [m]"
     name, what: name of the argument, and description of its values, for error messages.
 
     Raises:
-        ValueError: the array is not square, is empty, or contains a number that is not finite.
+        ValueError: the array is not square. See also `map_samples`.
     """
     heights = map_samples(samples, name, what)
     if heights.shape[0] != heights.shape[1]:

@@ -1,4 +1,4 @@
-"""Numbers of a pupil that are tensors of PyTorch and require a gradient."""
+"""Numbers of pupils and other objects that are tensors of PyTorch and require a gradient."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class Mask(ABC):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True if the mask depends only on the distance from the axis, also under all requested derivatives."""
+        """True if the mask and its requested derivatives depend only on the distance from the axis."""
         return False
 
     @property
@@ -80,11 +80,14 @@ class GaussianMask(Mask):
         return library(x).exp(-(x * x + y * y) / (waist * waist))
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return the frequency at which the mask's spectrum exp(-π²w²f²) has fallen to `level`."""
+        """Return the frequency [1/m] at which the mask's spectrum exp(-π²w²f²) falls to `level`; at least 1/(πw)."""
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """Return the frequency f at which exp(-2π²w²f²), the fraction of the light beyond f, has the given value."""
+        """Return the frequency f [1/m] beyond which the mask sends at most `light`, see `Mask.detail`.
+
+        The fraction exp(-2π²w²f²) of the transmitted light lies beyond f.
+        """
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)
         return math.sqrt(max(-math.log(light / beam), 0.0) / 2) / (math.pi * waist)

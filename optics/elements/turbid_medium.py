@@ -45,7 +45,7 @@ class BandMedium(ReadOnlyArrays):
     """A medium in the spectral bands of an eye.
 
     attenuation: coefficient c [1/m], (band,)
-    veil: radiance V of a path of infinite length, relative to a white surface in unit daylight, (band,)
+    veil: radiance V of a path of infinite length, in units of a white surface's radiance in daylight at 560 nm, (band,)
     """
 
     attenuation: np.ndarray
@@ -66,8 +66,8 @@ class TurbidMedium:
     """A uniform medium that fills a world.
 
     attenuation: beam attenuation coefficient c, the sum of absorption and scattering [1/m]
-    veil: radiance of the veiling light along a path of infinite length. It is relative to a white surface that faces
-        unit daylight, at each wavelength. It does not depend on direction or depth
+    veil: radiance of the veiling light along a path of infinite length. At each wavelength, it is relative to the
+        radiance of a white surface in daylight. It does not depend on direction or depth
     refractive_index: refractive index of the medium, such as `optics.medium("water")`; None: air
 
     Raises:
@@ -102,7 +102,7 @@ class TurbidMedium:
         return BandMedium(c, bands.band_values(_in_daylight(self.veil), receptors, nonnegative=True))
 
     def band_error(self, bands: int, receptors: Any) -> float:
-        """Return the largest error of a signal due to this number of bands, relative to a white surface in daylight.
+        """Return the largest error of a signal due to this number of bands, relative to that of white in daylight.
 
         The maximum is taken over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
         The reference is the integral over the spectrum in steps of 1 nm. Without attenuation the error is 0.

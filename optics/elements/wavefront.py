@@ -68,7 +68,7 @@ class Aberration(ABC):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True if the wavefront depends only on the distance from the axis, also under all requested derivatives."""
+        """True if the wavefront and its requested derivatives depend only on the distance from the axis."""
         return False
 
     def _check_radius(self) -> None:
@@ -135,9 +135,9 @@ class Zernike(Aberration):
 
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
 
-        Fringe polynomials are 1 at the rim, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ. Their coefficients are therefore
-        divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use them. A row that is a
-        Dr.Jit array is not accepted.
+        Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. Their
+        coefficients are therefore divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use
+        Fringe polynomials. A row that is a Dr.Jit array is not accepted.
 
         Raises:
             ValueError: a number is outside 1 to 36, or a coefficient is invalid, see `Zernike`.
@@ -276,7 +276,7 @@ def _check_mode(key: Any) -> None:
 
 
 def _of_vector(given: Any) -> dict[tuple[int, int], float]:
-    """Convert a vector, ordered by the index of OSA, to a dictionary of modes."""
+    """Convert a vector, ordered by the index of OSA, to a dictionary of modes; ValueError if it is invalid."""
     vector = plain_reals("coefficients_um", given)
     most = (HIGHEST + 1) * (HIGHEST + 2) // 2
     if vector.ndim != 1 or not 0 < vector.size <= most:

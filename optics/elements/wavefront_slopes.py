@@ -53,7 +53,7 @@ def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) 
 
 @dataclass(frozen=True, eq=False)
 class Slopes(ReadOnlyArrays):
-    """Gradient of the optical path on a grid that covers the disk and its soft edge."""
+    """Gradient of the optical path, (y, x), on a grid over a disk of this radius [m] and its soft edge."""
 
     grid: Grid
     along_x: np.ndarray

@@ -37,7 +37,7 @@ def mode(n: int, m: int, x: Any, y: Any) -> Any:
 
 
 def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: Any) -> Any:
-    """Return Σ w Z_n^m at (x, y). Many wavefronts have the same samples, so the polynomials are cached for them.
+    """Return Σ w Z_n^m at (x, y). The polynomials are cached, since many wavefronts are evaluated at the same points.
 
     weights, x, y: arrays of NumPy or PyTorch, in float64. Positions carry no derivatives.
     """
@@ -53,7 +53,10 @@ def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: 
 def _modes(
     named: tuple[tuple[int, int], ...], x: bytes, columns: tuple[int, ...], y: bytes, rows: tuple[int, ...]
 ) -> np.ndarray:
-    """Return the polynomials at (x, y), (mode, point). Positions are float64."""
+    """Return the polynomials at (x, y), (mode, point).
+
+    x, y: memory of float64 arrays with the shapes `columns` and `rows`.
+    """
     at = np.frombuffer(x).reshape(columns), np.frombuffer(y).reshape(rows)
     size = np.broadcast_shapes(columns, rows)
     return np.stack([np.broadcast_to(mode(n, m, *at), size).ravel() for n, m in named])

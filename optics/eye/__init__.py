@@ -9,7 +9,7 @@ receptor_lattice      receptors of different sizes, from their density
 cell_integrals        integrals of sampled functions over cells
 retina                the retina as a plane of cells
 sensor_pixels         means over the pixels of a sensor
-visual_kernel       kernels: receptive fields of receptors
+visual_kernel         kernels: receptive fields of receptors
 guided_field          kernels of receptors that are waveguides
 receptor_kernel       kernel of any receptor
 kernel_interpolation  number of kernels for a range of distances and directions

@@ -17,8 +17,8 @@ __all__ = [
     "sampling_acuity",
 ]
 
-# Wavelengths of the finest grating that a lattice resolves, in units of the distance between neighbours: √3 for a
-# hexagonal lattice, 2 for a square one.
+# Period of the finest grating that a lattice resolves, in units of the distance between neighbours: √3 for a hexagonal
+# lattice, 2 for a square one.
 PERIODS = {"hexagon": math.sqrt(3), "square": 2.0}
 DETECTED = 0.954  # d' for 75 % correct choices between two intervals
 
@@ -33,7 +33,7 @@ def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
     interommatidial_deg: interommatidial angle Δφ [degrees].
 
     Raises:
-        ValueError: an argument is not positive, or an angle is above 180°.
+        ValueError: an argument is not positive, or the angle is above 180°.
     """
     angle = positive("interommatidial_deg", interommatidial_deg, "degrees")
     return positive("diameter", diameter) * math.radians(in_range("interommatidial_deg", angle, 0.0, 180.0))
@@ -42,8 +42,8 @@ def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
 def least_eye_parameter(wavelength: float, lattice: str = "hexagon") -> float:
     """Return the smallest useful eye parameter [m]: λ/√3 for a hexagonal lattice, λ/2 for a square one.
 
-    With this value, the finest grating that the lattice resolves has the period λ/D. Facets do not transmit finer
-    gratings.
+    With this value, the finest grating that the lattice resolves has the period λ/D. Facets of the diameter D do not
+    transmit finer gratings.
 
     wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
     lattice: "hexagon" or "square".
@@ -56,20 +56,22 @@ def least_eye_parameter(wavelength: float, lattice: str = "hexagon") -> float:
 
 
 def sampling_acuity(spacing_deg: float, lattice: str = "hexagon") -> float:
-    """Return the finest grating [cycles/degree] that a lattice of receptors resolves: 1/(√3 Δφ), or 1/(2 Δφ).
+    """Return the frequency [cycles/degree] of the finest grating that a lattice of receptors resolves.
+
+    It is 1/(√3 Δφ) for a hexagonal lattice and 1/(2 Δφ) for a square one.
 
     spacing_deg: angle Δφ [degrees] between neighbouring receptors or ommatidia.
     lattice: "hexagon" or "square".
 
     Raises:
-        ValueError: an angle is not positive, or the lattice is unknown.
+        ValueError: the angle is not positive, or the lattice is unknown.
     """
     one_of("lattice", lattice, PERIODS)
     return 1 / (PERIODS[lattice] * positive("spacing_deg", spacing_deg, "degrees"))
 
 
 def anatomical_acuity(density: float, nodal_distance: float, lattice: str = "hexagon") -> float:
-    """Return the finest grating [cycles/degree] that a retina resolves, from its density of receptors.
+    """Return the frequency [cycles/degree] of the finest grating that a retina resolves, from its receptor density.
 
     If several receptors share a ganglion cell, use the density of ganglion cells instead.
 

@@ -38,12 +38,15 @@ def choose_bands(
     - The error of the kernels for white light: the largest difference, over all scenes, between the signals with n and
         with 2n bands.
 
+    tolerance: largest error, 1e-6 to 0.5.
+    receptors: see `optics.receptors_of`.
     kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
         side of a receptor. None: the kernel is the same for all wavelengths.
     white: fraction of a white surface's signal that kernels transmit if they are wide enough to contain all light.
         None: the fraction that the given kernels transmit.
 
     Raises:
+        ValueError: the tolerance is outside its range, or the receptors are invalid.
         AccuracyError: the error with 32 bands exceeds the tolerance.
     """
     in_range("tolerance", tolerance, 1e-6, 0.5)

@@ -95,15 +95,17 @@ def camera_image(
     sensor: the sensor behind a pupil; None for an eye.
     depth: distance [m] of the scene along the axis: a number, or a map with one distance per cell (Y, X).
     samples_per_pixel: cells of the scene per pixel along each axis. Defocused edges need more than one.
-    field_zones: number of PSFs across the width of the field, or "auto", see `Eye.sight`. 1 uses the PSF on the axis.
+    field_zones: number of PSFs along the longer side of the field, or "auto", see `Eye.sight`. 1: the PSF in the middle
+        of the field is used everywhere.
     rng: random generator of the noise. None: no noise; the result belongs to mean numbers of electrons.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         focuses an infinitely distant point.
     tolerance: relative error of the PSF, see `Eye`.
 
     Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons as float32. There is one channel with a
-    mosaic, and otherwise one for each type. If the pupil carries derivatives, the result is a Dr.Jit tensor of
-    electrons. For PyTorch, see `optics.torch.camera_image`.
+    mosaic, and otherwise one for each type. If the pupil carries derivatives, which requires bits=None, the result is a
+    Dr.Jit tensor of electrons. For an eye, the result is that of `Eye.see`. For PyTorch, see
+    `optics.torch.camera_image`.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
@@ -166,7 +168,11 @@ def _camera_eye(pupil: Pupil, sensor: Sensor, distance: float, tolerance: float)
 
 
 def _radiance(scene: Any, eye: Eye, samples_per_pixel: int) -> np.ndarray:
-    """Return the radiance (band, Y, X) of an sRGB image, or of a scene that is spectral already."""
+    """Return the radiance (band, Y, X) of an sRGB image, or of a scene that is spectral already.
+
+    Raises:
+        ValueError: the scene has another shape, or values that are invalid.
+    """
     values = reals("scene", scene)
     if values.ndim != 3 or (values.shape[2] != 3 and len(values) != eye.bands):
         raise ValueError(
@@ -190,7 +196,7 @@ def _radiance(scene: Any, eye: Eye, samples_per_pixel: int) -> np.ndarray:
 
 
 def _distances(depth: Any, shape: tuple[int, ...]) -> Any:
-    """Return the distance, or the map of distances, after checks."""
+    """Return the distance, or the map of distances; ValueError unless they are positive and fit the scene's `shape`."""
     if is_differentiable(depth) or np.ndim(found := reals("depth", depth)) == 0:
         positive("depth", depth, infinite=True, carried=True)
         return depth
@@ -203,7 +209,11 @@ def _distances(depth: Any, shape: tuple[int, ...]) -> Any:
 
 
 def _read(signals: np.ndarray | Array, sensor: Sensor, eye: Eye, rng: np.random.Generator | None) -> np.ndarray | Array:
-    """Return electrons or digital numbers for the signals of pixels."""
+    """Return electrons or digital numbers for the signals of pixels.
+
+    Raises:
+        ValueError: the signals carry derivatives, and `bits` is not None.
+    """
     per_signal = eye.receptor_photons
     assert per_signal is not None
     mean = np.maximum(plain(signals), 0) * per_signal

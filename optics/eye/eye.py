@@ -128,17 +128,17 @@ class Eye(EyeSpec):
 
         The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
         enough to lose less than the tolerance (limits: see `visual_kernel`). Light of a steep relief may count as
-        blocked if it lands farther from the image than the longer side of the retina. A perfect lens has the kernel 1.
-
-        The kernel treats the light of each scene cell as coming from its centre. Signals are then a² Σ_b weights[c, b]
-        (kernel_b ⊗ radiance_b), averaged over each receptor's cells. By default, `see` assumes light from all over each
-        cell instead (see `light_from` of `sight`).
+        blocked if it lands farther from the image than the longer side of the retina. A perfect lens has the kernel 1,
+        a single cell. The kernel treats the light of each scene cell as coming from the cell's centre. Signals are then
+        a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b), averaged over each receptor's cells. By default, `see` assumes
+        light from all over each cell instead (see `light_from` of `sight`).
 
         With waveguides, the kernel is the fraction of each scene cell's light that a receptor accepts, averaged over
         the cell. The cells lie around the receptor's direction. Signals are not averaged over the receptor. ky and kx
         are even if samples_per_receptor is even. The kernel's sum is relative to a square that absorbs all light.
 
         Raises:
+            ValueError: an argument is invalid, the waveguide has no mode, or it is combined with derivatives.
             AccuracyError: see `optics.psf`.
         """
         positive("z", z, infinite=True, carried=True)
@@ -156,7 +156,7 @@ class Eye(EyeSpec):
         return Retina(self.retina_distance, wavelengths, cell, self.tolerance, *settings)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the fewest bands that keep a receptor's predicted error within the tolerance; errors as in `psf`."""
+        """Return the fewest bands that keep a receptor's predicted error within the tolerance. Errors: see `psf`."""
         retina = self._retina_of(np.empty(0), self.smallest_receptor, CELLS_FOR_BANDS)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
 
@@ -178,13 +178,13 @@ class Eye(EyeSpec):
         depth_layers: number of kernels between the nearest and the farthest distance, evenly spaced in 1/z. "auto": the
             smallest number that meets the tolerance. "distinct": one kernel for each different distance in z, at most
             64.
-        field_zones: number of kernels across the width of the field; or "auto". With 1, the kernel on the axis is used
-            for the whole retina.
+        field_zones: number of kernels along the longer side of the field; or "auto". With 1, the kernel in the middle
+            of the field is used for the whole retina.
         tolerance: largest error of a receptor's signal, relative to the signal of a white surface, for any scene at
             most as bright as white (None: the eye's tolerance).
         light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" treats all light
             of a cell as coming from its centre. It suits cells whose radiance is the mean of finer detail, as in
-            rendered images. Its error is then less than half that of "cells", which is O(samples_per_receptor^-2).
+            rendered images. Its error is then less than half the error of "cells", which is O(samples_per_receptor^-2).
 
         Raises:
             ValueError: an argument is outside its valid range, which the message states.
@@ -231,7 +231,7 @@ class Eye(EyeSpec):
             hide far ones at jumps of depth (see `optics.eye.occlusion`). Behind them, far surfaces continue with their
             nearest visible cell. Up to 17 different distances have one kernel each. If there are more, distances share
             kernels within the tolerance.
-        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its
+        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside their
             range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
             last call are kept. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
         polarization: (degree, angle_deg) of the light, for an eye with microvilli. These are the degree of linear
@@ -259,7 +259,7 @@ class Eye(EyeSpec):
     def _last_sight(self, samples_per_receptor: int, z: Any) -> KernelBank:
         """Return `sight` for these samples and distances, from the preceding call of `see` if possible.
 
-        Kernels that depend on Dr.Jit arrays are computed again, because these may carry derivatives.
+        Kernels that depend on Dr.Jit arrays are computed again, because the arrays may carry derivatives.
         """
         layers, distances = layers_for(z)
         if holds_arrays(z) or holds_arrays(self):

@@ -218,7 +218,10 @@ class EyeSpec:
 
     @property
     def parallax(self) -> float:
-        """Shift of the image [average receptors] between opposite edges of the pupil, per unit of 1/distance [1/m]."""
+        """Shift of the image between opposite edges of the pupil, per unit of 1/distance [1/m].
+
+        The unit of the shift is the shorter side of an average receptor.
+        """
         if self.pupil is None:
             return 0.0
         return 2 * number(self.pupil.aperture_radius) * number(self.sensor_distance) / min(self.receptor_size)
@@ -270,5 +273,5 @@ class EyeSpec:
         return self.spectral_bands.band_values(radiance, self.receptors)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the spectral bands for `bands="auto"`. The choice needs kernels, so only `Eye` implements it."""
+        """Return the spectral bands for `bands="auto"`. Only `Eye` can choose them; others raise a ValueError."""
         raise ValueError("bands = 'auto': must be a number of bands, except in an Eye")

@@ -118,7 +118,10 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Number of cells in a row, their side, and the sampling distance that resolves a receptor's field, as tangents."""
+    """Cells in a row: their number, their side, and the sampling distance that resolves a receptor's field.
+
+    Lengths are tangents of angles.
+    """
 
     count: int
     side: float
@@ -126,7 +129,7 @@ class _Cells:
     tolerance: float
 
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return tangents (cell, node) along an axis from its middle, and weights that sum to a cell's side."""
+        """Return tangents (cell, node) along the row, from its middle, and weights that sum to a cell's side."""
         middle = (np.arange(self.count) - (self.count - 1) / 2) * self.side
         if not from_cell:
             return middle[:, None], np.array([self.side])
@@ -141,7 +144,7 @@ class _Cells:
 
 
 def _radius(waveguide: Waveguide, beam: Beam) -> float:
-    """Return the radius [m] that contains the field of the best confined mode."""
+    """Return the radius [m] that contains the field of the best confined mode; ValueError if there is no mode."""
     modes = waveguide.modes(beam.wavelength)
     if not modes:
         raise ValueError(f"waveguide: has no guided mode at {beam.wavelength:g} m; must be wider, or of a higher index")
@@ -149,7 +152,7 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return integrals over cells of E (row, column), and their sum relative to the integral over all directions.
+    """Return integrals of E over cells, (row, column), and their share of E's integral over all directions.
 
     E is the accepted fraction of a source's light. Areas of cells are in squared tangents.
     """
@@ -177,7 +180,11 @@ def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cell
 
 
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
-    """Return a grid of sines that covers the sines x and y, with the margin that a spline needs."""
+    """Return a grid of sines that covers the sines x and y, with the margin that a spline needs.
+
+    Raises:
+        AccuracyError: the grid needs more samples than the limit.
+    """
     centre = tuple(float(axis.min() + axis.max()) / 2 for axis in (x, y))
     sides = [math.ceil(float(np.ptp(axis)) / (2 * step)) for axis in (y, x)]
     shape = tuple(2 * (side + MARGIN) + 1 for side in sides)

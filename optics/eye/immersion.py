@@ -18,10 +18,10 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
     """Return an eye that is immersed in a medium.
 
     The medium is in front of the pupil (`Pupil.object_n`). A refracting surface between air and the eye, such as a
-    cornea, therefore loses power. The retina and its receptors do not move, so the field of view changes by the ratio
-    of the indices at 550 nm. A pupil without `object_n` has the same medium on both sides; the medium then also fills
-    the eye, and the field of view does not change. A perfect lens is perfect in every medium. Air and fog have no
-    effect.
+    cornea, therefore loses power. The retina and its receptors do not move, so tan(fov/2) is divided by the ratio of
+    the new to the former index in front of the pupil, at 550 nm. A pupil without `object_n` has the same medium on both
+    sides. The medium then also fills the eye, and the field of view does not change. A perfect lens is perfect in every
+    medium. Air and fog have no effect.
 
     eye: an `optics.Eye`
     medium: the medium in front of the pupil; None: air

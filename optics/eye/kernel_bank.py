@@ -41,9 +41,9 @@ class KernelBank:
     kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
     choices: the chosen numbers of nodes, for depth and for the field.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
-    parallax: shift of the image [cells] between opposite edges of the pupil, per difference of 1/distance [1/m]. Within
-        this shift, near surfaces hide far ones. 0: no surface hides another, as in renderers whose rays all pass the
-        middle of the pupil.
+    parallax: shift of the image [cells] between opposite edges of the pupil, per difference of 1/distance [1/m]. It
+        determines where near surfaces hide far ones. 0: no surface hides another, as in renderers whose rays all
+        pass the middle of the pupil.
     """
 
     inverse_distances: tuple[float, ...]
@@ -55,6 +55,8 @@ class KernelBank:
 
     def shares(self, inverse_distance: np.ndarray) -> list[Any]:
         """Return the interpolation weight (Y, X) of each node in every cell of a scene, one array per node.
+
+        For a single node, the only weight is the number 1.
 
         inverse_distance: 1/z [1/m] of the cells, (Y, X).
         """
@@ -104,6 +106,10 @@ def prepare(
     mean: number of cells along the side of the square over which errors are averaged, as in a receptor's signal (None:
         samples_per_receptor).
     white: function that returns the fraction of the signal of a white surface that the kernels transmit.
+
+    Raises:
+        ValueError: a number or a distance is invalid, or there are too many distances for "distinct" layers.
+        AccuracyError: the tolerance requires more kernels than the limit.
     """
     s, depths = samples_per_receptor, DepthRange.from_distances(z)
     exactly = isinstance(counts[0], str) and counts[0] == DISTINCT

@@ -21,6 +21,8 @@ from optics.numerics.interpolation import linear_weights
 __all__ = ["Choice", "NodeChoice", "NodeError", "nodes", "worst_difference"]
 
 MOST_CHECKS = 8  # choice: largest number of kernels between nodes that are computed to measure the interpolation error
+# Places of these kernels in a field of [0, 1]²: the corners, and four places between them in separate rows and columns.
+SPREAD = (*itertools.product((0.0, 1.0), repeat=2), (0.2, 0.6), (0.4, 0.2), (0.6, 0.8), (0.8, 0.4))
 CAUTION = 1.3  # choice: safety factor on this error, which may be larger at positions that are not measured
 Place = tuple[float, ...]
 
@@ -56,14 +58,23 @@ def checks(counts: tuple[int, ...]) -> list[Place]:
     """Return the places with the largest error for these numbers of nodes along each axis.
 
     With a single node, these are the ends of the range. With more, they are the points halfway between nodes along
-    every axis. If there are many such points, only a few are used, including the corners.
+    every axis. If there are many such points, only a few are used: evenly spaced ones along one axis, and on two axes
+    those next to all four corners and a few between them, because the error of a pupil without symmetry may be largest
+    at any corner.
     """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
-    found = _places((nodes(n)[1:] + nodes(n)[:-1]) / 2 if n > 1 else nodes(1) for n in counts)
+    axes = [(nodes(n)[1:] + nodes(n)[:-1]) / 2 if n > 1 else nodes(1) for n in counts]
+    found = _places(axes)
     if len(found) <= MOST_CHECKS:
         return found
-    return [found[round(at)] for at in np.linspace(0, len(found) - 1, MOST_CHECKS)]
+    shares = SPREAD if len(axes) == 2 else np.linspace(0, 1, MOST_CHECKS)[:, np.newaxis]
+    return list(dict.fromkeys(_place(axes, at) for at in shares))
+
+
+def _place(axes: Sequence[np.ndarray], shares: Iterable[float]) -> Place:
+    """Return the place at these shares of the axes: 0 for an axis's first value, 1 for its last one."""
+    return tuple(float(axis[round(share * (len(axis) - 1))]) for axis, share in zip(axes, shares, strict=True))
 
 
 def _places(axes: Iterable[np.ndarray]) -> list[Place]:
@@ -77,7 +88,7 @@ class NodeChoice:
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
     white: function that returns the fraction of the signal of a white surface that the kernels transmit. It is less
-        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, its computation requires a
+        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, the function computes a
         kernel.
     """
 

@@ -1,8 +1,8 @@
 """Layers of a scene with a depth map: near surfaces hide far ones, and light passes their edges.
 
 Seen from a far point, a near edge hides a part of the pupil. The hidden fraction is the near surface's coverage,
-blurred by the kernel of the near surface's distance. With T_l the fraction of light that passes all layers nearer than
-the layer l,
+blurred by the kernel of the near surface's distance. Layers are numbered from the farthest to the nearest. With T_l the
+fraction of light that passes all layers nearer than the layer l,
 
     image = Σ_l T_l · (kernel_l ⊗ radiance_l),   T_(l-1) = T_l (1 - kernel_l ⊗ coverage_l),
 

@@ -1,6 +1,6 @@
 """Signal of a photoreceptor from the light on it: throughput, spectral weighting, noise.
 
-This is the noise of `optics.Eye.see`. In worlds, `sim.render.receptor_noise` draws the noise.
+`optics.Eye.see` draws its noise here. In worlds, `sim.render.receptor_noise` draws the noise.
 """
 
 from __future__ import annotations
@@ -63,6 +63,9 @@ def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random
     signal: (channel, y, x).
     photons: absorbed photons for a signal of 1: a number, one per channel, or one per receptor (channel, y, x), or
         (channel, 1, 1).
+
+    Raises:
+        ValueError: a signal is negative, a number of photons is not positive, or a receptor absorbs more than 1e18.
     """
     signal, budget = reals("signal", signal), np.atleast_1d(reals("photons", photons))
     positive("photons", float(budget.min()), "1")

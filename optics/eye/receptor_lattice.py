@@ -24,7 +24,7 @@ NARROWEST = 0.01  # choice: smallest side of a receptor, relative to the average
 
 @dataclass(frozen=True, eq=False)
 class ReceptorLattice(ReadOnlyArrays):
-    """Rectangles of receptors.
+    """Rectangles of receptors, in the coordinates of this module.
 
     rows: edges of the rows, from the top, (h + 1,).
     columns: edges of the receptors in each row, from the left, (h, w + 1).
@@ -82,7 +82,7 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack(found)
 
     def places(self, counted: np.ndarray) -> np.ndarray:
-        """Return positions (x, y) on the retina, (n, 2), given in coordinates that count receptors from its middle.
+        """Return positions (x, y) on the retina, (n, 2), given in coordinates that count receptors from the middle.
 
         In these coordinates, the receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. Beyond the
         rim, receptors continue with the size of the outermost ones.

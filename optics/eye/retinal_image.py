@@ -80,7 +80,7 @@ def _flat(array: np.ndarray, types: Precision) -> Array:
 
 
 def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:
-    """Return the size of the part of the scene that affects the middle part of the image, whose size is `shape`.
+    """Return the size of the part of the scene that affects the middle part, of size `shape`, of the image.
 
     It is at most the scene's size and has the same parity.
     """
@@ -112,7 +112,7 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def receptor_average(image: Array, samples_per_receptor: int, types: Precision) -> Array:
-    """Return the mean over each receptor's square aperture, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
+    """Return the mean over the s x s cells of each receptor, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
     return _of_receptors(image, np.full(samples_per_receptor, 1 / samples_per_receptor), types)
 
 

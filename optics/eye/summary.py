@@ -36,9 +36,10 @@ class Description:
     f_number: f/2R. f is the focal length that relates a distance x on the retina to the angle x/f; it is n₀/n times the
         distance to the retina. The brightness of the image is proportional to 1/f_number².
     wavelength: mean wavelength [m] of daylight, weighted by the receptors.
-    diffraction_cpd: cut-off frequency of an aperture of this width, 2 sin θ/λ on the retina.
+    diffraction_cpd: cut-off frequency of diffraction at the pupil, 2 sin θ/λ on the retina, where θ is half the angle
+        of the cone of light.
     sampling_cpd: Nyquist frequency of the receptors, 1/(2 Δφ), horizontally.
-    noise_cpd: lowest frequency at which the contrast of the optics falls below the noise.
+    noise_cpd: lowest frequency at which the contrast of the optics falls below `noise` divided by `white_signal`.
     acuity_cpd: horizontal acuity, the smallest of these three frequencies; NaN if one is unknown.
     acuity_vertical_cpd: vertical acuity, with the Nyquist frequency of the receptors' rows.
     binding: name of the smallest known limit: "diffraction", "sampling" or "noise".

@@ -91,6 +91,10 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
     direction: tangents (right, down) of the source's direction in the visual field.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
+
+    Raises:
+        ValueError: the retina's distance carries derivatives, and the source is off the axis.
+        AccuracyError: see `retinal_psf`, or the light covers too many cells.
     """
     import drjit as dr
 
@@ -266,12 +270,10 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
 def _beyond_edge(pupil: Pupil, fraction: float) -> float:
     """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts this fraction of the light.
 
-    δ is measured from the frequency of the undiffracted light.
-
-    The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge. An
-    aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ) of its light beyond δ. For a disk this is
-    1/(π²Rδ), as in the Airy pattern (Born & Wolf, §8.5.2). The fraction is larger behind a mask that is brighter along
-    the edge than on average.
+    δ is relative to undiffracted light. The squared spectrum of a straight edge, integrated over frequencies above f,
+    is 1/(2π²f) per length of the edge. An aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ) of
+    its light beyond δ. For a disk this is 1/(π²Rδ), as in the Airy pattern (Born & Wolf, §8.5.2). The fraction is
+    larger behind a mask that is brighter along the edge than on average.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * fraction)

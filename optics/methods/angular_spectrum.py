@@ -184,7 +184,7 @@ def _spectrum(beam: Beam, how: GridSampling, types: Precision) -> Field:
 def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
     """Return the field over the window that results from this spectrum in the pupil's plane.
 
-    A phase that does not affect the intensity is omitted.
+    For a split spectrum, a phase that does not affect the intensity is omitted.
     """
     spectrum = spectrum * transfer(beam, problem, how, precision(problem.dtype))
     if how.is_whole:

@@ -43,7 +43,7 @@ def derivative_cells(
     """Return the opening, divided into cells with the fewest nodes that are accurate enough; None for too many cells.
 
     The error is the relative L2 error of the derivatives with respect to all samples, for a random functional of the
-    PSF. It may be NODES_PART times the tolerance. Cells are halved if they would need more than MOST_NODES nodes.
+    PSF. It is at most NODES_PART times the tolerance. Cells are halved if they would need more than MOST_NODES nodes.
 
     cycles: local frequencies [cycles per R] of the integrand at points that are evenly spread over the opening.
     """

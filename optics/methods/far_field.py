@@ -76,7 +76,7 @@ class FarFieldSampling:
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
-    """Return a sampling: directions that oversample the field, and the nodes that the slow factor needs.
+    """Return a list with one sampling: directions that oversample the field, and the nodes that the slow factor needs.
 
     The list is empty if the method is not suitable for the window.
     """

@@ -80,7 +80,7 @@ def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> 
         if size[worst] < error**2 or len(kept) == len(rest):
             break
         along = rest[worst] / np.linalg.norm(rest[worst])
-        # The sum is no matrix product, because busy waiting of BLAS threads dominates the time of small products.
+        # The sum is not a matrix product, because busy waiting of BLAS threads dominates the time of small products.
         projection = (rest * along.conj()).sum(axis=1)
         rest = rest - projection[:, None] * along
         kept.append(worst)

@@ -66,7 +66,10 @@ class ParaxialSampling:
 
 
 def fresnel(problem: Problem) -> list[ParaxialSampling]:
-    """Return a sampling of Fresnel's integral (Goodman, Introduction to Fourier Optics, eq. 4-17); empty for pixels."""
+    """Return a list with one sampling of Fresnel's integral (Goodman, Introduction to Fourier Optics, eq. 4-17).
+
+    The list is empty if the pupil consists of pixels.
+    """
     reach = (1 + EDGE_REACH) * problem.radius + problem.outermost
     excess = reach / problem.distance - reach / math.hypot(reach, problem.distance)
     turning = min(
@@ -77,7 +80,10 @@ def fresnel(problem: Problem) -> list[ParaxialSampling]:
 
 
 def fraunhofer(problem: Problem) -> list[ParaxialSampling]:
-    """Return a sampling of Fraunhofer's integral (Goodman, eq. 4-25), which omits the quadratic phase."""
+    """Return a list with one sampling of Fraunhofer's integral (Goodman, eq. 4-25), which omits the quadratic phase.
+
+    The list is empty if the pupil consists of pixels.
+    """
     return _sampling(
         "fraunhofer", problem, problem.phase_band + problem.outermost / (problem.wavelength * problem.distance)
     )
@@ -111,7 +117,8 @@ def model_error(problem: Problem, curved: bool) -> float:
 
     at the hit points x of rays. Fraunhofer's integral omits the term ξ² of d². Light that adds up coherently at a hit
     point comes from a few Fresnel zones around the ray's origin, or from the whole aperture if several rays may hit the
-    same point. A phase that is common to all this light causes no error.
+    same point. A phase that is common to all this light causes no error. Without rays or behind a mask, the error
+    cannot be predicted and counts as 1.
 
     curved: True for Fresnel's integral, False for Fraunhofer's.
     """

@@ -120,7 +120,7 @@ class PinholeSampling:
 
 
 def geometric(problem: Problem) -> list[RaySampling]:
-    """Return a sampling with enough rays for a smooth image.
+    """Return a list with one sampling, which has enough rays for a smooth image; empty for a pupil of pixels.
 
     Every ray is spread by a quadratic B-spline over the window's cells. The spectrum of the spline falls like (πf
     dx)⁻³, so it is negligible beyond f = error^(-1/3)/(π dx). The rays are dense enough for this frequency: their hit
@@ -141,7 +141,7 @@ def geometric(problem: Problem) -> list[RaySampling]:
 
 
 def pinhole(problem: Problem) -> list[PinholeSampling]:
-    """Return the sampling that puts all light into one sample.
+    """Return a list with the sampling that puts all light into one sample; empty for a pupil of pixels.
 
     The error is predicted as 100 %, even for a very small exact PSF, because samples of the exact PSF are intensities
     at points and not means over cells. "auto" therefore never chooses this method.

@@ -80,7 +80,7 @@ class HankelSampling:
 
 
 def hankel(problem: Problem) -> list[HankelSampling]:
-    """Return a sampling whose nodes resolve the phases of both integrals.
+    """Return samplings whose nodes resolve the phases of both integrals, one for each taper of the spectrum.
 
     The list is empty unless the problem is rotationally symmetric.
     """

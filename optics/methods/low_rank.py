@@ -73,11 +73,12 @@ class LowRankSampling:
 
 
 def low_rank(problem: Problem) -> Sequence[LowRankSampling | WindowSampling]:
-    """Return a sampling with the fewest samples of the pupil and the necessary rank.
+    """Return a list with one sampling, which has the fewest samples of the pupil and the necessary rank.
 
     The samples resolve the combined phase of pupil and path. They are evenly spaced in sines, or in positions if even
     spacing in sines needs too many samples. A pupil of pixels has nodes within the pixels. At coarse tolerances, the
-    samples follow from the light in the window instead (`window_sampling`).
+    samples follow from the light in the window instead (`window_sampling`). The list is empty if the pupil is too wide
+    for its distance, or if the samples or the matrices would be too large.
     """
     coarse = window_sampling(problem)
     if coarse is not None:

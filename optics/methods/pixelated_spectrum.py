@@ -88,7 +88,10 @@ def _samplings(problem: Problem, method: str) -> list[PixelSpectrum]:
 
 
 def _nodes(problem: Problem, taper: Taper) -> PixelSamples | None:
-    """Return nodes within pixels that resolve the phase and every frequency below the end of the taper."""
+    """Return nodes within pixels that resolve the phase and every frequency below the end of the taper.
+
+    The result is None if pixels would need too many nodes.
+    """
     if problem.knots is not None:
         return cell_samples(problem, taper.end)
     assert problem.pixelated is not None

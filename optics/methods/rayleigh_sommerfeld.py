@@ -101,7 +101,10 @@ class NodeSampling:
 
 
 def nodes(problem: Problem) -> list[NodeSampling]:
-    """Return a sampling whose nodes resolve the combined phase of pupil and path."""
+    """Return a list with one sampling, whose nodes resolve the combined phase of pupil and path.
+
+    The list is empty if derivatives with respect to samples of maps need too many nodes.
+    """
     (cycles, digits), aperture = node_rule(problem), problem.aperture
     if problem.knots is not None:
         cells = problem.cells()

@@ -38,7 +38,10 @@ def row_blocks(grid: Grid) -> Iterator[tuple[int, Grid]]:
 
 
 def with_rows_moved(spectrum: Field, rows: int, period: Scalar, sign: int) -> Field:
-    """Return the Fourier sum of the same samples moved by `rows` rows along y, see `fourier.dft2`."""
+    """Return the Fourier sum of samples moved by `rows` rows along y, given their sum `spectrum` before the move.
+
+    period, sign: those of the sum, see `fourier.dft2`.
+    """
     if rows == 0:
         return spectrum
     types = spectrum.types

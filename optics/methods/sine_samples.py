@@ -1,4 +1,4 @@
-"""Samples of a pupil that are evenly spaced in the sines of the rays to the window's centre.
+"""Samples of a pupil that are evenly spaced in their sines, as seen from the window's centre.
 
 The distance from a point ξ of the pupil to points x = c + u of a window about c is
 
@@ -40,12 +40,12 @@ RIM = 64  # number of points on the rim from which the range of the sines is det
 class SineSamples:
     """A soft aperture on a grid of sines. The grid lies around the sines of the pupil's centre.
 
-    grid: grid of s - s₀, where s are the sines of rays to the window's centre, and s₀ those of the ray from the pupil's
-        centre.
+    grid: grid of s - s₀, where s = (ξ - c)/D are the sines of a point ξ of the pupil as seen from the window's centre
+        c, and s₀ those of the pupil's centre.
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: sine at which factors along the other axis are evaluated, see `slow_factor.axis_factor`.
+    elsewhere: sine along the other axis at which `slow_factor.axis_factor` evaluates the factor of an axis.
     """
 
     edge: PupilEdge
@@ -57,7 +57,7 @@ class SineSamples:
 
     @property
     def at(self) -> np.ndarray:
-        """Coordinates of the samples along either axis: direction sines of their rays, minus the centre's."""
+        """Sines s - s₀ of the samples along either axis."""
         return self.grid.x
 
     @property
@@ -75,7 +75,7 @@ class SineSamples:
         return _middle(self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return sines of rays from points (x, y) [m] to the window's centre, minus those of the central ray."""
+        """Return the sines s - s₀ of points (x, y) [m] of the pupil."""
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
 
@@ -102,7 +102,7 @@ class SineSamples:
         return found
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupil for sines (s, t) relative to those of the pupil's centre."""
+        """Return the points (x, y) [m] of the pupil for sines (s, t), from which s₀ is subtracted as in `grid`."""
         sx, sy = s + self._middle[0], t + self._middle[1]
         slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, max(self.steepest**2, MOST_SQUARE)))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
@@ -158,14 +158,14 @@ def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _sines(x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sines of the rays from the centre of the window to points (x, y) of the pupil."""
+    """Return the sines of points (x, y) of the pupil as seen from the centre of the window."""
     x, y = x - centre[0], y - centre[1]
     slant = np.sqrt(x * x + y * y + distance * distance)
     return x / slant, y / slant
 
 
 def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]:
-    """Return s₀, the sines of the ray from the pupil's centre to the window's centre."""
+    """Return s₀, the sines of the pupil's centre as seen from the window's centre."""
     slant = math.hypot(*centre, distance)
     return -centre[0] / slant, -centre[1] / slant
 

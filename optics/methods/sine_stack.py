@@ -1,4 +1,4 @@
-"""Samples of several pupils at once, evenly spaced in sines as in `sine_samples`, with as many samples for each pupil.
+"""Samples of several pupils at once, evenly spaced in sines as in `sine_samples`, the same number for each pupil.
 
 All arrays are of NumPy, and their first axis counts the pupils. It has length 1 if the light of several wavelengths or
 sources passes the same samples.
@@ -32,12 +32,12 @@ SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a
 
 @dataclass(frozen=True, eq=False)
 class SineGeometry:
-    """Points of pupils, and the sines of the rays from there to the centre of the window.
+    """Points of pupils, and their sines as seen from the centre of the window.
 
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the outermost samples with light, (pupil,).
-    elsewhere: sines at which factors along the other axis are evaluated, see `slow_factor.axis_factor`, (pupil,).
+    elsewhere: sine along the other axis at which `slow_factor.axis_factor` evaluates the factor of an axis, (pupil,).
     """
 
     distance: np.ndarray
@@ -47,7 +47,7 @@ class SineGeometry:
 
     @cached_property
     def _middle(self) -> tuple[np.ndarray, np.ndarray]:
-        """Sines of the rays from the centres of the pupils to the centre of the window."""
+        """Sines of the centres of the pupils as seen from the centre of the window."""
         none = np.zeros(len(self.distance))
         return _sines(none, none, self.centre, self.distance)
 
@@ -228,8 +228,8 @@ def rim_sines(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the largest sine of points on the rims, relative to the pupils' centres and along either axis, (pupil,).
 
-    The second result is the largest sine itself. The third one states for which pupils samples that are evenly spaced
-    in sines are even enough in the pupil.
+    The second result is the largest sine of all points on each rim, not relative to the centre. The third result is
+    True for pupils in which samples that are evenly spaced in sines are even enough.
 
     outermost: radii [m] of the rims.
     """
@@ -252,7 +252,7 @@ def _aligned(values: np.ndarray, to: np.ndarray) -> np.ndarray:
 def _sines(
     x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sines of the rays from the centre of the window to points (x, y) of the pupils."""
+    """Return the sines of points (x, y) of the pupils as seen from the centre of the window."""
     x, y = x - centre[0], y - centre[1]
     slant = np.sqrt(x * x + y * y + distance * distance)
     return x / slant, y / slant

@@ -229,8 +229,8 @@ def cross_term(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return factors a and b, so that the slow factor divided by both axis factors is about 1 + a b.
 
-    It is the term -ik us vt/D of the phase, with the mean of 1/D over the pupil. The factor a depends on u and s, and b
-    on v and t, so it costs as much as a second Fourier kernel along either axis.
+    The product a b is the term -ik us vt/D of the exponent, with the mean of 1/D over the pupil. Because a depends on u
+    and s, and b on v and t, the term costs as much as a second Fourier kernel along either axis.
 
     directions: s and t. window: u and v. Their last two axes broadcast.
     """

@@ -3,8 +3,8 @@
 The other samples are finer, and their edge is sharper. Their grid is shifted by a fraction of the pitch that is not a
 simple ratio. The comparison therefore shows the errors due to aliased light, to detail between the samples, and to the
 soft edge. It also shows the error due to the rank, because the check interpolates the slow factor over the pupil
-instead of the window. It compares the slow factor with the diffraction kernel itself, which both sums would otherwise
-trust. The error of the sum itself is at most half of the error that it finds.
+instead of the window. Both sums use the slow factor, so the check also compares this factor with the diffraction kernel
+itself. The error of the check's own sum is at most half of the error that the check finds.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _at_points(
 def _interpolated_kernel(
     path: Path, samples: SineStack, axis: int, place: np.ndarray, weight: np.ndarray
 ) -> np.ndarray:
-    """Return L_a A e^{-ik u s}, (stack, place · a, sine)."""
+    """Return the kernel L_a A e^{-ik u s} of `_at_points` along one axis, (stack, place · a, sine)."""
     kernel = axis_kernel(path, samples, axis, place, str(weight.dtype))
     return np.asarray((kernel[:, :, None, :] * weight).reshape(len(place), -1, weight.shape[1]))
 

@@ -2,8 +2,8 @@
 
 Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
 width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
-diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. The softer edge only
-changes light far from the geometrical rays of the edge, where there is little light.
+diffracted at the edge of the pupil spreads further. A soft edge keeps this light out of the window. Softening the edge
+changes light only far from the geometrical rays of the edge, where there is little light.
 
 If most light of a strongly curved wave misses the window, the wave itself is smoothed with the edge (`curved_disk`).
 This removes light in directions far from the window. The number of samples is then almost independent of the
@@ -61,7 +61,7 @@ class WindowEdges:
 
     half: distance [m] from the middle of the window within which interpolation points lie.
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: needs of derivatives; None if none are requested.
+    derivatives: additional needs of the PSFs if derivatives are requested, else None.
     smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
     """
 
@@ -104,13 +104,13 @@ class WindowEdges:
         return self._unless_mapped(wide, narrow)
 
     def _unless_mapped(self, wide: list[SoftAperture], narrow: list[SoftAperture]) -> list[SoftAperture]:
-        """Return wide soft edges, and narrow ones for maps: their fine detail sends light from the edge anywhere."""
+        """Return narrow soft edges for maps, whose fine detail sends light from the edge anywhere, else wide ones."""
         choices = zip(self.stack.mapped.tolist(), narrow, wide, strict=True)
         return [one if mapped else other for mapped, one, other in choices]
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, _Bands]:
-        """Curvatures, and the bands of the light."""
+        """Curvatures of the smoothed waves, and the bands of the light."""
         none = np.zeros(len(self.tolerance))
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
@@ -214,7 +214,7 @@ class WindowEdges:
         return (slopes.along_x + x * scale) * cycles, (slopes.along_y + y * scale) * cycles
 
     def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return ripples of the soft edges of the samples and of the finer samples, which fall in steps, (beam,)."""
+        """Return ripples of the soft edges of samples and of finer samples, (beam,), rounded down to steps."""
         share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0) ** RIPPLE_EXPONENT
         share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
         return RIPPLES[0] * share, RIPPLES[1] * share
@@ -258,7 +258,7 @@ class _Bands:
 def _transitions(ripples: np.ndarray) -> np.ndarray:
     """Return the smallest widths of the transition from passband to stopband, in cycles per radius.
 
-    The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to this one.
+    A narrower transition needs a wider soft edge, and the soft edge must not extend beyond EDGE_REACH.
     """
     return np.array([_transition(ripple) for ripple in ripples.tolist()])
 

@@ -45,7 +45,11 @@ def window_images(
 def window_image_errors(
     stack: LightStack, finer: SineStack, images: np.ndarray, window: Grid, tolerance: float
 ) -> np.ndarray:
-    """Return the relative L2 errors of the results of `window_images`, (beam,), see `window_errors`."""
+    """Return the relative L2 errors of the results of `window_images`, (beam,), see `window_errors`.
+
+    finer: samples of the check, see `WindowPlan.samples`.
+    images: result of `window_images`, (beam, y, x).
+    """
     path = Path(stack.wavelength, stack.distance, window)
     return window_errors(finer, path, finer.arriving(stack, str(images.dtype)), images, tolerance)
 

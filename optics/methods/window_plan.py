@@ -32,7 +32,7 @@ class WindowPlan:
     """Samples of several pupils for one window.
 
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: needs of derivatives; None if none are requested.
+    derivatives: additional needs of the PSFs if derivatives are requested, else None.
     smoothed: see `WindowEdges`.
     """
 
@@ -139,7 +139,8 @@ class WindowPlan:
     def _pitch(self, density: np.ndarray) -> np.ndarray:
         """Return the largest spacing of sines at which a pupil has `density` samples per radius everywhere.
 
-        The distance of two points in the pupil is at most z/cos³θ times the distance of their sines.
+        The distance of two points in the pupil is at most z/cos³θ times the distance of their sines, with θ the angle
+        of the steepest ray.
         """
         steepest = np.minimum(self._rims[1], 1 - 1e-12)
         found: np.ndarray = self.stack.radius * (1 - np.square(steepest)) ** 1.5 / (self.stack.distance * density)

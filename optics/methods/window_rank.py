@@ -16,8 +16,8 @@ from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 __all__ = ["DERIVATIVE_ERROR", "Derivatives", "WindowRays", "window_ranks"]
 
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
-# Choices: parts of these errors that the rank may take, and with `cross_term`, whose remaining phase depends mostly on
-# the position in the window alone.
+# Choices: part of the tolerance, or of DERIVATIVE_ERROR, that the rank may take, without and with `cross_term`. With
+# this term, the remaining phase depends mostly on the position in the window alone.
 RANK_SHARE, CROSSED_SHARE = 0.3, 0.9
 RAYS, PLACES = 100, 6  # choices: numbers of rays, and of places along a side of the window, that determine the rank
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
@@ -44,8 +44,8 @@ class WindowRays:
 
     directions: sines (s, t) of the lines from the middle of the window, relative to those of the pupil's centre,
         (beam, ray).
-    window: positions (u, v) [m] relative to the middle of the window. Diffraction spreads the light around them, and
-        those outside the window are moved to its side, (beam, ray).
+    window: positions (u, v) [m] relative to the middle of the window, (beam, ray). They are the hit points of the rays,
+        moved outwards by the width of diffraction and, if they then lie outside the window, to its nearest side.
     weight: weights of the rays, with a mean of 1, (beam, ray).
     """
 
@@ -57,7 +57,8 @@ class WindowRays:
     def from_stack(cls, stack: LightStack, window: Grid) -> WindowRays:
         """Return rays from points that are spread evenly over the disks.
 
-        To first order, a ray hits the window at D/n times the slope of the path to its middle, with D the distance.
+        To first order, a ray hits the window at D/n times the slope of its path to the middle of the window, where D is
+        the distance from the ray's point of the pupil to this middle.
         """
         slopes, half = stack.slopes, max(window.own_half_width, window.dx)
         some = slice(None, None, max(1, len(slopes.x) // RAYS))

@@ -7,7 +7,7 @@ array_sum_cost  predicted times of Fourier sums of NumPy arrays
 autodiff        Array and Scalar: values that may carry derivatives
 backend         the LLVM library that Dr.Jit compiles with
 device          processor or GPU
-bessel          J0 on Dr.Jit arrays
+bessel          Bessel functions: J0 of Dr.Jit arrays, Jm of NumPy arrays
 cost            time per operation, from which methods predict their time
 even_fields     fields that are even in x and y, stored on a quarter of the plane
 field           a sampled complex field

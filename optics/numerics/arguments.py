@@ -133,7 +133,7 @@ def vacuum_wavelengths(values: Any) -> np.ndarray:
 
 
 def wavelength_row(values: Any) -> np.ndarray:
-    """Return one or several vacuum wavelengths [m] as a float64 array (wavelength,)."""
+    """Return one or several vacuum wavelengths [m] as a float64 array (wavelength,), or raise a ValueError."""
     row = np.atleast_1d(vacuum_wavelengths(values))
     if row.size == 0:
         raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
@@ -193,7 +193,7 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
-    """Return (x, y) as finite floats."""
+    """Return (x, y) as floats; ValueError unless both are numbers within ±LARGEST."""
     x, y = pair(name, without_derivative(name, value), what)
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
@@ -217,7 +217,7 @@ def reals(name: str, values: Any) -> np.ndarray:
 
 
 def plain_reals(name: str, values: Any) -> np.ndarray:
-    """Return `values` as a float64 array of any shape, without the derivatives that arrays of Dr.Jit may carry."""
+    """Return `values`, which may carry derivatives, as a float64 array without them; other checks as in `reals`."""
     return plain(full_precision(name, values)) if is_differentiable(values) else reals(name, values)
 
 

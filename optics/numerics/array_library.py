@@ -30,7 +30,8 @@ def library(x: Array) -> Any:
 def like(x: Array, value: Any) -> Array:
     """Return `value` as an array of the type, precision and device of `x`.
 
-    value: number or array. Arrays of PyTorch and of Dr.Jit keep their derivatives. NumPy arrays have none.
+    value: number or array. Derivatives are kept if `value` and `x` belong to the same library, PyTorch or Dr.Jit, and
+        dropped if `x` is a NumPy array.
 
     A Dr.Jit result is flat and is treated as data, so that other values do not need a new kernel.
 
@@ -52,7 +53,7 @@ def like(x: Array, value: Any) -> Array:
 
 
 def matrix_like(x: Array, value: Any) -> Array:
-    """Return the square matrix `value` as an array, or as a tensor of Dr.Jit, of the type of `x`. See `like`."""
+    """Return the matrix `value` as an array, or as a tensor of Dr.Jit, of the type of `x`. See `like`."""
     flat = like(x, value)
     own = library(x)
     return own.tensor_t(type(x))(flat, value.shape) if own.__name__ == "drjit" else flat

@@ -33,7 +33,7 @@ def fft_seconds(shape_in: Shape, period: int, shape_out: Shape, real: str) -> fl
 
 
 def fft_wins(shape_in: Shape, period: float, shape_out: Shape, real: str) -> bool:
-    """Return whether transforms compute the sum faster than matrices, which may be cached."""
+    """Return whether Fourier transforms compute the sum faster than products with matrices that are already known."""
     if not float(period).is_integer():
         return False
     return fft_seconds(shape_in, int(period), shape_out, real) < products_seconds(shape_in, shape_out, real)

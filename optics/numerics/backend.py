@@ -187,7 +187,10 @@ def _write_cache(content: dict[str, Any]) -> None:
 
 
 def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm | None, list[Llvm]]:
-    """Return the first usable LLVM library among `paths` (default: `candidates()`), and all test results up to it."""
+    """Return the first usable LLVM library among `paths` (default: `candidates()`), and all test results up to it.
+
+    cached: True to use test results of former processes.
+    """
     tried: list[Llvm] = []
     for path in candidates() if paths is None else paths:
         tried.append(_prove_cached(path) if cached else prove(path))

@@ -1,6 +1,6 @@
-"""Bessel functions: J₀ on Dr.Jit arrays, and J_m on NumPy arrays without importing SciPy.
+"""Bessel functions: J₀ of Dr.Jit arrays, and J_m of NumPy arrays, which imports SciPy only for large arrays.
 
-Dr.Jit has no Bessel functions. Chebyshev series are fitted once to SciPy's values.
+Dr.Jit has no Bessel functions, so J₀ is computed from Chebyshev series, which are fitted once to SciPy's values.
 
 Up to x = 8, the series is in x². Beyond x = 8, J₀(x) = √(2/(πx)) Re[(P + iQ) e^{i(x - π/4)}] (Watson, Theory of Bessel
 Functions, §7.3). The series are for P and Q, because P + iQ = √(πx/2) H₀⁽¹⁾(x) e^{-i(x - π/4)} is smooth in 8/x.

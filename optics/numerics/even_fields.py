@@ -29,7 +29,7 @@ def quarter(grid: Grid) -> Grid:
 
 
 def even_seconds(shape_in: Shape, shape_out: Shape) -> float:
-    """Return the approximate time of `even_sum`."""
+    """Return the approximate time [s] of `even_sum`."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return (ny * nx * mx + ny * mx * my) / 2 / MATMUL_FLOPS["float32"] + 2 * DFT_CALL
 

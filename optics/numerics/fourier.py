@@ -1,6 +1,6 @@
 """Centred two-dimensional Fourier sums of any size and period.
 
-One function, `dft2`, computes all transforms of this package:
+`dft2` computes this sum for fields of Dr.Jit, and `fourier_sum` for NumPy arrays:
 
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
@@ -156,7 +156,7 @@ def kept_indices(across: int) -> np.ndarray:
 
 
 def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> float:
-    """Return the approximate time of one `dft2`."""
+    """Return the approximate time [s] of one `dft2`."""
     if _fft_wins(shape_in, period, shape_out):
         return _fft_seconds(shape_in, int(period), shape_out)
     return matrix_seconds(shape_in, shape_out)

@@ -27,7 +27,7 @@ def matrix_sum(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
 
 
 def matrix_seconds(shape_in: Shape, shape_out: Shape) -> float:
-    """Return the approximate time of `matrix_sum`."""
+    """Return the approximate time [s] of `matrix_sum`."""
     halves, whole = _halves_seconds(shape_in, shape_out), _whole_seconds(shape_in, shape_out)
     return DFT_CALL + min(halves, whole)
 

@@ -46,7 +46,7 @@ class Grid:
 
     @property
     def _is_plain(self) -> bool:
-        """True if all numbers have Python's built-in types and are in range."""
+        """True if all numbers have Python's built-in types and are valid."""
         height, width = self.shape if type(self.shape) is tuple and len(self.shape) == 2 else (None, None)
         return (
             type(height) is int

@@ -1,7 +1,7 @@
 """Interpolation between samples (linear, Lagrange polynomials, cubic B-splines), and tabulated functions.
 
-Functions of positions accept Dr.Jit and NumPy arrays, except `linear_weights` and `lagrange_basis`, which require NumPy
-arrays.
+`lagrange_weights`, `cubic_bsplines` and `tensor_product` accept arrays of NumPy, PyTorch and Dr.Jit. `Interpolant.at`
+requires Dr.Jit arrays, and the other functions of positions require NumPy arrays.
 """
 
 from __future__ import annotations

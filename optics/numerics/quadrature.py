@@ -58,8 +58,9 @@ def _debye_order(z: np.ndarray, digits: float) -> np.ndarray:
 
 
 def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
-    """Return the number of Gauss-Legendre nodes for a wave with `cycles` cycles between the ends, times a polynomial.
+    """Return the number of Gauss-Legendre nodes that integrate a wave times a polynomial to within 10^-digits.
 
+    cycles: number of cycles of the wave between the ends.
     degree: degree of the polynomial.
     """
     return ceil((_degree(float(f"{cycles:.12g}"), digits) + degree) / 2)

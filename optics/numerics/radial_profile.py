@@ -80,7 +80,7 @@ class RadialProfile:
 
     @property
     def positions(self) -> np.ndarray:
-        """Radii [m] of the points in descending order, or of the table's positions in ascending order."""
+        """Radii [m] of the Chebyshev points or, if `is_table`, of the positions in the order of the table."""
         if self.is_table:
             return np.abs(self.rim * _places(self.table))
         return self.radius * np.cos(np.pi * (np.arange(self.points) + 0.5) / (2 * self.points))
@@ -116,7 +116,7 @@ class DistinctRadii:
 
     They are used if a window has few samples for the structure that it contains.
 
-    The number of distinct radii of a square about the axis is less than an eighth of the number of its samples.
+    A square of 33 x 33 or more samples about the axis has fewer distinct radii than an eighth of that number.
     """
 
     window: Grid
@@ -173,7 +173,7 @@ def _refinement(points: int, table: int, rim: float, dtype: str) -> tuple[np.nda
     """Return the flat matrix (table + 7, points) that interpolates from Chebyshev points to the table, and its shape.
 
     The interpolating polynomial is even. The table has evenly spaced positions, which are numbered from -3 to table +
-    3. The axis is position 0, and the rim, in units of the line's radius, is position table - 1.
+    3. The axis is position 0, and `rim`, which is in units of the line's radius, is position table - 1.
     """
     radius = rim * _places(table)
     nodes = np.cos(np.pi * (np.arange(points) + 0.5) / (2 * points))

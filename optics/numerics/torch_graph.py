@@ -84,7 +84,7 @@ def _on_torch(tensor: Array, place: str) -> torch.Tensor:
 
 
 def torch_place() -> str:
-    """Return the torch name of the device on which optics computes.
+    """Return PyTorch's name of the device on which optics computes.
 
     Raises:
         BackendError: Dr.Jit or this build of torch cannot compute on this device.
@@ -96,7 +96,7 @@ def torch_place() -> str:
 
 
 def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
-    """Return the device of all tensors; single numbers on the processor fit any device, as in torch."""
+    """Return the device of all tensors; ValueError if they differ. Single numbers on the CPU fit any device."""
     places = {name: t.device for name, t in numbers.items() if t.ndim or t.device.type != "cpu"}
     for first, known in places.items():
         for name, place in places.items():

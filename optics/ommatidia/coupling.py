@@ -5,8 +5,9 @@ Rayleigh-Sommerfeld integral over the pupil, and the order of the two integrals 
 
     c(s) = ∫ ψ(x) U_s(x) dx = ∫ P(ξ) e^{ik n₀ s·ξ} Ψ(ξ) dξ,   Ψ(ξ) = ∫ ψ(x) z/(2πD²) (1/D - ik) e^{ikD} dx.
 
-Each mode is therefore propagated back to the pupil once. The amplitudes for all directions s (sines) then follow from
-one Fourier sum. A waveguide off the pupil's axis points at the pupil's centre. The module `radiation` computes Ψ.
+P is the amplitude that the pupil transmits, D the distance from x to ξ, and z the distance from the pupil to the end of
+the waveguide. Each mode is propagated back to the pupil once. The amplitudes for all directions s (sines) then follow
+from one Fourier sum. A waveguide off the pupil's axis points at the pupil's centre. The module `radiation` computes Ψ.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class ModesAtPupil:
     """Modes of a waveguide, propagated back to the nodes of a pupil.
 
     x, y: positions of the nodes [m].
-    weights: amplitude P of the pupil, times the mode's field Ψ at the node, times its area dξ, (mode, node).
+    weights: amplitude P of the pupil, times the mode's field Ψ at the node, times the node's area dξ, (mode, node).
     area_of: dξ of each node [m²].
     wavenumber: k n₀ [1/m] in front of the pupil.
     area: open area of the pupil [m²].
@@ -53,7 +54,7 @@ class ModesAtPupil:
     def power(self, sine_x: np.ndarray, sine_y: np.ndarray) -> np.ndarray:
         """Return the fraction of the light on the pupil that enters each mode, (mode, direction).
 
-        sine_x, sine_y: sines of the light's directions, relative to the sines of the source's direction.
+        sine_x, sine_y: sines of the light's directions, relative to the sines of the direction of the beam's source.
         """
         sx, sy = np.ravel(sine_x), np.ravel(sine_y)
         found = np.empty((len(self.weights), sx.size))
@@ -69,6 +70,7 @@ class ModesAtPupil:
 
         sines: grid of sines of the light's directions.
         taken: weight of each mode, for example the fraction of its light that is absorbed.
+        digits: digits of the Fourier sum.
         """
         per_sample = self.wavenumber / (2 * math.pi) * sines.dx
         sums = ScatteredSum(self.x * per_sample, self.y * per_sample, sines.shape, digits)

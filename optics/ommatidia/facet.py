@@ -68,7 +68,7 @@ class FacetLens:
         return front + back - self.thickness / n * front * back
 
     def focal_length(self, wavelength: float = MIDDLE) -> float:
-        """Return the focal length f' = n'/P [m] in the cone, measured from the second principal plane."""
+        """Return the focal length f' = n'/P [m] in the cone of index n', measured from the second principal plane."""
         return self._index("medium_n", wavelength) / self.power(wavelength)
 
     def object_focal_length(self, wavelength: float = MIDDLE) -> float:

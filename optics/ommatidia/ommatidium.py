@@ -164,7 +164,11 @@ class Ommatidium:
 
 @lru_cache(maxsize=32)
 def coupled_modes(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupil:
-    """Return the modes of an ommatidium's rhabdom, propagated back to its pupil; see `modes_at_pupil`."""
+    """Return the modes of an ommatidium's rhabdom, propagated back to its pupil; see `modes_at_pupil`.
+
+    Raises:
+        ValueError: the rhabdom guides no mode. See also `modes_at_pupil`.
+    """
     modes = eye.modes(wavelength)
     if not modes:
         raise ValueError(f"rhabdom: guides nothing at {wavelength:g} m; must be wider, or of a higher index")

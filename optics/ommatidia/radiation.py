@@ -69,9 +69,9 @@ def radiated(
 
 
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return G D² at points at the distances D = z/cos θ, as a function of the mode's number.
+    """Return a function of a mode's index that returns G D² at points at the distances D = z/cos θ.
 
-    It is interpolated linearly between closely spaced points. G is defined at the top of the module.
+    The values are interpolated linearly between closely spaced points. G is defined at the top of the module.
     """
     z = float((distance * np.sqrt(1 - sine**2)).mean())
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
@@ -88,7 +88,7 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return G D² at points with arbitrary sines and distances D, as a function of the mode's number.
+    """Return a function of a mode's index that returns G D² at points with arbitrary sines and distances D.
 
     G is defined at the top of the module.
     """

@@ -80,7 +80,7 @@ class Mode:
         return here * here / (below * above)
 
     def _square(self) -> float:
-        """Return the integral of the squared field, scaled to 1 at the core's edge, in closed form."""
+        """Return the integral of the square of a field whose maximum along the core's edge is 1, in closed form."""
         azimuth = math.pi * (2 if self.l == 0 else 1)
         outside = self.radius**2 / 2 * (1 / self._kappa() - 1)
         return azimuth * outside / (1 - self.core_share)
@@ -131,7 +131,7 @@ class Waveguide:
                 raise ValueError(f"length = None: must be a length in m, because proximal_diameter = {end:g} m")
 
     def v_number(self, wavelength: float) -> float:
-        """Return V = πd/λ √(n_core² - n_clad²) of the tip at a vacuum wavelength [m]. Below 2.405, it has one mode.
+        """Return V = πd/λ √(n_core² - n_clad²) of the tip at a vacuum wavelength [m]. Below 2.405, only LP01 exists.
 
         Raises:
             ValueError: the index of the core is not above that of the surroundings, V is above 60, or the wavelength is
@@ -211,7 +211,10 @@ class Waveguide:
 
 @lru_cache(maxsize=65536)
 def _core_share(l: int, m: int, v: float) -> float:
-    """Return `Mode.core_share` of the mode LP_lm at V, and its limit 1 - 1/l (0 for l = 0) too near to the cut-off."""
+    """Return `Mode.core_share` of the mode LP_lm at V.
+
+    If V is too near the cut-off for a computation, the result is the limit at the cut-off: 1 - 1/l, and 0 for l = 0.
+    """
     u = _root(l, *_brackets(l, m)[m - 1], v)
     share = math.nan if u is None else Mode(l, m, u, math.sqrt(v * v - u * u), 1.0).core_share
     return share if math.isfinite(share) else 1 - 1 / max(l, 1)
@@ -219,7 +222,7 @@ def _core_share(l: int, m: int, v: float) -> float:
 
 @lru_cache(maxsize=4096)
 def _brackets(l: int, count: int) -> list[tuple[float, float]]:
-    """Return the cut-offs of the first modes of azimuthal order l, each with the next zero of J_l, its largest U."""
+    """Return (cut-off, largest U) of the first `count` modes of azimuthal order l. The largest U is a zero of J_l."""
     from scipy.special import jn_zeros
 
     cutoffs = [0.0, *jn_zeros(1, count)] if l == 0 else list(jn_zeros(l - 1, count))

@@ -122,8 +122,7 @@ def psf_batch(
 
     At tolerances of 3e-4 or more, all PSFs are planned together, and PSFs with equal numbers of samples are computed as
     stacks of matrix products. The error of each PSF is checked. Pupils with derivatives or pixels are excluded, as are
-    PSFs that remain inaccurate or take long. They are planned one by one, and each is computed while the next one is
-    prepared.
+    PSFs that remain inaccurate or take long. These are planned one by one, before the first of them is computed.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.

@@ -70,6 +70,10 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
     """Return the MTF of weighted sums over the PSF's wavelengths, see `mtf`.
 
     weights: (sum, wavelength). They may be negative.
+
+    Raises:
+        ValueError: the tolerance is not positive.
+        AccuracyError: see `mtf`.
     """
     positive("tolerance", tolerance, "contrast")
     light, unsure = arriving_light(result, None)

@@ -41,6 +41,8 @@ SINGLE = 1e-4  # choice: smallest tolerance for which float32 is sufficient
 class Converging(ReadOnlyArrays):
     """Light behind a pupil.
 
+    beam: light in front of the pupil and through it, to the plane of the image.
+    aplanatic: True for a corrected objective, see `vector_focus`.
     jones: Jones vectors of the parts of the light that do not interfere with each other, (part, 2).
     stokes: Stokes parameters of all light, divided by the first.
     tolerance: relative L2 error of the intensity over a window.
@@ -86,7 +88,11 @@ class Converging(ReadOnlyArrays):
         return VectorFocus(intensity, scalar, window.dx, pure, parts, window.centre, self.stokes, plan, self)
 
     def _aplanatic(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        """Return the field behind an aplanatic lens, which is defined as a sum of plane waves."""
+        """Return the field behind an aplanatic lens, which is defined as a sum of plane waves.
+
+        Raises:
+            AccuracyError: the window is too wide, or the tolerance too small.
+        """
         rule = VectorSum(self.beam, window, True)
         if (nodes := rule.nodes) > MOST_NODES:
             far = f"{window.own_half_diagonal:.3g} m from the image"
@@ -128,6 +134,9 @@ class Converging(ReadOnlyArrays):
         """Return the field from Smythe's integral. All components use the samples that suit the scalar field.
 
         If a check shows that other components need more samples, all are computed again with a smaller tolerance.
+
+        Raises:
+            AccuracyError: the check also fails for the smaller tolerance, or no method meets it.
         """
         for tolerance in (self.tolerance, self.tolerance / FINER):
             found, plan = self._smythe(window, tolerance)

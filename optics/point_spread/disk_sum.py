@@ -100,7 +100,11 @@ def _kernel(dx: float, cutoff: float) -> SoftEdge:
 
 
 def _around(light: VectorFocus, towards: Converging, middle: tuple[float, float], radius: float) -> VectorFocus:
-    """Return light whose samples are fine enough and extend beyond the disk by the reach of the kernel."""
+    """Return light whose samples are fine enough and extend beyond the disk by the reach of the kernel.
+
+    Raises:
+        AccuracyError: too many samples are needed, or they cannot be computed.
+    """
     pitch, cutoff = FINE / towards.cutoff, towards.cutoff
     if light.dx <= pitch and radius + _kernel(light.dx, cutoff).reach / cutoff <= _room(light, middle):
         return light

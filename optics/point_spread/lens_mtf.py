@@ -34,7 +34,7 @@ class LensMTF(ReadOnlyArrays):
     frequencies: spatial frequencies [1/m] on the image plane, (frequency,).
     tangential: contrast of patterns that vary along the direction from the axis to the image, (field, shift,
         frequency). On the axis, this is the direction y.
-    sagittal: contrast of patterns that vary along the direction perpendicular to it.
+    sagittal: contrast of patterns that vary perpendicular to this direction.
     predicted_error: predicted error of any contrast, (field, shift).
     """
 
@@ -123,6 +123,10 @@ def _otf(
     """Return Σ parts · OTF at frequencies f (2, n) [1/m], complex (n,), and the predicted error of the sum.
 
     pupils, parts: exit pupil and weight for each wavelength.
+
+    Raises:
+        ValueError: a frequency is beyond the cutoff of the lens.
+        AccuracyError: see `lens_mtf`.
     """
     total, error, highest = np.zeros(f.shape[1], complex), 0.0, float(np.hypot(*f).max())
     for pupil, wavelength, part in zip(pupils, wavelengths, parts, strict=True):

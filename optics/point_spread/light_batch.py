@@ -27,7 +27,7 @@ class LightBatch:
 
     pupils: the pupils.
     distances: pairs of the sensor's and the source's distance [m].
-    angle: direction (x, y) [rad] of the source.
+    angle: direction (x, y) [rad] in which the light travels.
     """
 
     pupils: tuple[Pupil, ...]

@@ -190,7 +190,11 @@ class MTF(ReadOnlyArrays):
         return (to_user(found), self._radial_errors(f) + unsure) if with_error else to_user(found)
 
     def _over_orientations(self, f: np.ndarray) -> tuple[Array, np.ndarray]:
-        """Return the mean contrast over all orientations, and its error, (wavelength, frequency)."""
+        """Return the mean contrast over all orientations, and its error, (wavelength, frequency).
+
+        Raises:
+            AccuracyError: see `profile`.
+        """
         found, n = self._mean(f, ORIENTATIONS, 0.0), ORIENTATIONS
         allowed = np.maximum(self.predicted_error, FINEST)[:, None]
         while n < MOST_ORIENTATIONS:

@@ -65,9 +65,12 @@ class _Attempt:
 
     @classmethod
     def at(cls, request: Request, planned: tuple[Plan, Sampling]) -> _Attempt:
-        """Return the PSF by the planned method, or by an exact method if the planned one cannot compute derivatives.
+        """Return the PSF by the planned method. If "auto" chose one without derivatives, an exact method replaces it.
 
         Dr.Jit only records the computation here, and executes it when the PSF is first read.
+
+        Raises:
+            NoDerivativesError: the user requested a method that has no derivatives on the selected device.
         """
         import drjit as dr
 

@@ -37,8 +37,8 @@ def psf(
 ) -> PSFResult:
     """Return the PSF |U|² / (pupil area) of a pupil. U is the field on the sensor for incident light of amplitude 1.
 
-    wavelengths: one or several wavelengths [m] in vacuum. With eight or more, the plan of the first is used for all,
-        provided that it is accurate enough.
+    wavelengths: one or several wavelengths [m] in vacuum. With eight or more, each wavelength uses the method of the
+        preceding one, unless this method is then too inaccurate or much slower.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         images the source, or 240 µm without such a lens.
     source_distance, source_angle: distance [m] of the source, and direction (x, y) [rad] of its light, see PointSource.
@@ -46,11 +46,11 @@ def psf(
     tolerance: relative L2 error of the intensity over the window, 1e-12 to 0.5.
     method: "auto", "exact" (no approximations), or one of planner.METHODS. If an approximation is requested by name, it
         runs regardless of its error. The tolerance then applies only to its sampling, and the plan states the error.
-        The samples of "pinhole", "geometric" and "perfect_lens" are means over squares of side dx. "auto" may choose
-        these methods (`PSFResult.holds_cells`). The samples of all other methods are values at points.
+        The samples of "geometric", which "auto" may choose, and of "pinhole" are means over squares of side dx
+        (`PSFResult.holds_cells`). The samples of all other methods are values at points.
     dtype: "float32" or "float64".
-    field: True to return the complex amplitude U/√(pupil area) as well (`PSFResult.field`). Only methods that compute
-        it are then compared; it takes no additional time.
+    field: True to return the complex amplitude U/√(pupil area) as well (`PSFResult.field`). This takes no additional
+        time, but only methods that compute the amplitude are compared.
 
     Both distances, the angle and all parameters of the pupil may be Dr.Jit arrays that carry derivatives: see
     PSFResult.tensor. For tensors of PyTorch, use `optics.torch.psf`.
@@ -88,7 +88,7 @@ def plan(
 ) -> Plan:
     """Return the plan of `psf` at one wavelength without computing the PSF. Arguments and errors: see `psf`.
 
-    `psf` compares its result with the direct sum. Its plan can therefore state another error or method.
+    `psf` compares its result with the direct sum. The plan of the result can therefore state another error or method.
     """
     source = PointSource(source_distance, source_angle)
     at = sensor_place(of_kind("pupil", pupil, Pupil, "Pupil(25e-6)"), sensor_distance, source.distance)

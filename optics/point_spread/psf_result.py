@@ -49,7 +49,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
         that arrives there; evanescent light, for example, does not. The PSF is never renormalised.
     plans: one plan per wavelength; `plan` is the least accurate one.
-    requests: one per wavelength, also of a mean; measures recompute the PSF from them (empty for PSFs not from `psf`).
+    requests: one per wavelength, or per component of a mean. Measures recompute the PSF from them. Empty: unknown.
     shares: weight of each request in a mean over wavelengths (see `mean`), (request,). None: it is not a mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
         derivatives; None unless `psf` was called with field=True. The amplitude [1/m] has the carrier exp(ikz), and its
@@ -248,7 +248,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
         """Return a PSF for sums, whose samples are at most `coarsest` [m] apart.
 
-        It is `of_all_light` if its samples are fine enough. Otherwise each sample is divided into several equal ones.
+        It is `of_all_light` if samples are fine enough or means over cells. Otherwise, each sample is divided.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -280,7 +280,7 @@ def _through(request: Request, window: Grid) -> Request:
 def spread(requests: Sequence[Request]) -> PSFResult:
     """Return PSFs of one pupil at several wavelengths over one window.
 
-    For at least MANY wavelengths, the plan of the first one is used for all if it is accurate enough.
+    For at least MANY wavelengths, each may use the method of the preceding one, see `Request.after`.
 
     Raises:
         AccuracyError: no method meets the tolerance, or a window is so dark that rounding errors exceed it.

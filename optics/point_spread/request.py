@@ -31,7 +31,7 @@ class Request:
     beam: the light.
     problem: numbers that describe the light, the window and the tolerance.
     method: "auto", "exact" or a method's name.
-    most_seconds: time limit of the PSF.
+    most_seconds: time limit of the PSF [s].
     keeps_field: True to return the complex amplitude as well.
     like: a plan whose method is tried before all methods are compared.
     """
@@ -44,7 +44,10 @@ class Request:
     like: Plan | None = None
 
     def after(self, other: Request, plan: Plan) -> Request:
-        """Return this request with the plan of another request that differs only in wavelength and samples.
+        """Return this request with another request's plan as `like`, if the two differ only in wavelength and window.
+
+        The request is returned unchanged if they differ otherwise, if a method was requested by name, or if the plan's
+        method is an approximation.
 
         A method that is suitable for one wavelength is usually suitable for the next. Trying it first saves the
         comparison of methods, which takes as long as a small PSF.

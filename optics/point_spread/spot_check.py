@@ -180,9 +180,10 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
 def exact_psf(
     beam: Beam, problem: Problem, x: np.ndarray, y: np.ndarray, bright: float, seconds: float
 ) -> tuple[np.ndarray, float] | None:
-    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error where it is `bright` [1/m²].
+    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error at the value `bright` [1/m²].
 
-    The result is None if the sum would take longer than a check of a PSF that takes `seconds`.
+    The result is None if the problem has a `reach`, or if the sum would take longer than a check of a PSF that takes
+    `seconds`.
     """
     darkness = _darkness(beam, problem, bright)
     reference = _affordable(beam, problem, darkness, seconds)

@@ -110,7 +110,11 @@ class Peak(NamedTuple):
 
 
 def _peak(result: PSFResult) -> Peak:
-    """Return the highest value near the brightest sample of a PSF of one wavelength, or of a mean."""
+    """Return the highest value near the brightest sample of a PSF of one wavelength, or of a mean.
+
+    Raises:
+        AccuracyError: the value lies outside the window, or the necessary samples cannot be computed.
+    """
     fine = AT_A_PEAK / float(result.cutoff[0])
     image, wanted = result.psf[0], "the Strehl ratio"
     if result.holds_cells or (min(image.shape) > 2 and result.dx <= fine and not _at_rim(image)):

@@ -114,7 +114,11 @@ def _check_aplanatic(beam: Beam) -> None:
 
 
 def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Return Jones vectors (part, 2) of parts that do not interfere, and the Stokes parameters divided by the first."""
+    """Return Jones vectors (part, 2) of parts that do not interfere, and the Stokes parameters divided by the first.
+
+    Raises:
+        ValueError: `polarization` is neither a Jones vector nor Stokes parameters.
+    """
     polarization = full_precision("polarization", without_derivative("polarization", polarization))
     try:
         given = np.asarray((1, 0, 0, 0) if polarization is None else polarization, dtype=complex)

@@ -162,8 +162,7 @@ def white_psf(
     light: name of an illuminant, a Spectrum, or spectral power as a function of wavelengths [m].
     receptors: receptor types, see `optics.receptors_of`. Results are in the order of the types.
     waves: number of wavelengths over the receptors' range: odd, 5 to 513, or "auto" for the fewest that meet the
-        tolerance. Cubic splines interpolate PSFs between the wavelengths. The plan of the first wavelength is used for
-        all, provided that it is accurate enough.
+        tolerance. Cubic splines interpolate PSFs between the wavelengths.
     tolerance: relative L2 error over the window, for PSFs and spectrum together.
     asked: further arguments of `optics.psf`, apart from wavelengths.
 
@@ -208,7 +207,11 @@ def _weighed(result: PSFResult, catches: np.ndarray, ends: tuple[float, float]) 
 
 
 def _quantum_catch(light: Any, kinds: Any) -> np.ndarray:
-    """Return the normalised quantum catch of each type at steps of 1 nm, (type, nm)."""
+    """Return the normalised quantum catch of each type at steps of 1 nm, (type, nm).
+
+    Raises:
+        ValueError: the light is invalid, or a type does not absorb it.
+    """
     source = illuminant(light) if isinstance(light, str) else light
     if not isinstance(source, Spectrum) and not callable(source):
         raise ValueError(f"light = {shown(light)}: must be an illuminant's name, a Spectrum or a function of λ [m]")

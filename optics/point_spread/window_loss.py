@@ -40,7 +40,7 @@ class ErrorCauses(ReadOnlyArrays):
 
     @property
     def total(self) -> np.ndarray:
-        """Return the largest error of any contrast."""
+        """Largest error of any contrast, (wavelength,)."""
         found: np.ndarray = self.lost + self.rest
         return found
 

@@ -212,7 +212,7 @@ def sags(sines: np.ndarray) -> np.ndarray:
 
 
 def slowness(sine: float) -> float:
-    """Return 1 - c = (1 - cos θ)/2 from sin θ, where exp(ikcζ) is the carrier of light at the angle θ."""
+    """Return 1 - c = (1 - cos θ)/2 from sin θ. c belongs to the carrier exp(ikcζ), see the module."""
     return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 

@@ -66,6 +66,7 @@ class PupilSampling:
             frequencies are then part of the pupil's phase.
 
         Raises:
+            ValueError: the pupil has a relief of pixels.
             AccuracyError: more samples are necessary than the limit allows.
         """
         pupil = stop.pupil

@@ -86,7 +86,7 @@ class SeparableSampling:
         return max(self.source.shape)
 
     def seconds(self, real: str, planes: int = 1) -> float:
-        """Return the predicted time of the propagation of planes, including the matrices.
+        """Return the predicted time [s] of the propagation of planes, including the matrices.
 
         real: type of real and imaginary parts, "float32" or "float64".
         """
@@ -122,9 +122,9 @@ class SeparableSampling:
 def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> SeparableSampling | None:
     """Return a sampling of the separable kernel whose predicted error of the intensity is at most `allowed`.
 
-    The result is None if transforms are requested or more than MOST_TERMS terms are necessary. It is also None if the
-    samples of the source represent too few of the frequencies that reach the window, or if light is to be removed that
-    could reach the window.
+    The result is None if transforms are requested, z is 0, a plane has more than MOST_SAMPLES samples along a side, or
+    more than MOST_TERMS terms are necessary. It is also None if the samples of the source represent too few of the
+    frequencies that reach the window, or if light is to be removed that could reach the window.
     """
     largest = max(*source.shape, *window.shape)
     if passage.z == 0 or passage.by_transforms or passage.limit is not None or largest > MOST_SAMPLES:

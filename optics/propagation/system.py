@@ -53,8 +53,8 @@ def propagate_through(
     wavelength: wavelength [m] in vacuum.
     out_dx, out_shape: pitch [m] and shape (y, x) of the output. By default, they equal those of u. They are required if
         u is None.
-    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u. For its
-        smallest value and dtype, see `optics.propagate`.
+    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u. For the
+        smallest tolerance and for dtype, see `optics.propagate`.
     backward: True if u is the field behind the last element, which is propagated back to the plane in front of the
         first element. Propagation and phases are reversed. Light that apertures blocked or that decayed is not
         restored.

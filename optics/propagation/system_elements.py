@@ -48,7 +48,7 @@ def light_in_front(
     """Return the field in front of the first stop, the output window, and the modulus of the field's brightest sample.
 
     The field is None if a source illuminates the first pupil. Otherwise it is divided by this modulus, because float32
-    cannot represent the power of every field.
+    cannot represent the power of every field. A ValueError names an invalid argument.
     """
     if u is None:
         if out_dx is None or out_shape is None:
@@ -69,7 +69,7 @@ def light_in_front(
 def stops_of(elements: Sequence[Element], backward: bool, window: Grid) -> list[Stop]:
     """Return the stops: the pupils, each with the distance in front of it, and the output window as the last stop.
 
-    Distances of adjacent elements of free space are added, which is exact.
+    Distances of adjacent elements of free space are added, which is exact. Pupils that touch raise a ValueError.
     """
     if not elements:
         raise ValueError("elements is empty: must hold at least one Pupil or FreeSpace")

@@ -202,6 +202,10 @@ class TransferFunction:
 class Passage:
     """Parameters of a transfer function: the passage of light from one plane to another.
 
+    wavelength: wavelength [m] in the medium.
+    z: distance [m] between the planes, negative for backward propagation.
+    paraxial: True for Fresnel's approximation.
+    band: band of the light that can reach the window.
     centre: position (x, y) [m] of the window.
     ripple: fraction of the light that remains beyond a fade.
     limit: band beyond which light is removed although it could reach the window; None if there is no limit.
@@ -220,7 +224,7 @@ class Passage:
     by_transforms: bool = False
 
     def over(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> TransferFunction:
-        """Return the transfer function at frequencies fx (column), fy (row) [1/m]."""
+        """Return the transfer function at the frequencies fx of the columns and fy of the rows [1/m]."""
         grazing = None
         if math.isinf(self.band.kept) and self.z != 0 and not self.paraxial:
             sine = np.hypot(fx[None, :], fy[:, None]) * self.wavelength

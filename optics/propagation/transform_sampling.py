@@ -83,7 +83,7 @@ class TransformSampling:
         return float(round(period)) if abs(period - round(period)) <= SAME_PITCH else period
 
     def seconds(self, real: str, planes: int = 1) -> float:
-        """Return the predicted time of the propagation of planes, including the transfer function.
+        """Return the predicted time [s] of the propagation of planes, including the transfer function.
 
         real: type of real and imaginary parts, "float32" or "float64".
         """
@@ -234,8 +234,8 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of the power |U|² at the Nyquist frequency along one axis that comes back into the window.
 
-    There is one weight per frequency along the other axis, (frequency,). It follows from the fraction of eq. (2) above.
-    The sum over samples U = Σ u e^{-2πi...} equals S/dx, so this fraction times dx² |U|² is the power ∫|b|² dx.
+    There is one weight per frequency along the other axis, (frequency,). It follows from the fraction of eq. (2) of the
+    module. The sum over samples U = Σ u e^{-2πi...} equals S/dx, so this fraction times dx² |U|² is the power ∫|b|² dx.
     Division by dx gives the sum over samples along the axis. By Parseval's theorem, the factor 1/period gives the sum
     along the other axis. The two ends ±f_N of the spectrum contribute a factor of 2.
     """

@@ -29,8 +29,8 @@ class SpectralBands(ReadOnlyArrays):
 
     wavelengths: centres of the bands [m], (band,).
     weights: (channel, band). For every channel c, Σ_b weights[c, b] daylight(wavelengths[b]) = 1, so that the signal of
-        a white surface in unit daylight is 1.
-    white_catch: quantum catch from a white surface in unit daylight, before the weights are normalised, (channel,): ∫
+        a white surface is 1 in `daylight`, which is 1 at 560 nm.
+    white_catch: quantum catch from a white surface in `daylight`, before the weights are normalised, (channel,): ∫
         daylight(λ) λ S_c(λ) dλ [m²]. S_c is the pigment's quantal sensitivity, with a peak of 1.
     """
 

@@ -29,7 +29,7 @@ def optical_sensitivity(
         P = 1 - exp(-k l)       for light at the pigment's peak (Land, Handbook of Sensory Physiology VII/6B, 1981).
 
     Pass S to `PhotonBudget.photons` as the etendue. That method applies the pigment's spectrum and the quantum
-    efficiency. For this purpose, omit the length unless the efficiency describes only the losses in front of the
+    efficiency. For this purpose, omit the length if the quantum efficiency already includes the absorption in the
     receptor.
 
     diameter: diameter D [m] of the pupil or facet.

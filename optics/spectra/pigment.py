@@ -70,12 +70,13 @@ CHROMOPHORES = {
 
 
 def pigment_absorptance(wavelengths: np.ndarray, lambda_max: float, chromophore: str = "A1") -> np.ndarray:
-    """Return the quantal sensitivity of a visual pigment at `wavelengths` [m].
+    """Return the quantal sensitivity of a visual pigment at `wavelengths` [m], an array of any shape.
 
     It is the sum of the α band, with a peak of 1 at `lambda_max` [m], and the β band.
 
     Raises:
-        ValueError: lambda_max is outside 330-700 nm, or the chromophore is neither "A1" nor "A2".
+        ValueError: lambda_max is outside 330-700 nm, the chromophore is neither "A1" nor "A2", or a wavelength is not
+            positive or is above 1 m.
     """
     t = CHROMOPHORES[one_of("chromophore", chromophore, CHROMOPHORES)]
     peak = in_range("lambda_max", lambda_max, LAMBDA_MAX_NM[0] * 1e-9, LAMBDA_MAX_NM[1] * 1e-9) * 1e9

@@ -31,7 +31,7 @@ class ReceptorDynamics:
         J. Solid-State Circuits 43:566). None: no events
     motion: elementary motion detectors between neighbours in a row. Their outputs are channels that follow those of the
         receptors. a is the left receptor, b is the right one, and D is a low-pass filter. "hassenstein_reichardt"
-        (1956): D(a) b - a D(b). "barlow_levick" (1965): max(a - D(b), 0) - max(b - D(a), 0). With these, an object that
+        (1956): D(a) b - a D(b). "barlow_levick" (1965): max(a - D(b), 0) - max(b - D(a), 0). Here an object that
         moves in the null direction reaches the inhibiting neighbour first. "none": no detectors. Motion to the right
         gives positive output
     motion_ms: time constant of D [ms]

@@ -101,7 +101,10 @@ def _spectrum(nm: np.ndarray, values: np.ndarray) -> Spectrum:
 
 @lru_cache(maxsize=6)
 def _table(name: str) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return names and values (column, wavelength) of the columns of a CSV file. The first is wavelengths [nm]."""
+    """Return the names of all columns of a CSV file but the first, and all values (column, wavelength).
+
+    The first column is wavelengths [nm].
+    """
     with resources.files("optics.spectra").joinpath("data", name).open() as file:
         names = tuple(file.readline().strip().split(","))
         return names[1:], np.loadtxt(file, delimiter=",").T
@@ -126,6 +129,9 @@ def cie_1931(wavelengths: np.ndarray) -> np.ndarray:
     """Return the CIE 1931 2° colour matching functions x̄, ȳ, z̄, (wavelength, 3).
 
     wavelengths: wavelengths [m] in 300-780 nm. The functions are 0 below 360 nm.
+
+    Raises:
+        ValueError: a wavelength is outside its range.
     """
     table = _table("colour_tables.csv")[1]
     nm = _nanometres(wavelengths)

@@ -15,7 +15,7 @@ eyes_of_kind           signals of one kind of an agent's eyes
 frame_choice           number of frames per action for receptors with dynamics
 renderers              renderers of all eyes
 observation            memory of past frames
-ommatidia_space        space of the signals of a compound eye
+ommatidia_space        observation space of the signals of a compound eye
 auxiliary              depth, geom ids and optic flow in observations
 held_state             checks of stored states
 calls                  checks of the calls of all environments: their order, seeds and actions

@@ -20,7 +20,11 @@ Pending = list[dict[str, PendingFrame]]  # for each agent with eyes: frames by k
 
 @dataclass(frozen=True)
 class Advanced:
-    """The outcome of an action, and frames that are still being rendered."""
+    """The outcome of an action, and frames that are still being rendered.
+
+    step: outcome of the action
+    pending: frames after the action, for each agent in `Animals.seeing`
+    """
 
     step: Step
     pending: Pending
@@ -102,7 +106,7 @@ class Animals:
         worlds: indices of the worlds
 
         Raises:
-            RuntimeError: a method of the task fails, or the task changes the model of all worlds.
+            RuntimeError: a method of a `sim.Task` fails, or the task changes the model of all worlds.
         """
         self.simulation.restart(worlds)
         for senses in self.seeing:
@@ -176,10 +180,10 @@ def _put(seen: Sequence[Arrays], worlds: np.ndarray, fresh: Sequence[Arrays]) ->
 
 
 def _require_fit(other: Frozen, senses: Senses) -> None:
-    """Compare the observation space of a frozen policy, if it has one, with the observations of its task.
+    """Check that a frozen policy fits the observations of its animal. A policy without observation space is accepted.
 
     Raises:
-        ValueError: the two have different entries, or entries of different shapes.
+        ValueError: the policy's observation space has other entries, or entries of other shapes.
     """
     learnt = getattr(other.policy, "observation_space", None)
     if learnt is None:

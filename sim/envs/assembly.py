@@ -94,7 +94,8 @@ def make_vec_env(
     fidelity: a complete `sim.Fidelity` instead of rays_per_receptor, or "auto", which has the same meaning as
         rays_per_receptor="auto". A `sim.Fidelity` may also be passed as rays_per_receptor.
     world_seed, mazes, course, layouts, wall_height: the layout that all worlds share, see `sim.build_world`
-    least_return: in training, an episode is truncated once its rewards sum to this value or less, below 0; None: never
+    least_return: a negative number. In training, an episode is truncated once the sum of its rewards is at most this
+        number. None: never
     episode_steps: number of actions after which an episode is truncated, 1 or more; None: the task's default
     spectra: spectra of materials and lights by name, used instead of their colours: see `sim.build_world`
     medium: water or air between surfaces and eyes: see `sim.build_world`
@@ -106,8 +107,8 @@ def make_vec_env(
         behind, with the fields of view of its eyes; "eyes": the signals of all eyes, side by side; None: no images
 
     Physics uses the same number of threads as Dr.Jit, but at most one for each world. drjit.set_thread_count limits
-    both. A FidelityWarning reports a fidelity that is less accurate than allowed, and a MirrorWarning features of the
-    model that are not rendered.
+    both. A FidelityWarning states that the fidelity is less accurate than allowed. A MirrorWarning lists features of
+    the model that are not rendered.
 
     Raises:
         ValueError: an argument is invalid, or has no effect for this task.
@@ -171,7 +172,7 @@ def make_parallel_env(
 
 
 def refuse(options: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
-    """Raise a ValueError for an option that must be left out; `reasons` contains their names, each with the reason."""
+    """Raise a ValueError if `options` contains a name that is in `reasons`, which states why it must be left out."""
     for name, why in reasons.items():
         if name in options:
             raise ValueError(f"{name} = {shown(options[name])}: must be left out, {why}")

@@ -30,8 +30,8 @@ class Auxiliary:
             visible
         ids: id of the visible geom, (eye, height, width) int32; -1 if nothing is visible
         flow: motion of the visible point on the retina since the last observation, to the right and down [receptors],
-            (eye, 2, height, width) float32. The flow is 0 in the first observation of an episode, if nothing is
-            visible, and if the visible point was not in front of the eye at the last observation.
+            (eye, 2, height, width) float32. The flow is 0 in three cases: in the first observation of an episode, if
+            nothing is visible, and if the visible point was not in front of the eye at the last observation.
     """
 
     def __init__(self, renderer: Labels, names: Sequence[str], prefix: str = "") -> None:
@@ -70,7 +70,7 @@ class Auxiliary:
         Points are followed from their present positions back to the previous poses. The flow is the negative of this
         motion.
 
-        depth, ids: what the centre of each receptor sees, see `flow_between`
+        depth, ids: depth and geom id of the point that is visible at the centre of each receptor, see `flow_between`
         """
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)

@@ -25,7 +25,8 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     The function checks the following:
 
     - The task's settings are valid.
-    - All arrays that its methods return have the right shapes, finite numbers and valid indices of worlds.
+    - All arrays that its methods return have the right shapes, and `proprioception` and the outcome of an overridden
+      `judge` contain finite numbers. (If `rewards` returns NaN, only the episode of this world ends.)
     - `reset` changes only the worlds that it was given.
     - A world's episode depends neither on other worlds nor on their number.
     - The same seed leads to the same episode.

@@ -1,7 +1,7 @@
 """Checks of the calls of an environment: their order, their seeds and their actions. All environments share them.
 
-An action that is not finite has two consequences. In a batch, it ends the episode of its world, so that the other
-worlds continue (`sim.tasks.simulation`). An environment of one world has no other worlds to protect, and refuses it.
+A batch accepts an action that is not finite: the action ends the episode of its world, and the other worlds continue
+(`sim.tasks.simulation`). An environment of one world refuses such an action with a ValueError.
 """
 
 from __future__ import annotations

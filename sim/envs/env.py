@@ -26,7 +26,8 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         episode_steps, spectra, medium, vary, auxiliary, render_mode: see `sim.make_vec_env`
 
     Raises:
-        ValueError: an argument is invalid, or is `seed` or `n_envs`.
+        ValueError: an argument is invalid, or `seed` or `n_envs` was given.
+        TypeError: `sim.make_vec_env` has no argument of this name.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
         RuntimeError: a method of a `sim.Task` fails at the start of the first episode. An exception of a
@@ -87,8 +88,8 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         `sim.BatchTask` is raised unchanged.
 
         Raises:
-            ValueError: the action is not real, finite numbers of the right shape, or it is masked; or a `sim.BatchTask`
-                returns an invalid array.
+            ValueError: the action has another shape, is masked, or does not consist of real, finite numbers; or a
+                `sim.BatchTask` returns an invalid array.
             RuntimeError: there has been no reset yet, or `close` has been called.
         """
         observation, reward, terminated, truncated, info = self._batch.step_once(action)

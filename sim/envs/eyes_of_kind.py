@@ -105,7 +105,12 @@ class EyesOfKind:
         return signals if self._shot is None else self._shot(signals, self._normals.launch(worlds).wait())
 
     def _normals_of(self, worlds: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return normal numbers of this shape for the noise of these worlds; motion detectors add no noise."""
+        """Return normally distributed numbers of this shape for the noise.
+
+        They are 0 for the outputs of motion detectors, to which no noise is added.
+
+        worlds: indices of the worlds, which determine the random generators
+        """
         drawn = self._normals.launch(worlds).wait()
         return np.concatenate([drawn, np.zeros_like(drawn)], axis=2) if drawn.shape != shape else drawn
 
@@ -138,7 +143,7 @@ class EyesOfKind:
     def _brightest(self) -> float:
         """Return the signal of a white surface that faces all directional lights at once.
 
-        If light varies, the surface is in the brightest light that can be drawn.
+        If light varies, this is the largest signal at the ends of its ranges (`Variation.extremes`).
         """
         variation = self._simulation.variation
         if variation is None or not variation.of_light:

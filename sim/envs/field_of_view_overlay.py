@@ -57,8 +57,8 @@ class _Field:
     pixels, depth: as in _Level, (n,)
     opacity: opacity of the overlay, (n,)
     distance: distance of the pixel's point from the eye [m], (n,)
-    ray: index of the nearest of the fan's rays to the right of the pixel's point, (n,)
-    share: angular position of the point between this ray, at 0, and the next ray, at 1, (n,)
+    ray: index of the fan's ray that is next to the pixel's point on its right, (n,)
+    share: angular position of the point between this ray (0) and the next ray to the left (1), (n,)
     """
 
     pixels: np.ndarray
@@ -111,8 +111,9 @@ class FieldsOfView:
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         """Return the image (y, x, 3) uint8 with the visible part of every eye's field of view drawn into it.
 
+        picture: image from the camera, (y, x, 3) uint8; it is not changed
         nearness: function that returns 1 / depth of the surfaces in the image, see `Nearness`
-        data: MuJoCo's data with the current poses
+        model, data: MuJoCo's model of the world, and its data with the current poses
         """
         shown = picture.reshape(-1, 3).copy()
         heading = float(data.joint("agent_heading").qpos[0])

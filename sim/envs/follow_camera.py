@@ -47,7 +47,7 @@ class FollowCamera:
         number of rays per pixel at eight wavelengths. They take twenty to fifty times as long.
 
     Raises:
-        ValueError: samples is below 1.
+        ValueError: `samples` is neither None nor a whole number of at least 1.
     """
 
     def __init__(self, world: World, eyes: Eyes | None = None, samples: int | None = None) -> None:

@@ -1,7 +1,7 @@
 """Choice of the number of frames per action that receptors with dynamics need for correct motion blur.
 
 A few random actions are simulated. For each number of frames, the responses at the end of each action are compared with
-the responses to the largest possible number, up to one frame per physics step.
+the responses to the largest number that is tried: at most FINEST, and at most one frame per physics step.
 """
 
 from __future__ import annotations
@@ -37,10 +37,11 @@ def dynamics_of(eye: Any) -> Any:
 def with_frames(
     task: BatchTask, fidelities: Sequence[Fidelities | None], scenes: Mapping[str, WorldScene] | None
 ) -> list[Fidelities | None]:
-    """Return the fidelities with `frames` set for all eyes whose receptors have dynamics.
+    """Return the fidelities with the number of frames per action (`frames`) that receptors with dynamics need.
 
-    The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify it. Otherwise it
-    is the smallest number for which the errors of all signals are acceptable.
+    The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify the number.
+    Otherwise it is the smallest number for which the errors of all signals are acceptable. If no eyes have receptors
+    with dynamics, the fidelities are returned unchanged.
 
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
     scenes: see `renderers_for`

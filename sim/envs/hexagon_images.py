@@ -18,12 +18,14 @@ ALONE = 0.05  # choice: radius [rad] of the hexagon of a single ommatidium
 
 
 def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
-    """Return an sRGB image (y, x, 3) uint8 of a frame of signals (ommatidium, channel), with one map per mount.
+    """Return an sRGB image (y, x, 3) uint8 of the signals of a compound eye, with one map per mount.
 
     Each map is Hammer's equal-area projection of the sphere: ahead is in the middle, left is on the left, and up is at
-    the top. It shows the part of the sphere that has ommatidia. A pixel has the colour of the ommatidium with the
+    the top. A map shows the part of the sphere that has ommatidia. A pixel has the colour of the ommatidium with the
     nearest direction, which gives hexagons on a hexagonal lattice. Colours show receptor types as for other eyes
     (`retina_images.side_by_side`), and white in full daylight is white.
+
+    frame: signals of the ommatidia of all mounts, one mount after the other, (ommatidium, channel)
     """
     linear = np.einsum("enc,nck->enk", frame.reshape(-1, len(eye), frame.shape[-1]), _palette(eye))
     colours = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)

@@ -23,7 +23,9 @@ class OneEnvironment(VecEnv):
         )
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seed all random streams at the next reset. World i uses streams derived from (seed, i).
+        """Seed all random streams at the next reset, and return the seed of each world.
+
+        World i uses streams derived from (seed, i). If the seed is None, the random numbers continue.
 
         Raises:
             ValueError: the seed is neither a whole number of at least 0 nor None.
@@ -38,7 +40,7 @@ class OneEnvironment(VecEnv):
         environment, so it handles the mode "eyes" itself.
 
         Raises:
-            RuntimeError: there has been no reset yet.
+            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
         """
         if self.render_mode == "eyes" and mode in (None, "eyes"):
             return tile_images(self.get_images())

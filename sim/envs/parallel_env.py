@@ -86,7 +86,8 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         Steps after the end of an episode have no effect, and return empty dictionaries.
 
         Raises:
-            ValueError: an action is missing, belongs to an unknown animal, has the wrong shape, or is not finite.
+            ValueError: an action is missing, belongs to an unknown animal, has the wrong shape, or does not consist of
+                finite numbers.
             RuntimeError: there has been no reset yet, or `close` has been called.
         """
         self._calls.require_begun()

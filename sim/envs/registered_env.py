@@ -27,7 +27,7 @@ class RegisteredEnv(EyesEnv):
     Further errors are those of `EyesEnv`.
 
     Raises:
-        ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.
+        ValueError: an argument is invalid, or `episode_steps` was given, which Gymnasium calls `max_episode_steps`.
     """
 
     def __init__(self, task: str | Task | type[Task], *args: Any, **options: Any) -> None:
@@ -41,7 +41,7 @@ class RegisteredVectorEnv(EyesVectorEnv):
     `EyesVectorEnv`.
 
     Raises:
-        ValueError: an argument is invalid, or is `episode_steps`, which Gymnasium calls `max_episode_steps`.
+        ValueError: an argument is invalid, or `episode_steps` was given, which Gymnasium calls `max_episode_steps`.
     """
 
     def __init__(

@@ -76,7 +76,7 @@ def _of_agent(
 def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:
     """Return the simulation's model as a scene for one kind of eyes.
 
-    If the fidelity's samples are rays, Mitsuba traces them.
+    Mitsuba traces all rays. Closed forms are used only for area sampling.
     """
     task, physics = simulation.task, simulation.physics
     return PreparedScene(

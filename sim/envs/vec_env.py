@@ -31,11 +31,10 @@ class EyesVecEnv(OneEnvironment):
     documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
     observation is then the first observation of the new episode, and info["terminal_observation"] is the last
     observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
-    episodes depend only on the seed and on the world's index, not on the number of worlds.
+    episodes depend only on the seed and on the world's index. Exceptions of a `sim.BatchTask` are raised unchanged.
 
     simulation, renderers: the worlds, and renderers of every agent's eyes
-    memory: number of frames in an observation
-    render_mode: "rgb_array", "eyes" or None
+    memory, render_mode: see `sim.make_vec_env`
     failures: number of episodes that ended because of a failure, by reason
 
     Raises:
@@ -95,7 +94,7 @@ class EyesVecEnv(OneEnvironment):
         """Start an episode in every world; return the first observations.
 
         Raises:
-            RuntimeError: the environment is closed, an action is pending, or a method of a user task fails.
+            RuntimeError: the environment is closed, an action is pending, or a method of a `sim.Task` fails.
         """
         self._calls.start_reset()
         if self._seeds[0] is not None:
@@ -114,8 +113,8 @@ class EyesVecEnv(OneEnvironment):
         An episode is then the same as in a single environment with this seed.
 
         Raises:
-            ValueError: there is not one seed per world, or a seed is neither a whole number of at least 0 nor None.
-            RuntimeError: the environment is closed, or an action is pending.
+            ValueError: there is not one seed per world, or one is neither None nor a whole number of at least 0.
+            RuntimeError: `close` has been called, or an action is pending.
         """
         self._calls.require_open()
         own = self.simulation.streams.episodes
@@ -139,10 +138,10 @@ class EyesVecEnv(OneEnvironment):
     def step_once(self, action: np.ndarray) -> tuple[Arrays, np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Take one action in the only world, without restarting it if its episode ends.
 
-        Returns observation, reward, terminated, truncated, info, all as batches of one.
+        Return the observation, reward, terminated, truncated and info, all as batches of one.
 
         Raises:
-            ValueError: the action is not finite, or `step_async` would refuse it.
+            ValueError: the action is not finite, `step_async` would refuse it, or an array of the task is invalid.
             RuntimeError: there has been no reset yet, `close` has been called, or an action is pending.
         """
         self._calls.require_begun()
@@ -157,7 +156,8 @@ class EyesVecEnv(OneEnvironment):
         """Take the actions of `step_async`; return the observations, rewards, ends of episodes and infos of all rows.
 
         Raises:
-            RuntimeError: no action is pending, `close` has been called, or a method fails at the start of an episode.
+            ValueError: a `sim.BatchTask` returns an invalid array.
+            RuntimeError: no action is pending, `close` was called, or a `sim.Task` fails at the start of an episode.
         """
         advanced = self._advance()
         step = advanced.step

@@ -25,17 +25,20 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     The returned observation and info are then those of the start of the new episode. info["final_obs"] and
     info["final_info"] contain the last observation and info of the old episode.
 
-    `reset` accepts one seed or, as Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, world i
-    has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.
+    `reset` accepts one seed or, like Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, world
+    i has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.
 
     num_envs: number of worlds
     task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its `alone`
     eyes, memory, mode ...: see `sim.make_vec_env`
 
     Raises:
-        ValueError: an argument is invalid, or is `seed` or `n_envs`.
+        ValueError: an argument is invalid, or `seed` or `n_envs` was given.
+        TypeError: `sim.make_vec_env` has no argument of this name.
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
-        RuntimeError: a method of a user task fails at the start of the first episode.
+        optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
+        RuntimeError: a method of a `sim.Task` fails at the start of the first episode. An exception of a
+            `sim.BatchTask` is raised unchanged.
     """
 
     metadata = {  # noqa: RUF012 (Gymnasium's own declaration)
@@ -86,7 +89,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`; None without a mode.
 
         Raises:
-            RuntimeError: there has been no reset yet.
+            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
         """
         return None if self.render_mode is None else tuple(self._batch.get_images())
 

@@ -144,7 +144,11 @@ def _pixel_bytes(header: Mapping[str, Any]) -> int:
 
 
 def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, str]]:
-    """Return the name, channels and attributes of a view's part of this kind, "spectral" or "receptors"."""
+    """Return the name, channels and attributes of a view's part of this kind, "spectral" or "receptors".
+
+    Raises:
+        ValueError: JSON cannot represent an attribute of the view.
+    """
     held: dict[str, Any] = {"attributes": dict(view.attributes)}
     attributes: dict[str, str] = {}
     if kind == "spectral":

@@ -28,15 +28,16 @@ class CompoundEye:
     """A compound eye, used like `optics.Eye` in a task. Each ommatidium is a facet lens in front of a rhabdom.
 
     Every ommatidium collects light with its acceptance function, which wave optics computes for each band
-    (`optics.acceptance_function`). Signals are normalised: a white surface in full daylight that fills the field of an
-    ommatidium gives 1. Observations have the axes (memory, ommatidium, channel). If an eye has several mounts, the
-    ommatidia of the first mount come first.
+    (`optics.acceptance_function`). Signals are normalised: if a white surface in full daylight fills the field of an
+    ommatidium, the signal is 1. Observations have the axes (memory, ommatidium, channel). If an eye has several mounts,
+    the ommatidia of the first mount come first.
 
     directions: viewing directions in the frame of the mount: unit vectors (ahead, left, up), (n, 3), or (azimuth to the
         left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The field is always
         converted to unit vectors.
-    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. An object that
-        occurs several times has its acceptance function computed once; equal objects are computed separately.
+    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. If the same object
+        occurs several times, its acceptance function is computed once. Distinct objects are computed separately, even
+        if they are equal.
     receptors: receptor types, see `optics.Eye`. Mosaics are not supported here; use `types`.
     types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). With one column, each
         ommatidium has a single receptor, as in a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7
@@ -46,7 +47,7 @@ class CompoundEye:
     photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised. A
         wide facet therefore has less shot noise than a narrow one with the same field. None: no shot noise
     rows: number of rows, if the directions are those of `sim.hexagonal_rows`. Observations then have the axes of an
-        `optics.Eye`, (memory, eye, channel, row, column). None: the directions are in no order
+        `optics.Eye`, (memory, eye, channel, row, column). None: the directions form no rows
     radius: radius [m] of the eye's surface, a sphere around the mount on which the facets lie. Facets must not overlap.
         None: all facets are at the mount, and may overlap
     spectral_bands: attribute, the bands and the weights of the receptor types in them (`optics.SpectralBands`)
@@ -124,7 +125,7 @@ class CompoundEye:
 
     @property
     def resolution(self) -> tuple[int, int]:
-        """Number of rows, and of ommatidia in a row; a single row if the directions are in no order."""
+        """Number of rows, and number of ommatidia in a row; a single row if `rows` is None."""
         return self.rows or 1, len(self) // (self.rows or 1)
 
     @property

@@ -50,8 +50,8 @@ class Eyes:
         optics.Receptors.
     photon_budget: an optics.PhotonBudget, which defines the amount of light and the integration time of the receptors.
         The resulting shot noise is added to the noise of `noise_sigma`. None: unlimited light, without shot noise.
-    waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; this requires
-        `optics`. None: each receptor receives all light that falls on its square.
+    waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; the eyes then need
+        a pupil (`optics`). None: each receptor receives all light that falls on its square.
     pupil_turned: True if the pupils are rotated by 180° about their axes
     vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170]. None: receptors are square
     dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: no memory
@@ -296,5 +296,5 @@ def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
 
 
 def camera_rotations(azimuths: np.ndarray) -> np.ndarray:
-    """Return `eye_rotations` as MuJoCo defines the frames of cameras: x to the right, y up, view along -z."""
+    """Return the frames of `eye_rotations` in MuJoCo's convention for cameras: x to the right, y up, view along -z."""
     return eye_rotations(azimuths) * np.array([1.0, 1.0, -1.0])

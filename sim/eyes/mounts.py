@@ -27,7 +27,7 @@ _AXES = {
 class Mount:
     """Position and direction of one eye on a model.
 
-    With all angles 0, the eye looks along +x of a body or site, or in the direction of a camera.
+    With all angles 0, the eye looks along the +x axis of a body or site, or in the viewing direction of a camera.
 
     on: name of a site, a camera or a body of the model
     azimuth_deg: rotation to the left, about the z axis of the object's frame (for a camera: about its upward axis)
@@ -130,8 +130,8 @@ def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
     """Return mounts in a circle around the upward axis of an object, from left to right. The eyes look outwards.
 
-    For a body or site, this is its z axis. A single eye looks ahead. `Eyes` uses the same arrangement on the built-in
-    agent.
+    The upward axis of a body or site is its z axis. A single eye looks ahead. `Eyes` uses the same arrangement on the
+    built-in agent.
 
     on: name of a body, site or camera
     n_eyes: number of eyes, 1 to 10,000

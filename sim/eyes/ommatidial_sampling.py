@@ -28,8 +28,8 @@ class OmmatidialSampling:
 
     An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
     weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. Equal
-    ommatidia share PATTERNS arrangements of rays, one of which is drawn for each ommatidium, so that the errors of
-    neighbours are nearly independent.
+    ommatidia share PATTERNS arrangements of rays. One of them is chosen at random for each ommatidium, so that the
+    errors of neighbours are nearly independent.
 
     depth: a single layer, because facets have a large depth of field
     """
@@ -107,7 +107,10 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
 
 
 def _tests(places: np.ndarray, spread: float) -> np.ndarray:
-    """Return the light of two scenes at places (place, 2): uniform, and a Gaussian of variance `spread` on the axis."""
+    """Return the light of two test scenes at places (place, 2), as an array (place, scene).
+
+    The light is uniform in the first scene, and a Gaussian of variance `spread` around the axis in the second.
+    """
     return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
 
 

@@ -48,9 +48,9 @@ class Draw:
 class ReceptiveFields:
     """Tabulated receptive fields of an eye.
 
-    field: power per cell of one receptor's field, (plane, y, x), with one plane for each band of each depth layer. It
-        is the PSF, rotated by 180° and convolved with the receptor's square. If receptors are waveguides, it is a
-        waveguide's acceptance of light from each cell.
+    field: power per cell of one receptor's field, (plane, y, x), with one plane for each band of each depth layer. A
+        plane is the PSF, rotated by 180° and convolved with the receptor's square. If receptors are waveguides, a plane
+        is a waveguide's acceptance of light from each cell.
     density: probability per cell of the mixture, which is the mean of the fields of all receptors and planes, (Y, X)
     resolution: receptors (height, width)
     cells: cells along a receptor's side
@@ -250,7 +250,7 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
     """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
 
-    field: field of every receptor, (plane, y, x) [cells]
+    field: field that all receptors share, as its power in each cell, (plane, y, x)
     resolution: rows and columns of receptors
     cells: number of cells along a receptor's side
     receptors: indices of the receptors, counted row by row

@@ -44,9 +44,9 @@ class Stretch:
         return cls(first, np.ascontiguousarray(dense.T, np.float32), _views_at_once(dense.size))
 
     def product(self, radiance: np.ndarray, views: int) -> np.ndarray:
-        """Return the signals of the first `views` views, and of views that fill up the last product.
+        """Return the signals of at least the first `views` views, (view, channel * width).
 
-        The result has the shape (view, channel * width).
+        A product contains `self.views` views, so the result includes further views if `views` is not a multiple.
 
         radiance: radiance along all rays, (view, ray); the number of views is a multiple of `self.views`
         """

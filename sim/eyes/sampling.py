@@ -131,7 +131,10 @@ class BoxSampling:
         return directions_of(self.eye, from_receptors(self.eye, points.reshape(-1, 2)))
 
     def _corners(self) -> np.ndarray:
-        """Return the upper left corner of every receptor's square, from the middle, in sides, (receptor, 1, 2)."""
+        """Return the upper left corner of every receptor's square [receptor widths and heights], (receptor, 1, 2).
+
+        The origin is in the middle of the receptors.
+        """
         height, width = self.eye.resolution
         row, column = (index.ravel() for index in np.indices((height, width)))
         return np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
@@ -230,7 +233,9 @@ def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[
     """Return the numbers of rows and columns of areas per receptor.
 
     A `per_receptor` of 1 or more is rounded to a whole number. If it is below 1, several receptors share an area, so
-    there is less than one column per receptor, and with `in_rows` also less than one row. aspect: see `parts_of`
+    there is less than one column per receptor, and with `in_rows` also less than one row.
+
+    aspect: see `parts_of`
     """
     if per_receptor >= 1:
         return parts_of(round(per_receptor), in_rows, aspect)

@@ -145,10 +145,11 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
 class OmmatidialSensor(ReadOnlyArrays):
     """Sensor of a compound eye, whose ommatidia have their own rays.
 
-    The kernel multiplies the light along each ray by the weight of the ray and sums over an ommatidium's rays. The
-    weight is the integral of the acceptance function in each band over the directions near the ray. The weights in band
-    b sum to Ω_b, the integral over all directions, relative to the mean of Ω over all bands. The signal of type t is
-    Σ_b mixing[t, b] times the sum in band b, divided by the same expression for white light.
+    The kernel multiplies the light along each ray by the weight of the ray and sums over an ommatidium's rays. Let Ω_b
+    be the integral of the acceptance function in band b over all directions. In this band, the weight of a ray is the
+    integral over the directions near the ray, divided by the mean of Ω over all bands. The weights therefore sum to
+    Ω_b / mean(Ω). The signal of type t is Σ_b mixing[t, b] times the sum in band b, divided by the same expression for
+    white light.
 
     directions, bounce_samples, rays_per_receptor: see `BoxSensor`
     facets: weights and starting points of the rays

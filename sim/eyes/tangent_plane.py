@@ -12,8 +12,8 @@ import optics
 def from_receptors(eye: optics.Eye, counted: np.ndarray) -> np.ndarray:
     """Return points of the tangent plane (x right, y down) [average receptor widths and heights], (n, 2).
 
-    counted: the same points in coordinates in which every receptor has the size 1. The two differ only if the eye's
-        receptors have a `density`.
+    counted: the same points in coordinates in which every receptor has the size 1. These coordinates differ from those
+        of the result only if the eye's receptors have a `density`.
     """
     return counted if eye.lattice is None else eye.lattice.places(counted)
 

@@ -23,8 +23,8 @@ class VariedFields(ReceptiveFields):
     """Tabulated receptive fields of receptors with a `density`.
 
     field: power per cell of the PSF, rotated by 180°, (plane, y, x)
-    density: see `ReceptiveFields`. It follows the density of receptors, because the fields of all receptors have equal
-        parts in the mixture
+    density: see `ReceptiveFields`. The mixture is dense where receptors are dense, because all receptors contribute
+        equally to it
     resolution: receptors (height, width)
     cells: cells along the side of an average receptor
     lattice: rectangles of the receptors

@@ -65,7 +65,7 @@ class AgentPhysics:
     """Batched physics of the agents in one world's model.
 
     world: the world, whose model all agents share
-    threads: threads of MuJoCo's batched step, see `sim.physics.mujoco_batch`
+    threads: number of threads for MuJoCo's batched step, see `sim.physics.mujoco_batch`
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
         obstacles are simulated in models of these obstacles alone (`local_contacts`). The attribute `free_motion` or
         `local_contacts` is None if the model does not support the method. If False, MuJoCo simulates all agents in the

@@ -26,8 +26,8 @@ class ArrayWorlds(MujocoWorlds):
     The arguments are those of `sim.physics.mujoco_worlds.MujocoWorlds`, and `sim.Physics` describes the methods.
 
     qpos, qvel, act, ctrl, userdata: arrays that tasks may write in `reset` and `act`, (n, value)
-    mocap_pos, mocap_quat: further such arrays, (n, mocap body, 3) and (n, mocap body, 4)
-    time: further such array [s], (n, 1)
+    mocap_pos, mocap_quat: writable positions and rotations of mocap bodies, (n, mocap body, 3) and (n, mocap body, 4)
+    time: writable simulation time [s], (n, 1)
 
     All other arrays of mjData (`xpos`, `geom_xpos`, `site_xpos`, `sensordata`, `cvel` ...) are read-only. They are
     stacked over worlds when they are first read after a step. A name that mjData lacks raises an AttributeError.

@@ -61,7 +61,10 @@ class FreeMotion:
 
     @cached_property
     def _within(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Limits of an agent's centre within reach of each box [m]: lower x, lower y, upper x, upper y, (box,) each."""
+        """Limits between which an agent's centre is within reach of a box [m].
+
+        The arrays are the lower x, lower y, upper x and upper y, (box,) each.
+        """
         return (*(self.lower - self.reach).T.copy(), *(self.upper + self.reach).T.copy())
 
     def obstacles_in_reach(self, position: np.ndarray, path: np.ndarray) -> np.ndarray:

@@ -95,8 +95,8 @@ def local_contacts_of(
     """Return the local contacts of a world's agent; None if small models cannot replace the whole model.
 
     Small models cannot replace it if agents have no free motion or no obstacles, or if bodies other than the agent
-    move. Every obstacle must be a simple primitive that is fixed to the world, and the world's model must be as
-    compiled.
+    move. Every obstacle must be a simple primitive that is fixed to the world, and the world's model must not
+    have been changed since it was compiled.
 
     whole: the world's complete model
     """

@@ -68,7 +68,7 @@ class Physics(Protocol):
         """
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:
-        """Advance all worlds except the skipped ones by one action; return the reason of each failure, by world."""
+        """Advance all worlds except the skipped ones by one action; return the worlds that fail, with the reasons."""
 
     def poses(self) -> Poses:
         """Return the current poses."""

@@ -52,7 +52,7 @@ _VIEW = 5  # rows of four floats: position, columns of the rotation, (tan(fovy /
 class RayLight:
     """Light along rays, and the planes that they hit.
 
-    linear: sRGB, not clipped, (3, ray)
+    linear: linear sRGB, not clipped, (3, ray)
     plane: coefficients of the tangent plane at each hit point, (3, ray); 0 without a hit. Any ray of the image meets
         this plane at 1 / depth = plane @ (across, above, 1) [1/m], see `plane_coordinates`.
     """

@@ -1,7 +1,8 @@
-"""A lattice of every fifth pixel, whose neighbours are a knight's move apart.
+"""A lattice of every fifth pixel. Neighbours in the lattice are a knight's move apart.
 
-Every pixel outside the lattice is adjacent to exactly one lattice pixel. In every horizontal, vertical or diagonal line
-of pixels, each fifth pixel belongs to the lattice, so no such line can pass between lattice pixels.
+Except at the border of the image, every pixel outside the lattice is adjacent to exactly one lattice pixel. In every
+horizontal, vertical or diagonal line of pixels, each fifth pixel belongs to the lattice, so no such line can pass
+between lattice pixels.
 """
 
 from __future__ import annotations

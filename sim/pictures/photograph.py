@@ -63,10 +63,10 @@ def read_photograph(path: str | Path) -> np.ndarray:
 
 
 def read_depth(text: str) -> Any:
-    """Return the distance [m] that a text states: a number, or the name of a .npy file with one number per pixel.
+    """Return the distance [m] that a text states, as a float, or the array in the .npy file that the text names.
 
     Raises:
-        ValueError: the text is neither, or the file contains no array of numbers.
+        ValueError: the text is neither a number nor a name that ends with ".npy", or the file contains no array.
         OSError: the file cannot be read.
     """
     try:

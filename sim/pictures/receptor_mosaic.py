@@ -26,7 +26,7 @@ class ReceptorMosaic:
 
     animal: name of the animal.
     signals: signals (channel, row, column), from the top left of the visual field. A white surface gives 1.
-    peaks_nm: peak wavelength of each channel, (channel,).
+    peaks_nm: peak wavelength of each channel [nm], (channel,).
     width_deg: angular width of the photograph [degrees].
     hexagons: True for ommatidia. Every second row, beginning with the second, is then shifted to the right by half an
         ommatidium.

@@ -116,7 +116,7 @@ class AreaKernel(RayKernel):
         return self._areas.radiance(area, faces, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
-        """Return the fractions of the lights that reach each point on the bodies of each world, flat (world, point)."""
+        """Return the tables of the light on the bodies of all worlds (`IlluminatedBodies`); [] if none are needed."""
         if inputs.places is None:
             return []
         world = inputs.places // self._areas.places

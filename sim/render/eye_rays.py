@@ -23,7 +23,7 @@ EYE_ROWS = 4  # rows of four floats: the pupil, right, up and ahead
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of samples of an eye, and of eyes of a world."""
+    """Number of samples of an eye, and number of eyes of a world."""
 
     samples: Divisor
     eyes: Divisor

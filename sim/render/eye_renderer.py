@@ -169,7 +169,7 @@ class EyeRenderer:
 
         `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to FEW worlds
         are rendered in separate buffers, so that a frame of all worlds may be pending at the same time. The errors are
-        those of `signals`, and an IndexError for an unknown world.
+        those of `signals`, and an IndexError, which `wait` may raise, for an unknown world.
         """
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
@@ -194,7 +194,7 @@ class EyeRenderer:
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, len(self.mounts), height, width)
 
     def radiance(self, poses: Placed) -> np.ndarray:
-        """Return the spectral radiance along every ray, (env, eye, ray, band) float32, like `receptor_radiance`."""
+        """Return spectral radiance along every ray, (env, eye, ray, band) float32; unit as in `receptor_radiance`."""
         layers = self._components(self._launched(poses, self._rays).wait())
         rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
         return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)

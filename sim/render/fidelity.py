@@ -28,7 +28,7 @@ class Level:
     stage, level: names of the stage and of the level
     why: the reason
     predicted_error: error of a signal (root mean square); None if unknown. For the eyes' own bands it is an upper
-        bound: the largest error over measured reflectances and types of receptors. It may exceed the tolerance
+        bound: the largest error over measured reflectances and types of receptors. The bound may exceed the tolerance
     """
 
     stage: str

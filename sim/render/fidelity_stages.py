@@ -30,7 +30,8 @@ NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the 
 def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = None) -> tuple[int, Level]:
     """Return the smallest number of bands with an allowed error for surfaces of any colour, and its `Level`.
 
-    If no number is accurate enough, return the eye's own number; in a medium, return FINEST.
+    If no number is accurate enough for the surfaces, return the eye's own number. If some numbers are, but none of
+    them is accurate enough for the medium, return FINEST.
 
     allowed: allowed error of a signal
     medium: if it is given, the error for white and black in it must also be allowed

@@ -165,9 +165,9 @@ class FidelityTrials:
         return max(found)
 
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
-        """Return root mean square differences to the signals with the finest layers, for the same rays.
+        """Return the root mean square error of signals with n instead of the finest layers, for each n in `counts`.
 
-        For each number n in `counts`, the n layers must be among the finest layers.
+        The rays are the same for all numbers of layers. The n layers must be among the finest layers.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -199,7 +199,7 @@ class FidelityTrials:
         depth: layers among which light is divided
         light: level of light
         views: views of the signals; None: the views of the trials
-        most: largest number of rays in all views together
+        most: largest number of rays in all views together, unless fewer than VIEWS[0] views would remain
         """
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))

@@ -61,7 +61,8 @@ def check_memory(demand: Demand) -> None:
     """Refuse rendering that does not fit into memory.
 
     Raises:
-        ValueError: there is too little memory; the message states how many rays per receptor fit.
+        ValueError: there is too little memory, or an array would have more than 2³² elements. The message states how
+            many rays per receptor fit.
     """
     free = available()
     excess = max(demand.bytes / free, demand.elements / INDICES)

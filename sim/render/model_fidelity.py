@@ -185,10 +185,12 @@ def _with(rays: float, eye: WorldEye, allowed: float, light: str) -> Fidelity:
 
 
 def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: float, allowed: float) -> Trials:
-    """Return the errors of increasing numbers of rays, compared with `truth` rays, up to the first allowed error.
+    """Return the errors of increasing numbers of rays, up to the first error that is allowed.
 
     seen: function that maps rays per receptor to signals (env, eye, channel, height, width)
-    ladder: numbers of rays to try
+    ladder: numbers of rays per receptor to try, in ascending order
+    truth: number of rays per receptor of the signals with which all others are compared
+    allowed: largest allowed error of a signal
     """
     right = seen(truth)
     errors: dict[float, float] = {}

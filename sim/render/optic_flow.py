@@ -16,9 +16,9 @@ Frames = tuple[np.ndarray, np.ndarray]  # pupils [m] (world, eye, 3), eyes' fram
 
 
 def receptor_centres(eye: optics.Eye) -> np.ndarray:
-    """Return the receptors' centres (receptor, 2), from the middle of the eye, in sides of a receptor.
+    """Return the receptors' centres, relative to the middle of the retina [receptor widths and heights], (receptor, 2).
 
-    x points to the right and y down.
+    The coordinate x points to the right, and y points down.
     """
     height, width = eye.resolution
     row, column = (index.ravel() for index in np.indices((height, width)))

@@ -77,7 +77,7 @@ class Moving:
     def frame(self) -> Frame:
         """Return the buffers as arrays on the device.
 
-        On the processor, they share the buffers' memory, so that the result is always the same.
+        On the processor, the arrays share the buffers' memory, so every call returns the same object.
         """
         if self._frame is None or on_gpu():
             self._frame = Frame(self._eyes.array(), self._things.arrays())

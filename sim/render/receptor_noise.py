@@ -3,8 +3,8 @@
 A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
 world's noise therefore depends on the world's own seed and history, and not on other worlds.
 
-The noise of `optics.Eye.see` is drawn as numbers of photons (`optics.eye.photoreceptor`). Both kinds of noise have the
-same mean, variance and third moment.
+This noise has the same mean, variance and third moment as the noise of `optics.Eye.see`, which is drawn as numbers of
+photons (`optics.eye.photoreceptor`).
 """
 
 from __future__ import annotations

@@ -13,9 +13,10 @@ def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
     """Refuse a fidelity that does not fit the eye.
 
     Raises:
-        ValueError: the eye has an eccentricity, its number of bands differs from the fidelity's, adaptive edge sampling
-            is not possible, the fidelity has areas and receptors have a density, or it has areas or depth layers, which
-            compound eyes do not support.
+        ValueError: the eye has an eccentricity, its number of bands differs from the fidelity's, or it does not support
+            the samples or depth layers of the fidelity. Adaptive edge sampling needs a perfect lens, direct light and
+            at least four rays per receptor. Areas need receptors of equal size. Compound eyes support only rays and a
+            single depth layer.
     """
     world_eye("eye", eye)
     if not isinstance(eye, CompoundEye) and any(eye.eccentricity_deg):

@@ -37,7 +37,7 @@ def choose_fidelity(
         and over receptors that see a nearby object; None: half of the eyes' `noise_sigma`, but at least 0.005 times the
         signal of a white surface
     bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments.
-        Compound eyes always have their own.
+        Compound eyes always use their own bands.
     tracer: tracer for the trials, see `sim.BatchedRenderer`
 
     Raises:

@@ -1,8 +1,8 @@
-"""Appearances of geoms: one for each geom, or one for each material that a world may draw for it.
+"""Appearances of geoms: one for each geom, or one for each material that an episode may choose for the geom.
 
-Every appearance is built as if the model had this material, including texture, mapping and glow. Each one is a separate
-moving shape, of which a world shows only one per geom. Worlds with different materials therefore share one kernel, and
-geoms with a single appearance cost nothing extra.
+Every appearance is built as if the geom had this material in the model, including texture, mapping and glow. Each
+appearance is a separate moving shape, and a world shows only one of them per geom. Worlds with different materials
+therefore share one kernel, and geoms with a single appearance cost nothing extra.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from optics.numerics.arguments import did_you_mean
 from sim.scene import surfaces
 from sim.scene.spectra import Spectra, of_geom
 
-# Names of geoms that differ from world to world, optionally with the names of the materials that may be drawn for them.
+# Names of geoms that differ between worlds, optionally with the names of the materials that an episode may choose.
 Varied = Sequence[str] | Mapping[str, Sequence[str]]
 
 
@@ -51,7 +51,7 @@ def appearances_of(
     """Return all visible appearances of these geoms.
 
     geoms: ids of visible geoms
-    materials: ids of the materials that may be drawn for a geom, by its id
+    materials: ids of the materials among which episodes choose for a geom, by the geom's id
     """
     found = []
     for geom in geoms:
@@ -96,14 +96,14 @@ def varied_geoms(
 ) -> dict[int, tuple[int, ...]]:
     """Return the geoms that differ from world to world, with the ids of the materials that they may have.
 
-    A geom for which `varied` lists no materials has no ids.
+    If `varied` lists no materials for a geom, its tuple of ids is empty.
 
     seen: ids of the visible geoms
-    varied: names of the geoms, or names of the materials of each geom by its name
+    varied: names of the geoms; or a mapping from each of these names to the names of the geom's materials
 
     Raises:
-        ValueError: no visible geom or no material has a name in `varied`, or a geom without listed materials has a
-            measured spectrum.
+        ValueError: `varied` contains a name that no visible geom has, or the name of a material that the model lacks;
+            or a geom without listed materials has a measured spectrum.
     """
     known = {model.geom(g).name: g for g in seen if model.geom(g).name}
     found = {}

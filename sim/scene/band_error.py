@@ -63,7 +63,7 @@ def band_error(reflectances: Iterable[Spectrum], receptors: Any, bands: int) -> 
     does not include blur that differs from band to band.
 
     Raises:
-        ValueError: `optics.receptors_of` does not accept the receptors, or bands is out of its range.
+        ValueError: `optics.receptors_of` does not accept the receptors, or `bands` is not a whole number from 1 to 64.
     """
     few, many = (SpectralBands.uniform(n, receptors_of(receptors)) for n in (bands, FINE_BANDS))
     return max((float(np.abs(_signals(few, one) - _signals(many, one)).max()) for one in reflectances), default=0.0)

@@ -33,7 +33,7 @@ OWNERS = {"geom": "geom", "body": "body", "mat": "material", "light": "light"}
 
 
 def require_modest(text: str, name: str) -> None:
-    """Refuse MJCF that exceeds the memory of a computer. Text that is not XML is ignored here; MuJoCo refuses it.
+    """Refuse MJCF with too many elements for a computer's memory. Text that is no XML is ignored; MuJoCo refuses it.
 
     Raises:
         ValueError: there are too many elements, or too many cells in a height field. The message states their number.

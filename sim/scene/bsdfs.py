@@ -1,8 +1,9 @@
 """Materials as Mitsuba BSDFs. A surface is Lambertian unless its material has one of these properties:
 
-- specular > 0: a rough dielectric coat. Its reflectance at normal incidence is 0.08 · specular (0.5 is glass of index
-  1.5; Burley 2012). Its Beckmann roughness is √(2 / (n + 2)) for the exponent n = 128 · shininess (Walter et al.
-  2007). If specular and shininess are both 0.5, MuJoCo's defaults for unset values, the surface is Lambertian.
+- specular > 0: a rough dielectric coat. Its reflectance at normal incidence is 0.08 · specular (specular = 0.5
+  corresponds to glass of index 1.5; Burley 2012). Its Beckmann roughness is √(2 / (n + 2)) for the exponent n = 128 ·
+  shininess (Walter et al. 2007). If specular and shininess are both 0.5, MuJoCo's defaults for unset values, the
+  surface is Lambertian.
 - metallic or roughness set: Burley's principled BSDF.
 - reflectance, on planes and on top of boxes as in MuJoCo: this fraction of the light is reflected as by a mirror.
 """

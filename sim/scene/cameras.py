@@ -49,7 +49,10 @@ class Viewpoint:
         return Viewpoint(origin, rotation, fovy_deg)
 
     def rays(self, width: int, height: int) -> np.ndarray:
-        """Return directions in the world through the pixels' centres, of unit depth along the axis, (y, x, 3)."""
+        """Return the directions of rays through the pixels' centres, in the world's frame, (y, x, 3).
+
+        The component of each direction along the camera's viewing axis is 1.
+        """
         half = np.tan(np.radians(self.fovy_deg) / 2)
         y, x = np.indices((height, width))
         across, up = (2 * (x + 0.5) - width) / height * half, (1 - 2 * (y + 0.5) / height) * half

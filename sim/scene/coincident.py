@@ -30,7 +30,7 @@ class Coincidences:
     """Geoms whose surfaces coincide.
 
     pairs: ids of the two geoms of each pair; the geom that is defined later comes second
-    lifts: distances by which surfaces are moved outwards [m], by geom; others are not moved
+    lifts: distance by which the surface of a geom is moved outwards [m], by geom id; other geoms are not moved
     """
 
     pairs: tuple[tuple[int, int], ...]

@@ -19,10 +19,10 @@ def encode_srgb(linear: np.ndarray | float) -> np.ndarray:
 
 
 def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:
-    """Convert spectral radiance (band, y, x) to linear sRGB (y, x, 3) by CIE 1931, with white for radiance D65.
+    """Convert spectral radiance (band, y, x) to linear sRGB (y, x, 3) with the colour matching functions of CIE 1931.
 
-    Each band represents the wavelengths that are nearer to it than to other bands. With few bands the colours are
-    approximate.
+    The radiance D65 becomes white. Each band represents the wavelengths that are nearer to it than to other bands. With
+    few bands the colours are approximate.
 
     wavelengths_nm: centres of the bands [nm], (band,)
     """

@@ -1,7 +1,8 @@
 """NumPy arrays in aligned memory that kernels can read.
 
 Dr.Jit compiles a kernel again for every alignment of its inputs. It also records a frozen kernel again if the arrays of
-any Mitsuba shape in memory, even in another scene, have another alignment than when the kernel was recorded.
+a Mitsuba shape have another alignment than when the kernel was recorded. This applies to all shapes in memory, even in
+other scenes.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class Divisor:
 
     Processors have no instruction that divides several whole numbers at once. A kernel would divide lane by lane, which
     takes as long as a seventh of the rendering of the built-in worlds. `quotient` therefore multiplies and shifts (fig.
-    4.1 in Granlund and Montgomery 1994). The number is an input, so kernels for other numbers are the same.
+    4.1 in Granlund and Montgomery 1994). The number is an input of kernels, so one kernel serves all numbers.
 
     number: the divisor
     factor, first_shift, second_shift: numbers from which quotients are computed

@@ -94,12 +94,12 @@ def _alpha(model: mujoco.MjModel, rgba: np.ndarray, material: np.ndarray) -> np.
 
 
 def listed_geoms(model: mujoco.MjModel, geoms: Iterable[int]) -> str:
-    """Return a list of geoms in words."""
+    """Return text that lists geoms by name, such as "geoms 'a', 'b'"; only the first few are named."""
     return _listed("geom", (_name(model, g) for g in geoms))
 
 
 def listed_materials(model: mujoco.MjModel, materials: Iterable[int]) -> str:
-    """Return a list of materials in words."""
+    """Return text that lists materials by name, such as "materials 'a', 'b'"; only the first few are named."""
     return _listed("material", (_material(model, m) for m in materials))
 
 

@@ -62,10 +62,10 @@ class Emitter:
 
 
 def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) -> Description:
-    """Return the spectrum scale · rgb · daylight(λ) on 300-780 nm.
+    """Return the spectrum of a light, scale · max(rgb) · daylight(λ) on 300-780 nm, as a Mitsuba texture.
 
-    A grey rgb gives exactly this spectrum. A coloured one is multiplied by the reflectance spectrum of its hue (Jakob
-    and Hanika 2019). `measured` replaces daylight and hue.
+    If `rgb` (3,) is not grey, the spectrum is also multiplied by the reflectance spectrum of its hue (Jakob and Hanika
+    2019). `measured` replaces daylight and hue.
     """
     level = float(np.max(rgb))
     if measured is not None:

@@ -43,8 +43,8 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 def is_linear(model: mujoco.MjModel, texture: int) -> bool:
     """Return whether a texture contains linear light.
 
-    It does if it is marked, or if it is a 2-D texture without a file that the model declares as linear. (The compiler
-    resolves "auto" to linear only for files.)
+    This is the case if the texture is marked. It is also the case if the model declares the texture as linear, and it
+    is a 2-D texture that was not read from a file. (The compiler resolves "auto" to linear only for files.)
 
     Raises:
         ValueError: a mark lists an object that is not a texture.

@@ -126,7 +126,7 @@ class Mirror:
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
-        """Return the BSDF of a geom in or outside the scene. KeyError: unknown name. IndexError: unknown id."""
+        """Return the BSDF of a geom, which need not be in the scene. KeyError: unknown name. IndexError: unknown id."""
         index = self.model.geom(geom).id
         with in_variant(self.variant):
             return self._bsdf(index)
@@ -150,14 +150,14 @@ class Mirror:
         width, height: size of the image [pixels], whole numbers
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}.
             "direct" shows only emitters behind a transparent geom; a MirrorWarning names such geoms once.
-        spp: samples per pixel, a whole number
-        seed: seed of the samples, a whole number
+        spp, seed: number of samples per pixel, and seed of the samples, whole numbers
         sampler: "independent", or "multijitter", whose images have less noise
 
         Raises:
             ValueError: the camera is unknown or no plain perspective, the integrator is unknown, there is less than one
                 pixel or sample, a wavelength is outside 300 to 780 nm, or Mitsuba would apply an argument incorrectly.
-            RuntimeError: Mitsuba has no such sampler.
+            RuntimeError: Mitsuba has no such sampler, or `width` or `height` is not a whole number.
+            TypeError: `spp` or `seed` is not a whole number.
         """
         view = self.viewpoint(camera)
         rays.check_size(width, height, spp)

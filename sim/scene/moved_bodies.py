@@ -1,4 +1,4 @@
-"""Poses of models in which only a few bodies move. Other arrays are built only when they are read."""
+"""Poses of models in which only a few bodies move. Arrays with all elements are built only when they are read."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class ReferencePose:
 
     bodies: ids of the moving bodies. Geoms, sites and cameras move rigidly with them; no other body may be attached to
         them
-    turning: number of the first bodies that may also turn. The others keep their rotation
+    turning: number of bodies that may also rotate, which come first in `bodies`. The others keep their rotation
     """
 
     def __init__(self, model: mujoco.MjModel, bodies: Sequence[int], turning: int) -> None:
@@ -31,7 +31,7 @@ class ReferencePose:
         self._kept: dict[tuple[int, ...], np.ndarray | None] = {}
 
     def moved(self, kind: str) -> list[int]:
-        """Return the ids of the elements of a kind that are fixed to the bodies."""
+        """Return the ids of the elements of a kind ("geom", "site" or "camera") that are fixed to moving bodies."""
         return [int(i) for i in np.flatnonzero(np.isin(self.body_of[kind], self.bodies))]
 
     def local(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:

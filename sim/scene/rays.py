@@ -79,9 +79,8 @@ class Camera:
 
         It is the mean over `spp` random positions in each pixel.
 
-        sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel. Its noise is lower
-            than the standard error of independent samples. It is not available in scalar variants, or for an spp that
-            it would round.
+        sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel, so that images have
+            less noise. Multijitter is not available in scalar variants, or for an spp that it would round.
 
         Raises:
             ValueError: the integrator is unknown, Mitsuba would apply it incorrectly, or the sampler is not available.

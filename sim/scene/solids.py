@@ -16,7 +16,7 @@ FAR = 3.0  # half sides of an infinite plane, in units of the model's extent
 
 @dataclass(frozen=True)
 class Solid:
-    """A geom as a plain shape, with the values of the model at the time of the call.
+    """A geom as a plain shape, with the values that the model had when `solids_of` was called.
 
     name: name in the model, or "geom_<id>"
     body: id of the geom's body

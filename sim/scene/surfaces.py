@@ -59,7 +59,7 @@ def visible(model: mujoco.MjModel, groups: Sequence[int]) -> list[int]:
 
 
 def require_geoms(model: mujoco.MjModel, geoms: Sequence[int], where: str = "") -> None:
-    """Raise a ValueError if no geom can be mirrored. A URDF may have lost its visuals.
+    """Raise a ValueError if no geom can be mirrored, for example because MuJoCo has discarded the visuals of a URDF.
 
     where: beginning of the error message
     """

@@ -1,7 +1,8 @@
 """Geoms as triangles with MuJoCo's texture coordinates, in the geom's frame.
 
 In MuJoCo's coordinates u points to the right and v downwards, and (0, 0) is the outer corner of the image's first
-texel. They were measured with the renderer of MuJoCo 4.0.0 (tests/sim/scene/test_textures.py compares with it).
+texel. These conventions were measured with the renderer of MuJoCo 4.0.0, with which tests/sim/scene/test_textures.py
+compares the results.
 """
 
 from __future__ import annotations
@@ -175,9 +176,9 @@ def capsule(radius: float, half_length: float) -> Triangles:
 def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
     """Return a mesh asset with one vertex per corner of each face.
 
-    Vertices are not shared, because normals and texture coordinates have separate indices. As in MuJoCo's renderer, a
-    corner of a mesh without texture coordinates gets the normal of its face if its own normal deviates from it by more
-    than 37°.
+    Vertices are not shared, because normals and texture coordinates have separate indices. In a mesh without texture
+    coordinates, a corner gets the normal of its face if the two normals differ by more than 37°, as in MuJoCo's
+    renderer.
     """
     faces = slice(model.mesh_faceadr[mesh_id], model.mesh_faceadr[mesh_id] + model.mesh_facenum[mesh_id])
     vertices = model.mesh_vert[model.mesh_face[faces].ravel() + model.mesh_vertadr[mesh_id]].astype(float)

@@ -56,6 +56,7 @@ def variant(name: str | None = None) -> Iterator[None]:
 
     Raises:
         optics.BackendError: LLVM is requested and cannot run.
+        ImportError: Mitsuba lacks the variant.
     """
     name = name or default_variant()
     before = mi.variant()

@@ -38,7 +38,7 @@ class WorldModels:
     models: models of the worlds; a single one for all, unless `own` is True
     own: True if each world has its own model, because a quantity differs between worlds or a task changes the model
         (`separate`). Each episode then starts from the compiled model.
-    varied: names of the geoms whose size, colour or material differs, with the materials that may be drawn
+    varied: names of the geoms whose size, colour or material differs, each with the materials that episodes may choose
 
     Raises:
         ValueError: `variation` names an object that the model lacks or that cannot vary, or sizes differ and the source
@@ -89,7 +89,7 @@ class WorldModels:
     def require_unchanged(self, before: bytes, whose: str) -> None:
         """Compare the shared model with the settings that `noted` returned.
 
-        If there is only one world, it gets its own model as soon as a task changes it.
+        If there is only one world, a changed model is accepted and becomes the world's own model.
 
         whose: beginning of the message
 
@@ -109,7 +109,7 @@ class WorldModels:
         """Set a world's sizes, colours and materials, and reset all other fields of its model to the compiled values.
 
         Raises:
-            ValueError: a drawn material is not one of the materials that may be drawn for the geom.
+            ValueError: a material in `drawn` is not one of the materials that `variation` lists for the geom.
         """
         mine = self.models[world]
         if self.own and self.get_state(world) != self._compiled:
@@ -129,7 +129,7 @@ class WorldModels:
             getattr(data, where)[address] = drawn[name]
 
     def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
-        """Return the ids of the materials that may be drawn for a geom, by the names of the materials.
+        """Return the ids of the materials that episodes may choose for a geom, by the names of the materials.
 
         Raises:
             ValueError: the geom's colour is also varied or replaces that of its materials, or a material is unknown.

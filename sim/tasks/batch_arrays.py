@@ -58,7 +58,7 @@ def mapping(where: str, returned: Any) -> Mapping[str, Any]:
 
 
 def not_finite(where: str, terms: Mapping[str, np.ndarray]) -> dict[int, str]:
-    """Return the error messages of all worlds in which a term is not finite, by world."""
+    """Return an error message for each world in which a term is not finite, by the index of the world."""
     found: dict[int, str] = {}
     for name, term in terms.items():
         for world in np.flatnonzero(~np.isfinite(term)).tolist():
@@ -67,10 +67,11 @@ def not_finite(where: str, terms: Mapping[str, np.ndarray]) -> dict[int, str]:
 
 
 def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
-    """Check the arrays of an outcome against the number of worlds.
+    """Check that the arrays of an outcome fit the number of worlds `n` and the number of learning agents.
 
     Raises:
-        ValueError: an array has another shape, a reward is not finite, or the outcome names worlds that do not exist.
+        ValueError: an array has another shape or masked elements, a term is not finite, or the outcome names worlds
+            that do not exist.
     """
     terms, size = outcome.terms.terms, n * learners
     for name, array, shape in (

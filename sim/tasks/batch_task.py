@@ -32,8 +32,8 @@ class Agent:
     name: name of the animal
     n_actions: number of values in an action
     kinds: kinds of its eyes
-    auxiliary: names of the auxiliary entries of its observation, each with one value for each receptor
-    first_action: value of the observation's "previous action" at the beginning of an episode
+    auxiliary: names of the auxiliary entries of its observation, which have values for each receptor
+    first_action: value of the observation's entry "previous_action" at the beginning of an episode
     learns: True if the caller of the environment chooses its actions; False if `policy` does
     policy: policy of an animal that does not learn; None: its actions are zeros
     """
@@ -50,11 +50,11 @@ class Agent:
 class BatchTask(TaskSettings):
     """A task whose methods receive all worlds at once.
 
-    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task`, except for `others`,
-    and those listed below. Arrays have one row for each world. The argument `worlds` of the methods is the object that
-    `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`,
-    `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a
-    task follows this description.
+    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task` without `others`,
+    together with those listed below. Arrays have one row for each world. The argument `worlds` of the methods is the
+    object that `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays
+    (`worlds.qpos`, `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task`
+    tests whether a task follows this description.
 
     An exception in a method ends the simulation of all worlds, and reaches the caller of the environment unchanged.
     The environment raises a ValueError if a method returns an invalid array.
@@ -66,7 +66,8 @@ class BatchTask(TaskSettings):
         not listed has no limits
     ramped: terms of the reward whose weight `evolve` reduces at the beginning of training if the setting
         `learning.contact_ramp` is above 0
-    counted: titles of table rows, by reward term. A row shows the number of actions in which the term is not 0
+    counted: titles of rows in a report's table of an episode, by reward term. A row shows the number of actions in
+        which the term is not 0
     compared_light: level of light (see `Fidelity`) with which `evolve` compares eyes, for example "direct"; None: the
         level in `fidelity`
     """
@@ -87,13 +88,12 @@ class BatchTask(TaskSettings):
         """
 
     def act(self, worlds: Any, actions: np.ndarray) -> Mapping[int, str] | None:
-        """Apply actions in [-1, 1], (n, n_actions), before the physics steps.
+        """Apply actions in [-1, 1], (n, n_actions). The physics then simulates the worlds for one action.
 
-        The default maps each value to the full range of one control of the actuators; a control without limits gets
-        the value itself.
+        The default maps [-1, 1] to the full range of each control of the task's actuators; a control without limits
+        gets the value itself.
 
-        Return the reason for each world that cannot continue, by the index of the world, or None if there is no such
-        world.
+        Return the worlds that cannot continue, by index, each with the reason. None means that all can continue.
         """
         mine = controls_of(worlds.model, self.actuators)
         limited = worlds.model.actuator_ctrllimited[mine].astype(bool)
@@ -161,7 +161,7 @@ class BatchTask(TaskSettings):
         return None
 
     def commands(self) -> tuple[Command, ...]:
-        """Return the meaning of each number in the first agent's action. By default, names are consecutive numbers."""
+        """Return the meaning of each number in the first agent's action. By default, the names are "0", "1" ..."""
         return tuple(Command(str(number)) for number in range(self.agents()[0].n_actions))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
@@ -183,7 +183,7 @@ class BatchTask(TaskSettings):
         return np.radians([mount.azimuth_deg for mount in self.agents()[0].kinds[0].mounts])
 
     def ground_plan(self, place: np.ndarray) -> GroundPlan | None:
-        """Return a plan of the surroundings of this place (2,) [m], seen from above; None if the task has no plan.
+        """Return a plan, seen from above, of the surroundings of `place` (2,) [m]; None if the task has no plan.
 
         Without a plan, reports show images of the task's camera instead.
         """
@@ -215,7 +215,7 @@ class BatchTask(TaskSettings):
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 
     def in_mode(self, mode: str) -> Self:
-        """Return this task in the given mode, "training", "evaluation" or "test"."""
+        """Return the task in the mode "training", "evaluation" or "test": a copy, unless it already has this mode."""
         if self.mode == mode:
             return self
         found = copy.copy(self)

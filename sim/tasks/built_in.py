@@ -143,7 +143,7 @@ class AgentTask(BatchTask):
         return (replace(agent, first_action=np.array(STANDING, np.float32)),)
 
     def act(self, worlds: SlidingAgents, actions: np.ndarray) -> None:
-        """Set the agent's forward speed and change of heading, each in [-1, 1], (n, 2), and move the objects."""
+        """Apply actions (n, 2) in [-1, 1], the forward speed and the change of heading, and move the objects."""
         worlds.steer(actions)
         worlds.move_objects(*self.moved(worlds))
 

@@ -152,7 +152,7 @@ def split_agents(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen
 
 
 def of_world(animals: Sequence[Task], what: str) -> Any:
-    """Return the setting `what` of the world from the first task that defines it; None if no task does."""
+    """Return the world's setting with the name `what` from the first task that sets it; None if no task does."""
     return next((said for animal in animals if (said := getattr(animal, what))), None)
 
 

@@ -1,6 +1,6 @@
 """Random motion of the objects in the tracking task.
 
-Each object avoids the other objects, whose positions are known exactly, but does not react to the agent.
+The objects avoid each other, based on their exact positions, but they do not react to the agent.
 """
 
 from __future__ import annotations

@@ -72,7 +72,8 @@ class RewardTerms:
 class Outcome:
     """The outcome of one action in all worlds, which a task returns. Rows are those of `RewardTerms`.
 
-    The environment raises a ValueError if an array has another shape, a term is not finite, or a world does not exist.
+    The environment raises a ValueError if an array has another shape than stated here, if a term is not finite, or if
+    an index does not belong to a world.
 
     terms: terms of the reward
     terminated: True if the task ends the episode, (row,) bool
@@ -107,9 +108,9 @@ class Step:
     terminated: True if the task ended the episode, (row,) bool
     truncated: True if the episode ended for another reason, such as its number of actions, (row,) bool
     success: True if the task is accomplished, (row,) bool
-    changed: worlds that must be rendered again
+    changed: indices of the worlds that must be rendered again, (k,) int
     given_up: True if the episode was truncated because the sum of its rewards is too low, (row,) bool
-    failure: the worlds that could not continue, each with the reason
+    failure: the worlds that could not continue, by index, each with the reason
     info: additional entries of each row's `info`, or None
     """
 

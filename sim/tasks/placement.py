@@ -19,10 +19,11 @@ class SpawnPoints:
         self._apart = np.array([_apart(objects, place, SEPARATION) for place in objects])
 
     def draw(self, rng: np.random.Generator, n_objects: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return an agent's position (2,) and the objects' positions (k, 2).
+        """Return an agent's position (2,) and the objects' positions (n_objects, 2) [m].
 
         Raises:
-            ValueError: there are too few cells for the distances SEPARATION and CLEARANCE.
+            ValueError: TRIES attempts found no positions that keep the distances SEPARATION (between objects) and
+                CLEARANCE (from the agent).
         """
         for _ in range(TRIES):
             agent, chosen = rng.integers(len(self._agents)), []

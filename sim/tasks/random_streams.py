@@ -133,8 +133,8 @@ class MotionNoise:
     def get_state(self) -> dict[str, np.ndarray]:
         """Return the states of the generators, and the remaining numbers that were drawn in advance.
 
-        The array of numbers has the shape (world, action, 2, moving object). The numbers fill its last actions, and
-        the actions before are NaN.
+        The array of numbers has the shape (world, action, 2, moving object), with AHEAD actions. The remaining numbers
+        are at the end of the axis of actions. All entries before them are NaN.
         """
         left, _, n, movers = self._drawn.shape
         ahead = np.full((n, AHEAD, 2, movers), np.nan)

@@ -22,9 +22,9 @@ def distance_to_nearest(state: WorldState, goals: int) -> np.ndarray:
 
 
 def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray) -> np.ndarray:
-    """Return the first substep at which the agent is within REACH of each object, (n, k).
+    """Return the index of the first substep at whose end the agent is within REACH of each object, (n, k).
 
-    The result is the number of substeps for an object that the agent does not reach.
+    For an object that the agent does not reach, the result is the number of substeps.
 
     path: positions of the agent at the *end* of each substep [m], (n, substep, 2)
     objects_before: positions of the objects before the action [m], (n, k, 3)

@@ -16,7 +16,7 @@
     test        1.5    10     -10    -2     the same, for final results
 
 Terms and weights follow the text of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
-Evolution". The fitness is the sum of an evaluation episode's rewards, averaged over these episodes. In training, the
+Evolution". The fitness is the mean, over all evaluation episodes, of the sum of an episode's rewards. In training, the
 code published with the paper gives a metre of progress the same weight as an action in contact; rhabdom uses the
 weights of the text. Foraging is not in the paper and has the reward of detection. A training run may begin with a w_c
 closer to 0 (setting `learning.contact_ramp` of `evolve`). At the end of training, and in the fitness, the weights are

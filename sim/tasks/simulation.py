@@ -27,7 +27,7 @@ LEAST_RETURN = "least return"
 
 
 class Simulation:
-    """Independent worlds of one task.
+    """Independent worlds of one task. An exception in a method of a `sim.BatchTask` is raised unchanged.
 
     task: rules of the task
     n: number of worlds
@@ -48,7 +48,7 @@ class Simulation:
 
     Raises:
         ValueError: `n` is below 1, or `least_return` is not below 0 or is given although the mode is not training.
-        RuntimeError: a method of the task fails in the first episode, which the constructor starts.
+        RuntimeError: a method of a `sim.Task` fails in the first episode, which the constructor starts.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Simulation:
         """Start new episodes in these worlds.
 
         Raises:
-            RuntimeError: a method of the task fails, or the task changes the model of all worlds.
+            RuntimeError: a method of a `sim.Task` fails, or the task changes the model of all worlds.
         """
         self.physics.watch()
         self._start(worlds)
@@ -275,9 +275,9 @@ class Simulation:
 
 
 def check_least_return(least_return: float | None, mode: str) -> None:
-    """Check that `least_return` is negative, and that it is used in training only.
+    """Check that `least_return` is None, or is negative and used in training.
 
-    Otherwise every episode would end at once, or the truncation would change the fitness.
+    With a value of 0 or more, episodes would end at once. In evaluation, the truncation would change the fitness.
 
     Raises:
         ValueError: `least_return` is not negative, or the mode is not training.

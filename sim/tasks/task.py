@@ -52,8 +52,8 @@ class Task(TaskSettings):
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
         """Apply an action, (n_actions,), with values in [-1, 1].
 
-        The default maps each value to the full range of one control of the actuators; a control without limits gets
-        the value itself.
+        The default maps [-1, 1] to the full range of each control of the task's actuators; a control without limits
+        gets the value itself.
         """
         model, mine = data.model, controls_of(data.model, self.actuators)
         limited = model.actuator_ctrllimited[mine].astype(bool)

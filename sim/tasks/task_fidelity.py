@@ -37,7 +37,7 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
 
     Raises:
         ValueError: `fidelity` is neither a `sim.Fidelity` nor "auto", or the task's model or eyes are invalid.
-        RuntimeError: a method of the task fails at the start of an episode.
+        RuntimeError: a method of a `sim.Task` fails at the start of an episode.
     """
     batch = PerWorld(task) if isinstance(task, Task) else task
     animal = batch.agents()[0]
@@ -79,7 +79,7 @@ def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
 
     Raises:
         ValueError: see `fidelities_of`.
-        RuntimeError: a method of the task fails at the start of an episode.
+        RuntimeError: see `fidelities_of`.
     """
     if not isinstance(task, PerWorld):
         return fidelities_of(task)

@@ -27,7 +27,7 @@ MOST_STEPS = 10**9
 
 
 class TaskSettings:
-    """Settings that a subclass defines as class attributes. It must define `model` and `mounts`.
+    """Settings of a task. A subclass sets them as class attributes, and must set `model` and `mounts`.
 
     Environments raise a ValueError if a setting is missing or invalid.
 

@@ -87,12 +87,13 @@ class ClosedForm:
     world, walls, footprints, lights, components: the parts of the scene
     medium: water or air between surfaces and eyes; None: clear air
     faces: textures of walls and floor, see `face_rows`
-    sphere_textures: for each visible sphere, the map from texture coordinates to texels, and the place of its texture
+    sphere_textures: for each sphere that rays can hit, the map from texture coordinates to texels, and the place of its
+        texture in the atlas
 
     Raises:
-        NoClosedForm: there are many walls, and they lie on no grid. If light is reflected more than once, also: walls
-            have several heights or are lower than a body, a body may change its height, or the body that carries the
-            eyes has a texture.
+        NoClosedForm: there are many walls, and they lie on no grid. There are further reasons if light is reflected
+            more than once: walls have several heights or are lower than a body, a body may change its height, or the
+            body that carries the eyes has a texture.
     """
 
     name = "closed_form"
@@ -215,7 +216,10 @@ class ClosedForm:
         return total
 
     def _face_texel(self, face: Array, point: Array, tables: ClosedFormTables) -> tuple[Array, ...]:
-        """Return the texture of a face and the place of a point in it: first texel, columns, rows, column and row."""
+        """Return the texture of a face, and the place of a point in it.
+
+        The five results are the texture's first texel, its numbers of columns and rows, and the point's column and row.
+        """
         columns = dr.gather(mi.Vector4f, tables.faces, face * 3)
         place = dr.gather(mi.Vector4f, tables.faces, face * 3 + 2)
         x = _affine(columns, point)
@@ -264,7 +268,8 @@ def _check_tops(scene: UprightScene) -> None:
 def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
     """Return a row of ROW numbers for each face, from which the texel at a point is computed.
 
-    They are two affine functions of the point, which give the texel's column and row, the texture's place, and 0.
+    A row contains two affine functions, from which the texel's column and row at a point (x, y, z, 1) follow. The
+    texture's place in the atlas and a 0 come after them.
 
     uv: matrices (2, 4) from points of each face to texture coordinates, (face, 2, 4)
     place: index of each face's texture in the atlas, (face,)

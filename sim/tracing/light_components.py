@@ -28,7 +28,11 @@ class Components:
 
 
 def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return the smallest set of components that describes texels (texel, band) under lights (light, band)."""
+    """Return components that describe reflectances `texels` (texel, band) under `irradiance` (light, band).
+
+    They are fewer than the bands if all lights share one spectrum and the reflectances have a smaller rank. Otherwise
+    they are the bands.
+    """
     n_bands = texels.shape[1]
     brightest = irradiance[np.argmax(irradiance.sum(axis=1))]
     level = irradiance @ brightest / (brightest @ brightest)

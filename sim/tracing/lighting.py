@@ -48,8 +48,8 @@ def spectra(wavelengths: np.ndarray) -> list[Array]:
 def spawn_bounce_ray(point: Array, normal: Array, bounce_sample: Array, clearance: float = 1) -> Array:
     """Return a ray that leaves a surface in the direction to which a sample (2,) on the unit square is mapped.
 
-    The directions of uniform samples are distributed as Lambert's cosine. If L is the radiance along the ray, the
-    surface reflects ρ L, averaged over samples.
+    The directions of uniform samples are distributed as Lambert's cosine. If light of radiance L arrives along the ray,
+    the radiance that the surface reflects is the mean of ρ L over the samples, with the surface's reflectance ρ.
 
     clearance: see `clear_of`
     """
@@ -67,7 +67,7 @@ def clear_of(point: Array, normal: Array, clearance: float = 1) -> Array:
     """Return a point in front of the surface.
 
     clearance: distance of this point from the surface, relative to the distance at which Mitsuba's own shadow rays
-        start. The latter is 9e-5 times the sum of 1 m and the largest absolute coordinate of the point
+        start. Mitsuba's distance is 9e-5 times the sum of 1 m and the largest absolute coordinate of the point
     """
     offset = (1 + dr.max(dr.abs(point))) * (mi.math.RayEpsilon * clearance)
     return mi.Point3f(dr.fma(normal, offset, point))

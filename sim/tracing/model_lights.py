@@ -50,9 +50,10 @@ class ModelLight:
 def model_lights(
     model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray
 ) -> tuple[list[ModelLight], list[str]]:
-    """Return a model's lights, except for the sky, at wavelengths [m], and messages about properties without a mirror.
+    """Return a model's lights, except for the sky, at wavelengths [m], and messages about properties left out.
 
-    The scene's Mitsuba variant must be active.
+    The messages describe properties of lights that have no counterpart in Mitsuba. The scene's Mitsuba variant must be
+    active.
     """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -111,7 +112,7 @@ class Lights:
     def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
         """Return the unit vector from a point to a light, the distance [m], and a factor of the light's level.
 
-        The factor is the fraction of the level that arrives on a surface that faces the light.
+        The level times this factor is the irradiance of a surface at the point that faces the light.
 
         axis: axis of the observing eye
         """

@@ -54,13 +54,13 @@ class ModelScene:
     spectra: measured spectra of materials and lights, by name
     has_sky: True if rays without a hit reach a sky
     glows: BSDFs whose reflectance is the radiance of a glowing geom, by appearance; such geoms count as movers
-    varied: geoms whose size or colour differs between worlds, with the ids of the materials that each may have; they
-        count as movers, although they may be static
+    varied: geoms whose size, colour or material differs between worlds, with the ids of the materials that each may
+        have; they count as movers, although they may be static
     coincidences: geoms in the same place in the model's reference pose
     as_built: snapshot of the model, with which worlds are compared
 
     Raises:
-        ValueError: the model has no visible geoms, or lacks a part that has spectra or is varied.
+        ValueError: the model has no visible geoms, or lacks an element that `spectra` or `varied` names.
     """
 
     def __init__(

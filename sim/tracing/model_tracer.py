@@ -287,7 +287,7 @@ class ModelTracer:
 
     @staticmethod
     def _sky_radiance(still: MitsubaObject, direction: Array, active: Array, band: Array) -> Array:
-        """Return the radiance of the sky."""
+        """Return the radiance of the sky at the wavelengths `band` [nm]; 0 in lanes that are not `active`."""
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.wi, si.wavelengths = -direction, band
         return dr.select(active, still.environment().eval(si, active), 0)

@@ -37,7 +37,7 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray.
 
-    t, which: distance [m], and index of the mover; without a hit, the largest distance, and the number of movers
+    t, which: distance [m], and index of the mover; without a hit, `farthest` of the call, and the number of movers
     normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
     """
 

@@ -65,7 +65,7 @@ class Paint:
         return max(len(self) * len(self._spectra) * (1 + self.glow), 1)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return reflectances, (world, 4 n_rows) float32, in each world followed by emissions if any geom glows."""
+        """Return the reflectances in each world, (world, 4 n_rows) float32, followed by emissions if a geom glows."""
         rows = np.zeros((poses.n, self.n_rows * lighting.LANES), np.float32)
         if not len(self):
             return rows

@@ -37,7 +37,7 @@ class UprightScene:
     walls: all walls and the floor
     lights: all lights
     spheres: all visible spheres
-    bodies: these spheres, followed by the eyes' own body if it is a sphere, which the eyes do not see
+    bodies: these spheres, followed by the body that carries the eyes, if it is a sphere. The eyes do not see this body
     heights: heights of all bodies' centres in the reference pose [m], (body,)
     settled: True for bodies that keep this height, (body,)
     model: the MuJoCo model

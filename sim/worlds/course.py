@@ -2,7 +2,7 @@
 
 Navigation rewards an increase of the distance from the start. If the path leads back towards the start, this reward
 has a local optimum that no agent ever leaves (docs/concepts/physics.md). On a course the distance never has to
-decrease by more than MOST_FALL.
+decrease by more than MOST_FALL, 1.5 m.
 """
 
 from __future__ import annotations

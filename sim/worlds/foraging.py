@@ -27,9 +27,9 @@ STEP_NM = 5.0
 
 
 def petal(ultraviolet: float) -> Spectrum:
-    """Return a yellow spectrum with this reflectance in the ultraviolet. It is smooth.
+    """Return a smooth, yellow reflectance spectrum, which equals `ultraviolet` up to 350 nm.
 
-    At 400 nm and above, it does not depend on this reflectance.
+    At 400 nm and above, the spectrum does not depend on `ultraviolet`.
     """
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + STEP_NM / 2, STEP_NM)
     yellow = DARK + (BRIGHT - DARK) / (1 + np.exp((EDGE_NM - nm) / WIDTH_NM))

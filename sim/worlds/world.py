@@ -114,9 +114,9 @@ def build_world(
     spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the
         task defines, or replace them. Each is an `optics.Spectrum`, or a name that `optics.reflectance` or
         `optics.illuminant` accepts.
-    medium: water or air between surfaces and eyes: an `optics.TurbidMedium`, or one of its names ("clear_ocean",
-        "coastal_water", "fog"; see `optics.turbid_medium`). Under water, eyes are immersed (`optics.immersed`). None:
-        clear air
+    medium: water or air between surfaces and eyes: an `optics.TurbidMedium`, or a name ("air", "clear_ocean",
+        "coastal_water" or "fog", see `optics.turbid_medium`). Under water, eyes are immersed (`optics.immersed`). None
+        or "air": clear air
 
     Raises:
         ValueError: an argument has the wrong type or is out of range; the task, the course, the medium or a spectrum is

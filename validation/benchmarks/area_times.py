@@ -47,7 +47,7 @@ CASES = {
 
 
 def moments(world: sim.World) -> WorldState:
-    """Return worlds in which all agents face an object 0.6 to 4 m ahead."""
+    """Return a state of all worlds in which each agent faces an object 0.6 to 4 m ahead."""
     simulation, random = Simulation(task_of(world), WORLDS, 0), np.random.default_rng(0)
     simulation.reset()
     for _ in range(STEPS):

@@ -2,8 +2,8 @@
 
     python -m validation.benchmarks.first_psf [rounds]
 
-Prints medians of CPU time of separate processes that take turns. Python's byte code and Dr.Jit's kernels are cached
-from earlier processes, as they are for a user.
+The script prints medians of the CPU times of separate processes, which take turns. Python's byte code and Dr.Jit's
+kernels are cached from earlier processes, as they are for a user.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
     python -m validation.benchmarks.gpu [--only NAME ...]
 
-Each device computes in a separate process. Prints wall time per call, as medians after calls that compile and warm up,
-and the largest difference between the results of both devices, as a share of the largest number.
+Each device computes in a separate process. The script prints the wall time per call, as the median over calls after
+those that compile and warm up. It also prints the largest difference between the results of both devices, as a share of
+the largest number.
 """
 
 from __future__ import annotations

@@ -2,10 +2,10 @@
 
     OPENBLAS_NUM_THREADS=1 python -m validation.benchmarks.kernel_times [genotypes]
 
-Random genotypes of the preset `lens` are used, with the cells on which receptive fields are tabulated, in the preset's
-field of view and in narrower ones, with three genes of a relief (laptop) and with sixteen (paper). Prints CPU seconds
-of one thread for `Eye.kernel` of new eyes, after a round with other eyes has compiled its kernels, and the number of
-refused eyes.
+The script prints the CPU seconds of one thread for `Eye.kernel` of new eyes, and the number of refused eyes. Before
+that, a round with other eyes compiles Dr.Jit's kernels. The eyes develop from random genotypes of the preset `lens`,
+whose relief has three genes (scale laptop) or sixteen (scale paper). Their fields of view are 45°, 20° and 10°. The
+kernels have the cells on which receptive fields are tabulated.
 """
 
 from __future__ import annotations

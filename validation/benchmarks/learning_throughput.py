@@ -3,9 +3,10 @@
     python -m validation.benchmarks.learning_throughput [--steps 24576] [--json]
 
 Rates are agent-steps per second of the whole machine. As in an evolutionary run, one training per core runs in
-parallel, each in a process with one thread (after a warm-up training; rollouts and updates, without evaluations). In
-the same run `mujoco.Renderer` renders the same eyes of one world without shadows. Settings of learning are the defaults
-of the task. The bound on training applies to one frame of memory and a perfect lens.
+parallel, each in a process with one thread. The measured time covers rollouts and updates, but no evaluations, and
+starts after a warm-up training. In the same run, `mujoco.Renderer` renders the same eyes of one world without shadows.
+Settings of learning are the defaults of the task. The bound on training applies to one frame of memory and a perfect
+lens.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
 
 from evolve.config.assemble import assemble
 from evolve.search.worker import prepare_device
@@ -55,13 +55,8 @@ def training_rate(learner: Learner, steps: int, seed: int) -> float:
     case = learner.case
     eyes = with_pupil(case.eyes) if learner.lens else case.eyes
     config = replace(assemble(case.task).learning, total_steps=steps, eval_interval=steps)
-    height, width = eyes.resolution
-    common: dict[str, Any] = {
-        "memory": learner.memory,
-        "rays_per_receptor": "auto" if learner.lens else max(1, round(config.rays_per_eye / (height * width))),
-    }
-    worlds = sim.make_vec_env(case.task, eyes, config.n_envs, seed, mode="training", **common)
-    evaluation_worlds = sim.make_vec_env(case.task, eyes, 2, seed, mode="evaluation", **common)
+    worlds = sim.make_vec_env(case.task, eyes, config.n_envs, seed, memory=learner.memory, mode="training")
+    evaluation_worlds = sim.make_vec_env(case.task, eyes, 2, seed, memory=learner.memory, mode="evaluation")
     marks: list[float] = []
     for attempt in (0, 1):  # the first one compiles kernels and loads torch's lazy modules
         marks.clear()

@@ -1,7 +1,8 @@
 """Foci of many Fresnel zones with Zernike modes up to order six: `python -m validation.benchmarks.many_zones`.
 
-Prints CPU seconds of one thread for 513 x 513 samples about the focus with compiled kernels. Also prints the difference
-between the PSF and the direct sum at 16 points about its middle, relative to the root mean square there.
+The script prints CPU seconds of one thread for 513 x 513 samples about the focus with compiled kernels. It also prints
+the difference between the PSF and the direct sum at 16 points about the middle of the PSF, relative to the root mean
+square of the PSF at these points.
 """
 
 from __future__ import annotations

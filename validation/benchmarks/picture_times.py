@@ -2,8 +2,8 @@
 
     python -m validation.benchmarks.picture_times
 
-Prints medians of CPU time of one thread, with and without the eyes' signals in the image. The first two images of each
-kind compile kernels and do not count. The agent moves between images.
+The script prints medians of the CPU time of one thread, with and without the eyes' signals in the image. The first two
+images of each kind compile kernels and do not count. The agent moves between images.
 """
 
 from __future__ import annotations

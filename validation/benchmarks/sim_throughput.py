@@ -108,7 +108,7 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         fidelity = sim.Fidelity(rays, eyes.bands) if rays else sim.choose_fidelity(world, eyes, bands="own")
         renderer = sim.BatchedRenderer(world, eyes, n_envs, fidelity, tracer)
         chosen[name] = f"{renderer.tracer.name}, {renderer.fidelity.rays_per_receptor:g} rays per receptor"
-        rates[name] = n_envs / seconds(lambda renderer=renderer: renderer.signals(moved()), budget)  # type: ignore[misc]
+        rates[name] = n_envs / seconds(lambda renderer=renderer: renderer.signals(moved()), budget)
     step = _Step(case, n_envs)
     for _ in range(SETTLED + BLOCK):  # at least one block counts
         step()
@@ -124,7 +124,7 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         "n_envs": n_envs,
         "chosen": chosen,
         "agent_steps_per_second": rates,
-        "ratio_to_mujoco": {name: rates[name] / base for name in names} if base else None,  # type: ignore[operator]
+        "ratio_to_mujoco": {name: rates[name] / base for name in names} if base else None,
         "overhead": statistics.median(step.shares[SETTLED // BLOCK :]),
     }
 
@@ -147,17 +147,19 @@ class _Step:
         self._parts: list[Callable[[], Any]] = []
         self.wholes: list[float] = []
         self.shares: list[float] = []
-        physics, chance = simulation.physics, StreamsByPurpose(1, n_envs)
+        task: Any = simulation.task  # of a built-in task, whose physics has agents
+        physics: Any = simulation.physics
+        chance = StreamsByPurpose(1, n_envs)
         (sight,) = self._worlds.animals.learners[0].sights.values()
         alone = EyesOfKind(simulation, sight.renderer, simulation.streams.noise_keys[0][0], memory=1)
-        move = simulation.task.moved
+        move = task.moved
 
         def moved(worlds: Any) -> Any:
             then = SimpleNamespace(state=worlds.state, chance=chance, seconds=worlds.seconds)
             self._parts.append(lambda: move(then))
             return move(worlds)
 
-        simulation.task.moved = moved  # type: ignore[method-assign]
+        task.moved = moved
         self._note(physics.agents, "step", physics.agents.step)
         self._note(sight, "launch", lambda *asked: alone.launch(*asked).wait())
 

@@ -194,7 +194,7 @@ def correlation(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
 
 
 def _of_ranks(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return Pearson's correlation of the ranks of each row; NaN for constant rows."""
+    """Return, for each row, Pearson's correlation of the ranks in `a` with those in `b`; NaN for constant rows."""
     x, y = (rankdata(values, axis=1) - (values.shape[1] + 1) / 2 for values in (a, b))
     with np.errstate(invalid="ignore"):
         return (x * y).sum(axis=1) / np.sqrt((x**2).sum(axis=1) * (y**2).sum(axis=1))

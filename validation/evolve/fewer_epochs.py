@@ -140,7 +140,7 @@ def pairs(lives: Sequence[Life], task: str) -> list[tuple[Life, Life]]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Results of a task's training runs with constant and with fewer epochs.
+    """Results of a task's training runs with constant and with fewer epochs. Pairs of numbers are in this order.
 
     returns: mean returns.
     gain, error: mean difference of the returns, and its standard error.

@@ -123,7 +123,7 @@ def watched(case: Case, seed: int) -> Iterable[Row]:
         update()
         update_seconds += time.process_time() - began
 
-    model.train = timed_update  # type: ignore[method-assign]
+    model.train = timed_update
     while model.num_timesteps < case.learning.total_steps:
         began = time.process_time()
         model.learn(case.learning.eval_interval, reset_num_timesteps=False)

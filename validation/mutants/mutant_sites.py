@@ -88,7 +88,7 @@ class Site:
         return source[: self.start] + self.after.encode() + source[self.end :]
 
     def chance(self, seed: int) -> str:
-        """Return a hash that determines the place in a random order, whatever other files and lines contain."""
+        """Return a hash that determines the site's place in a random order, whatever other files and lines contain."""
         return hashlib.sha256(f"{seed} {self.path} {self.kind} {self.change}".encode()).hexdigest()
 
 
@@ -156,7 +156,7 @@ class _Finder:
             ast.Assign: self._targets,
         }
         if type(node) in looks:
-            yield from looks[type(node)](node)  # type: ignore[operator]
+            yield from looks[type(node)](node)
 
     # --- kinds of mistakes
 

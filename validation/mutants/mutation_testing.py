@@ -85,7 +85,7 @@ def stored(path: Path) -> list[Row]:
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", newline="") as file:
-        return [Row(**{**row, "line": int(row["line"])}) for row in csv.DictReader(file)]  # type: ignore[arg-type]
+        return [Row(**{**row, "line": int(row["line"])}) for row in csv.DictReader(file)]
 
 
 def chosen(root: Path, count: int, seed: int) -> list[Site]:

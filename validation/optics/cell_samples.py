@@ -2,7 +2,8 @@
 
 For random genotypes of the preset `lens`, each wavelength's PSF is computed with twice the stated samples per cycle of
 its highest frequency. Integrals over the eye's cells from every second sample are compared with those from all samples.
-Prints the relative error by the number of cycles per cell: the median, the 90 % quantile, and the largest of all PSFs.
+The script prints the relative error by the number of cycles per cell: the median, the 90 % quantile, and the largest of
+all PSFs.
 """
 
 from __future__ import annotations

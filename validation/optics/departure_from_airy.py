@@ -7,7 +7,7 @@ exact integral.
 
     python -m validation.optics.departure_from_airy [--out DIR]
 
-Prints the table, draws the figure, and exits with 1 if a bound does not hold.
+The script prints the table, draws the figure, and exits with 1 if a bound does not hold.
 """
 
 from __future__ import annotations

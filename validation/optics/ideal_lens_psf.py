@@ -2,12 +2,12 @@
 
 1. The exact first Rayleigh-Sommerfeld integral, by quadrature in float64. `optics.psf` must agree with it.
 2. The Airy pattern, the limit of that integral for small apertures and large distances. The exact PSF differs from it
-by O(NA²), and by O(1/Fresnel    number²) for small lenses. At f/2 the Airy pattern must therefore *not* agree. The
-difference must fall like NA², and a slow lens of large Fresnel    number must agree with the Airy pattern.
+by O(NA²), and by O(1/Fresnel number²) for small lenses. At f/2 the exact PSF must therefore *not* agree with the Airy
+pattern. The difference must fall like NA², and a slow lens of large Fresnel number must agree with the Airy pattern.
 
     python -m validation.optics.ideal_lens_psf [--out DIR]
 
-Prints the table, draws the figure, and exits with 1 if a bound does not hold.
+The script prints the table, draws the figure, and exits with 1 if a bound does not hold.
 """
 
 from __future__ import annotations

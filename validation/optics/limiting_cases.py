@@ -85,9 +85,8 @@ def propagated(u: Any, **more: Any) -> optics.PropagationResult:
 def lobe(radius: float) -> float:
     """Return the error relative to the closed form of a tiny pinhole's PSF, πa² z² / (λρ²)² for ka << 1.
 
-    a is the radius of the pinhole, and ρ the distance from it.
-
-    It follows from the kernel ik z / (2πρ²) e^{ikρ}.
+    Here a is the radius of the pinhole, and ρ is the distance from it. The closed form follows from the kernel
+    ik z / (2πρ²) e^{ikρ}.
     """
     distance, side = 1e-3, 17
     got = psf(Pupil(radius), distance, dx=2e-4, shape=(side, side))

@@ -1,6 +1,7 @@
 """Pupils of lens designs, and their PSFs by a matrix Fourier transform in PyTorch.
 
-The transform goes from direction sines to the window, with a grey edge. It plans nothing and predicts no error. All
+The transform computes the window from samples of the pupil, placed by their direction sines. The pupil's edge is grey:
+a sample counts by the share of its cell within the pupil. The transform plans nothing and predicts no error. All
 matrices that do not depend on the design parameters are prepared in advance.
 """
 
@@ -32,7 +33,8 @@ class Design:
 
     numbers: function that returns new design parameters.
     pupil: function that returns the pupil with these parameters, NumPy or PyTorch.
-    path: function that prepares, for points along an axis of the pupil [m], the optical path [m] of the parameters.
+    path: function of points along an axis of the pupil [m]. It returns a function from design parameters to the optical
+        path [m] at these points.
     """
 
     name: str
@@ -57,7 +59,7 @@ def designs() -> Iterator[Design]:
 
 
 def matrix_transform(design: Design, count: int) -> Callable[[torch.Tensor], torch.Tensor]:
-    """Return a function that returns PSFs (distance, wavelength, y, x) of the parameters, float32.
+    """Return the function from design parameters to PSFs (distance, wavelength, y, x) in float32.
 
     count: samples across the pupil.
     """
@@ -160,7 +162,7 @@ def _separable(matrix: np.ndarray) -> Path:
 
 
 def _mode_path(at: np.ndarray, count: int) -> Path:
-    """Return the function for the modes of `optics.Zernike`, whose wavefront is ahead by 1 µm per unit."""
+    """Return the function from coefficients of `optics.Zernike` [µm] to the optical path [m] at these points."""
     x, y, far = at[None, :], at[:, None], optics.PointSource()
     flat = _zernike(np.zeros(count)).path(x, y, GREEN[0], far)
     own = torch.tensor(np.stack([_zernike(one).path(x, y, GREEN[0], far) - flat for one in np.eye(count)], -1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
     )
 
 
-def _field(case: Case, grid: SampleGrid) -> object:
+def _field(case: Case, grid: SampleGrid) -> Any:
     from diffractio.scalar_fields_XY import Scalar_field_XY
 
     x = grid.x * MICRONS

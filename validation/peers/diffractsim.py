@@ -1,4 +1,4 @@
-"""diffractsim: angular spectrum (on a grid padded by us) and its Bluestein transform onto a window; numpy back end."""
+"""diffractsim: angular spectrum, on a grid padded by us, with its numpy back end."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class Verdict:
 
 
 def verdicts(ours: Sequence[Point], peers: Sequence[Point]) -> list[Verdict]:
-    """Evaluate every goal on every case of ours."""
+    """Evaluate every goal on every case of our points."""
     found = []
     for case in dict.fromkeys(point.case for point in ours):
         mine, others = ([point for point in points if point.case == case] for points in (ours, peers))
@@ -69,8 +69,8 @@ def _single_precision(case: str, ours: Sequence[Point], peers: Sequence[Point]) 
 def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -> list[Verdict]:
     """Compare angular spectra with equal samples.
 
-    Errors are relative to the smallest error of the peers, and times to that of the fastest peer with a comparable
-    error.
+    Errors are relative to the smallest error of the peers. Times are relative to the time of the fastest peer with a
+    comparable error.
     """
     found = []
     spectra = [[point for point in points if point.kind == "angular spectrum"] for points in (ours, peers)]
@@ -89,9 +89,9 @@ def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -
 
 
 def own_best(peers: Iterable[Point]) -> list[Point]:
-    """Return the point of the smallest error of each peer, among methods that solve the same problem.
+    """Return the point with the smallest error of each peer, without paraxial methods.
 
-    Paraxial methods are excluded, because by chance they are most accurate with a handful of samples.
+    Paraxial methods solve another problem, and by chance they are most accurate with a handful of samples.
     """
     found: dict[str, Point] = {}
     for point in peers:

@@ -45,9 +45,10 @@ def one_thread() -> Iterator[None]:
 
 
 def median_seconds(compute: Callable[[], Any], repeats: int = REPEATS, least: float = 0.05) -> float:
-    """Return the median duration of at least `repeats` calls (three if one takes a second) and `least` seconds.
+    """Return the median duration [s] of a call.
 
-    The call must have been made once before. If the second call is short, it is not counted, because it may still
+    The call is repeated for at least `least` seconds, and at least `repeats` times, or three times if calls take a
+    second. It must have been made once before. If the second call is short, it is not counted, because it may still
     include warm-up.
     """
     times = [_seconds(compute)]
@@ -87,7 +88,7 @@ def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator
 
 
 def quickest(rounds: Sequence[Sequence[Point]]) -> list[Point]:
-    """Return one point of each method and setting: the smallest of its medians, since other load only adds time."""
+    """Return one point of each method and setting: that with the smallest median, since other load only adds time."""
     best: dict[tuple[object, ...], Point] = {}
     for point in (point for points in rounds for point in points):
         key = (*point.series, point.samples, point.pitch)

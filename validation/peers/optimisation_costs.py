@@ -57,7 +57,7 @@ Images = Callable[[torch.Tensor], torch.Tensor]
 
 @dataclass(frozen=True)
 class Point:
-    """CPU times [ms] of a design's PSFs, without and with their gradient, and their largest error.
+    """CPU times [ms] of a design's PSFs, without and with their gradient, and their largest relative L2 error.
 
     setting: tolerance of `optics`, or the number of samples of the plain transform.
     """
@@ -106,7 +106,7 @@ def _times(images: Images, numbers: torch.Tensor) -> tuple[float, float]:
 
 
 def least(points: Sequence[Point], error: float) -> Point | None:
-    """Return the plain transform with the fewest samples whose error is at most that given; None if there is none."""
+    """Return the plain transform with the fewest samples whose error is at most `error`; None if there is none."""
     return next((point for point in points if not point.ours and point.error <= error), None)
 
 

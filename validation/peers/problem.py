@@ -1,7 +1,7 @@
 """Cases for all codes, with their input and the exact result.
 
-A code receives the field in the pupil, sampled on a square grid of its choice, and returns the intensity on 129 x 129
-points. The exact result is the first Rayleigh-Sommerfeld integral in float64 (`validation.reference`).
+A code receives the field in the pupil, sampled on a square grid, and returns the intensity on 129 x 129 points. The
+exact result is the first Rayleigh-Sommerfeld integral in float64 (`validation.reference`).
 """
 
 from __future__ import annotations
@@ -145,12 +145,11 @@ class Peer:
 
 
 def grids(case: Case) -> list[SampleGrid]:
-    """Return square grids with even, fast lengths that contain pupil and window once.
+    """Return square grids just wide enough for pupil and window, and coarse grids of twice that width.
 
-    Coarse grids of twice that width follow.
-
-    Outputs coincide with samples if the samples are fine enough. The wider grids are for codes whose error is wrapped
-    light.
+    They are sorted by their number of samples, which is even and has a fast Fourier transform. Outputs coincide with
+    samples if the samples are fine enough. The wider grids are for codes whose error is light that wraps around the
+    edges of a grid.
     """
     least = max(2.04 * case.radius, 2 * case.half_window)
     found = []
@@ -163,7 +162,7 @@ def grids(case: Case) -> list[SampleGrid]:
 
 
 def error(case: Case, intensity: np.ndarray, fitted: bool) -> float:
-    """Return the relative L2 error of an intensity over the window.
+    """Return the relative L2 error of an intensity over the window; infinite for a wrong shape or non-finite values.
 
     fitted: True to multiply the intensity first by the factor that minimises the error.
     """
@@ -177,7 +176,11 @@ def error(case: Case, intensity: np.ndarray, fitted: bool) -> float:
 
 @cache
 def _exact(case: Case) -> np.ndarray:
-    """Return the exact result with the reference's own node counts, checked at some radii with many more."""
+    """Return the exact result with the reference's own node counts, checked at some radii with many more nodes.
+
+    Raises:
+        ArithmeticError: the two results differ by more than CONVERGED.
+    """
     r = np.hypot(case.window.x[None, :], case.window.x[:, None])
     profile = ideal_lens_profile(float(r.max()), WAVELENGTH, case.radius, case.focal_length, case.distance)
     some = np.linspace(0, float(r.max()), 23)

@@ -1,4 +1,4 @@
-"""prysm: its free-space transfer function, which is Fresnel's, and matrix and chirp-z transforms to the focus."""
+"""prysm: its free-space (Fresnel) transfer function, and its matrix and chirp-z transforms to the focus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""This package on the same cases: `optics.psf` from 1e-2 to 1e-9, and `optics.propagate` on a hard-edged pupil."""
+"""This package on the same cases.
+
+`optics.psf` runs at tolerances from 1e-2 to 1e-9, and `optics.propagate` runs on a hard-edged pupil.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,10 @@ LONGEST = 0.2  # predicted seconds above which a method selected by name is omit
 
 
 def psf_runs(case: Case) -> Iterator[Run]:
-    """Yield runs at every possible tolerance, by the planner's choice and by each method that reaches it."""
+    """Yield runs at every tolerance that is reached, with the planner's choice of method and with each exact method.
+
+    Methods that the planner does not choose are omitted if their predicted time is above LONGEST.
+    """
     focal_length = case.focal_length if case.has_lens else None
     pupil = optics.Pupil(aperture_radius=case.radius, thin_lens_focal_length=focal_length)
     for method in ("auto", *EXACT):

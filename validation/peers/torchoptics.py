@@ -38,9 +38,9 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
 
 
 def _target(case: Case, grid: SampleGrid) -> SampleGrid:
-    """Return an odd number of samples that has a fast transform.
+    """Return a grid with an odd number of samples that covers the window, with the pitch of `grid`.
 
-    It covers the window with a margin for interpolation.
+    The number is chosen so that the convolution with the samples of `grid.odd` has a fast Fourier transform.
     """
     least = 2 * math.ceil(case.half_window / grid.dx) + 1
     if grid.dx > case.window.dx:

@@ -7,7 +7,8 @@ only indicative in that case.
 
     python -m validation.peers.work_precision [--peers [PEER ...] [--write]] [--rounds N] [--cases f/2 ...]
 
-Prints tables and goals, draws the figure, and exits with 1 if a goal is missed. Peers: `pip install .[peers]`.
+The script prints tables and goals, draws the figure, and exits with 1 if a goal is missed. `pip install .[peers]`
+installs the peers.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def measure(
 
 
 def table(points: Sequence[Point]) -> str:
-    """Return the best error of every method of every code, with its time."""
+    """Return a table of the best error of every method of every code, with its time."""
     series: dict[tuple[str, ...], list[Point]] = defaultdict(list)
     for point in points:
         series[point.case, point.peer, point.method, point.dtype].append(point)

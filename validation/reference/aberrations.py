@@ -87,7 +87,11 @@ def strehl_of_wavefront(wavefront: np.ndarray, weight: np.ndarray) -> float:
 
 
 def noll_index(j: int) -> tuple[int, int]:
-    """Return (n, m) of Noll's j >= 1: m > 0 is the cosine, m < 0 the sine (Noll 1976, JOSA 66:207, table I)."""
+    """Return (n, m) of Noll's j >= 1: m > 0 is the cosine, m < 0 the sine (Noll 1976, JOSA 66:207, table I).
+
+    Raises:
+        ValueError: j is less than 1.
+    """
     if j < 1:
         raise ValueError(f"j = {j}: must be at least 1")
     n = (math.isqrt(8 * j - 7) - 1) // 2
@@ -99,7 +103,7 @@ def noll_index(j: int) -> tuple[int, int]:
 def zernike(j: int, rho: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Return Noll's polynomial Z_j, which has RMS 1 over the unit disk (Noll 1976, eqs. 1, 2).
 
-    It is √(n+1) R_n^m √2 cos mθ, or the same with sin mθ. All Z_j are orthogonal.
+    It is √(n+1) R_n^m √2 cos mθ, or the same with sin mθ, and √(n+1) R_n^0 for m = 0. All Z_j are orthogonal.
     """
     n, m = noll_index(j)
     radial = np.zeros(np.shape(rho))

@@ -21,7 +21,7 @@ def annulus_spectrum(fx: np.ndarray, fy: np.ndarray, inner: float, outer: float 
 
 
 def rectangle_spectrum(fx: np.ndarray, fy: np.ndarray, width: float, height: float) -> np.ndarray:
-    """Return the spectrum of a rectangle of full widths (Goodman, §2.1.5)."""
+    """Return the spectrum of a rectangle with these full widths along x and y (Goodman, §2.1.5)."""
     return np.asarray(width * np.sinc(width * np.asarray(fx)) * height * np.sinc(height * np.asarray(fy)))
 
 

@@ -37,6 +37,9 @@ def ideal_lens_field(
 
     nodes: numbers of nodes (radial, angular). None: enough for float64, from the gradient of the phase of lens and
         path.
+
+    Raises:
+        ValueError: the distance is not finite.
     """
     z = focal_length if distance is None else distance
     if not math.isfinite(z):
@@ -63,7 +66,7 @@ def ideal_lens_profile(
 
     The function is a Chebyshev series in r², because the field is even and analytic in r, and band-limited by the
     steepest ray (Trefethen, Approximation Theory and Approximation Practice, ch. 8). It saves time for windows with
-    more than a few hundred radii.
+    more than a few hundred radii. It raises ValueError if r exceeds r_max.
     """
     z = focal_length if distance is None else distance
     steepest = (radius + r_max) / math.hypot(radius + r_max, z)

@@ -6,7 +6,10 @@ polarised along x near the focus is
 
     E = (I₀ + I₂ cos 2φ, I₂ sin 2φ, -2i I₁ cos φ),   Iₘ = kz/2 ∫ a cₘ sin θ Jₘ(kρ sin θ) e^{ikW} dθ,
 
-    c₀ = 1 + cos θ,  c₁ = sin θ,  c₂ = 1 - cos θ.
+    c₀ = 1 + cos θ,  c₁ = sin θ,  c₂ = 1 - cos θ,
+
+where ρ and φ are polar coordinates in the focal plane, z is the radius of the sphere, and W(θ) [m] is the wavefront
+error on it.
 
 An evenly illuminated flat pupil (r = z tan θ) has a = 1/cos θ: with c₀ = 2 and the others 0 this is the
 Rayleigh-Sommerfeld integral for large kz. An aplanatic lens (r = z sin θ) has a = √cos θ.
@@ -30,7 +33,7 @@ class Light:
     """Light on the pupil.
 
     at: function that returns a(θ) e^{ikW(θ)} for angles θ.
-    cycles: upper bound on the cycles of W between the rims.
+    cycles: upper bound on the cycles of e^{ikW} between the rims.
     """
 
     at: Callable[[np.ndarray], np.ndarray]

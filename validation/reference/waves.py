@@ -82,7 +82,7 @@ def knife_edge_field(x: np.ndarray, wavelength: float, z: float) -> np.ndarray:
 def slit_field(x: np.ndarray, half_width: float, wavelength: float, z: float) -> np.ndarray:
     """Return Fresnel's field behind a slit |x| < a in a unit plane wave, the difference of two edges (Goodman §4.5.1).
 
-    The product of two such fields is that of a rectangle.
+    The product of two such fields, one of x and one of y, is the field behind a rectangle.
     """
     scale = np.sqrt(2 / (wavelength * z))
     x = np.asarray(x)

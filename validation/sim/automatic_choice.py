@@ -54,6 +54,7 @@ class Choice:
     """Chosen samples of one setting.
 
     sweep: property in which the setting differs from the preceding one
+    samples, number: kind of samples ("rays" or "areas"), and their number per receptor
     error: predicted error relative to the tolerance
     time: CPU time of a frame per receptor [s]
     """

@@ -2,9 +2,9 @@
 
     python -m validation.sim.environment_endurance [--steps N] [--task TASK]
 
-Steps a small VecEnv behind a pupil with random actions over many episodes, and reads the process's resident memory
-after every tenth of the steps. Bounds: after the first tenth the memory grows by less than 2 MB (allocators round), and
-no frozen function is recorded a second time.
+The script steps a small VecEnv, whose eyes have a pupil, with random actions over many episodes. It reads the process's
+resident memory after every tenth of the steps. Bounds: after the first tenth, the memory grows by less than 2 MB
+(allocators round), and no frozen function is recorded a second time.
 """
 
 from __future__ import annotations

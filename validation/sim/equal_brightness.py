@@ -152,7 +152,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _draw(path: Path) -> None:
-    """Draw the mean difference over distance, for fitted and for even bands."""
+    """Draw the mean difference over distance, for shipped and for even bands."""
     import matplotlib
 
     matplotlib.use("agg")

@@ -112,7 +112,7 @@ def mounts_on(model: mujoco.MjModel) -> list[sim.Mount]:
 
 
 def compare(name: str, model: mujoco.MjModel, rng: np.random.Generator) -> Row | None:
-    """Compare one model; None if it has no moving parts."""
+    """Return the results of one model; None if it has no moving parts, or if no eye can be mounted."""
     eye, datas = optics.Eye(resolution=RESOLUTION, fov_deg=FOV_DEG), [posed(model, rng) for _ in range(WORLDS)]
     renderer = None
     for mounts in (mounts_on(model), mounts_on(model)[:1]):  # cameras inside geoms are refused

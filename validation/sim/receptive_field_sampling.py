@@ -13,8 +13,8 @@ be reflected any number of times, with many areas ([area sampling](../concepts/r
 reference use the same light, so they differ only in sampling.
 
 Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection world.
-They are in units of the receptor noise σ = 0.01, where white gives a signal of 1 behind a pupil as wide as the retina
-(a = 1). The five kinds of pupil are:
+Their unit is the receptor noise, σ = 0.01. The unit of signals is the signal of white behind a pupil as wide as the
+retina (a = 1). The five kinds of pupil are:
 
 - perfect: no pupil (the perfect lens);
 - pinhole: a = 0.04;

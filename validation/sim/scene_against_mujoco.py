@@ -62,7 +62,8 @@ COLLECTIONS = (
 class Row:
     """Results for one model.
 
-    same_geom, same_depth: fractions of all pixels that agree.
+    same_geom: fraction of all pixels that show the same geom.
+    same_depth: fraction with the same depth, of the pixels that show the same geom and whose ray hits it.
     worst_picture: fraction of pixels with the same geom in the worst image.
     lacks: features that the mirror reports as missing.
     """
@@ -89,7 +90,7 @@ def model_files() -> Iterator[tuple[str, Path]]:
 def poses(model: mujoco.MjModel, rng: np.random.Generator) -> Iterator[Shot]:
     """Yield random poses with moved and rotated mocap bodies.
 
-    Each is seen from a random direction above the horizon, and by the model's cameras in turn.
+    Each pose is seen from a random direction above the horizon and, if the model has cameras, by one of these in turn.
     """
     data = mujoco.MjData(model)
     for i in range(POSES):
@@ -129,7 +130,7 @@ def move(model: mujoco.MjModel, qpos: np.ndarray, joint: int, rng: np.random.Gen
 
 
 def compare(name: str, model: mujoco.MjModel) -> Row:
-    """Compare one model.
+    """Return the results of one model.
 
     Raises:
         RuntimeError: MuJoCo cannot render.
@@ -157,9 +158,9 @@ def compare(name: str, model: mujoco.MjModel) -> Row:
 
 
 def _agreement(mirror: Mirror, data: mujoco.MjData, shot: Shot, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return masks of pixels that show the same geom, and of pixels with the same depth.
+    """Return the mask (y, x) of pixels that show the same geom, and, for some of them, whether the depth is the same.
 
-    Only pixels in which the ray caster hits the geom count.
+    Depths are compared only in pixels in which the ray caster hits the same geom.
     """
     view = _viewpoint(mirror, shot)
     seen, depth = mirror.render_ids(view, WIDTH, HEIGHT), mirror.render_depth(view, WIDTH, HEIGHT)

@@ -142,7 +142,7 @@ def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[P
 def converged(
     scene: Scene, world: sim.World, judged: Sequence[Population], spp: int
 ) -> tuple[list[np.ndarray], Errors]:
-    """Return the path-traced signals by the reference renderer, and their standard errors, from two halves."""
+    """Return the path-traced signals, means of two renderings by the reference renderer, and their standard errors."""
     renderer = sim.ReferenceRenderer(world, scene.eyes_with(BANDS), "path", spp, sampler="multijitter")
     halves = []
     for renderer.seed in (1, 2):
@@ -230,7 +230,10 @@ def to_the_end(scene: Scene, world: sim.World, judged: Sequence[Population], lig
 
 
 def timed(runners: Sequence[Runner], crowd: WorldState, rounds: int) -> list[float]:
-    """Return the CPU seconds of each runner's fastest call. Short calls are repeated for ROUND seconds a round."""
+    """Return the CPU seconds of each runner's fastest call.
+
+    In each round, short calls are repeated for ROUND seconds.
+    """
     quickest = [np.inf] * len(runners)
     for _ in range(rounds):
         for i, mine in enumerate(runners):

@@ -38,7 +38,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Errors:
-    """Root mean squares in σ, over all receptors, and over receptors that see an object; None without objects."""
+    """Root mean square errors [σ] over all receptors and over receptors that see an object; None without objects."""
 
     everywhere: float
     on_objects: float | None = None

@@ -60,7 +60,8 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
     Raises:
         RunError: the policy of the best animal is missing or damaged.
-        ConfigError: the user task was not named when the run was opened, or fails.
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        RuntimeError: a method of the user task fails at the start of the episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file cannot be read or written.
     """

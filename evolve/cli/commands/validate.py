@@ -74,7 +74,7 @@ def validate(arguments: Namespace) -> int:
 
 
 def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
-    """Return the script with this name, old name or code. If it is not the current name, print the current name.
+    """Return the script with this name, old name or code. For an old name or a code, also print the current name.
 
     Raises:
         ConfigError: the name is unknown.

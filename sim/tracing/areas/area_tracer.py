@@ -48,7 +48,8 @@ class AreaTracer:
     basis: (component, band): contribution of each component to each band
 
     Raises:
-        NoClosedForm: the walls have several heights or lie on no grid, or a texture changes along two axes.
+        NoClosedForm: the walls have several heights or lie on no grid, a texture changes along two axes, a shadow is
+            longer than a cell, or light is reflected more than once and there are no walls or too many cells.
     """
 
     name = "areas"
@@ -145,7 +146,7 @@ class AreaTracer:
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
-        """Return the rows `place` of a world's table of illuminated bodies, given the centres of its bodies."""
+        """Return the rows `place` of a world's table (`IlluminatedBodies`); bodies: centres of the world's bodies."""
         assert self._reflected
         assert inputs.reflected
         reflected = partial(self._reflected.on_body, tables=inputs.reflected)
@@ -213,10 +214,11 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return fractions of the area in which a sphere hides each wall (left, right) and the floor, then its light.
+        """Return the fractions of the area in which a sphere hides walls and floor, followed by the sphere's light.
 
-        The light of the sphere is multiplied by the fraction of the area that the sphere fills, per component. Parts of
-        the sphere that nearer spheres hide are omitted.
+        There are three fractions: for the left wall, the right wall and the floor. The light of the sphere, per
+        component, is multiplied by the fraction of the area that the sphere fills. Parts of the sphere that nearer
+        spheres hide are omitted.
         """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)

@@ -36,7 +36,7 @@ class BodyLight:
 
     @classmethod
     def on_patch(cls, illumination: Illumination, body: int, patch: Patch, now: FrameState) -> BodyLight:
-        """Return the light on the visible part of the body with the index `body`, which `patch` represents."""
+        """Return the light on the visible part of the body with the index `body`; `patch` represents this part."""
         lit = illumination.visibility(patch, now, body)
         if not now.body_light:
             return cls(illumination, lit, [], [])

@@ -4,7 +4,7 @@ The coordinate a runs across an area (`sim.tracing.areas.patch.Area`). An uprigh
 column a at the distance t, in units of the horizontal part of the direction. The foot of the wall is visible at the
 slope (floor - z)/t, and its top at (top - z)/t. The inverse distance 1/t is linear in a, so the fractions of the area
 that floor, wall and sky fill have closed forms. If rays at the two borders of the area hit different walls, a corner or
-an edge lies between them. It is computed from the ends of the walls.
+an edge lies between them. Its column is computed from the ends of the walls.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ class AreaTables:
 class FrameState:
     """Inputs of area sampling for one frame.
 
-    bodies: centres of the moving spheres; the agent is the last one
+    bodies: centres of the moving spheres; the body that carries the eyes is the last one, if it is a sphere
     inputs: tables that are the same in all worlds
     world: index of the world of each area
     body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is neglected
@@ -147,8 +147,8 @@ class Illumination:
     def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: FrameState) -> list[Array]:
         """Return the light that a body sends to a patch, minus the light that the body hides from the patch.
 
-        Both use the form factor of a sphere. Light that the patch lacks because of the body's shadows on the floor is
-        also subtracted, see `_shadow`.
+        Both amounts are computed with the form factor of a sphere. Light that the patch lacks because of the body's
+        shadows on the floor is also subtracted, see `_shadow`.
 
         If the patch's horizon crosses the sphere, Snyder's (1996) form factor applies. The hidden light is the light
         that arrives on the body's far side, as seen from the patch. Its radiance follows from the irradiance of that
@@ -187,9 +187,9 @@ class Illumination:
     def _sent(self, k: Array, towards: Array, nearness: Array, now: FrameState) -> list[Array]:
         """Return the radiosity of a body as seen from a patch, per component.
 
-        It is the body's mean reflectance times the light on its visible side. The light is a weighted mean of two
-        limits. From far away, the patch sees the whole side, whose light follows Lambert's phase function. From close
-        by, it sees only the body's nearest point, with the irradiance there.
+        The radiosity is the body's mean reflectance times the light on its visible side. This light is a weighted mean
+        of two limits. From far away, the patch sees the whole side, whose light follows Lambert's phase function. From
+        close by, the patch sees only the body's nearest point, with the irradiance there.
 
         towards: unit vector from the body to the patch
         nearness: radius divided by distance. The weight is a fitted function of it (residual at most 0.05 of the

@@ -64,7 +64,8 @@ class Baking:
     def tables(self) -> dict[str, np.ndarray]:
         """Return all tables by name, one for each component, float32, flat.
 
-        Each iteration adds one reflection, until the tables stop changing.
+        With light of any number of reflections (`lighting.ALL`), each iteration adds one reflection. The iterations end
+        when the tables stop changing, at the latest after ORDERS reflections.
         """
         found = self._surfaces()
         for _ in range(self._orders - 1):

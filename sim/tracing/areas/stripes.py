@@ -45,8 +45,8 @@ class Texture:
 class StripeTables:
     """Tables of all textures, one array per component.
 
-    rows: in fours, the second and the first integral up to each texel's centre, and the deviations of this texel and of
-        the next one from the texture's mean
+    rows: four numbers for each texel: the second and the first integral up to the texel's centre, and the deviations of
+        this texel and of the next one from the texture's mean
     means: the textures' means, for each texel
     """
 

@@ -113,6 +113,8 @@ def test_acuity_counts_rows_of_a_hexagonal_lattice():
         ),
         (("eye.temporal_order=1",), r"eye\.temporal_order: is for camera eyes"),
         (("eye.rhabdom_length=1e-4",), r"eye\.rhabdom_length: is for camera eyes"),
+        (("wiring.pool_side=4",), r"wiring\.pool_side = 4: must be 0 for compound eyes"),
+        (("wiring.repeat_side=4",), r"wiring\.repeat_side = 4: must be 0 for compound eyes"),
         (("eye.optics=false",), r"eye\.compound = true: facets are optics; set eye\.optics = true"),
         (("genome.relative_aperture.start=0.3",), r"relative_aperture: compound eyes have facets instead of a pupil"),
         (("eye.facet_area=1e-9", "genome.resolution_height.low=3"), r"2 eyes of 3 x 4 facets, .* do not fit on 1e-09"),

@@ -9,7 +9,7 @@ geometry: test_spec_parts.py, test_patches.py, test_vertical_field.py
 immersion: test_spec_parts.py, elements/test_turbid_medium.py
 depth_range: test_depth_range.py, test_occlusion.py, test_kernel_bank.py
 kernel_bank: test_choice_parts.py, test_eye_parts.py, test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py
-kernel_interpolation: test_choice_parts.py, test_eye_parts.py, test_kernel_interpolation.py, test_kernel_bank.py
+kernel_interpolation: test_choice_parts.py, test_eye_parts.py, test_kernel_interpolation.py
 layered_image: test_image_parts.py, test_occlusion.py
 occlusion: test_image_parts.py, test_eye_parts.py, test_occlusion.py
 photoreceptor: test_image_parts.py, test_photoreceptor.py

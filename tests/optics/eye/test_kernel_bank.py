@@ -7,11 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from optics import AccuracyError, BSplineRelief, Eye, Pupil, Waveguide
+from optics import BSplineRelief, Eye, Pupil, Waveguide
 from optics.eye.eye import LIGHT_FROM
 from optics.eye.kernel_bank import KernelBank
-from optics.eye.kernel_interpolation import NodeChoice, checks, nodes, worst_difference
-from optics.numerics.interpolation import linear_weights
 
 S = 2
 NEAR, FAR = 0.6e-3, 5e-3
@@ -168,39 +166,6 @@ class TestField:
         there = eye.see(scene, S, sight=bank)
         back = eye.see(scene[:, ::-1, ::-1], S, sight=bank)[:, ::-1, ::-1]
         np.testing.assert_allclose(back, there, atol=2e-3 * there.max())
-
-
-class TestNodeChoice:
-    @pytest.mark.parametrize("counts", [(1,), (3,), (9,), (1, 1), (3, 3), (3, 5), (9, 9), (1, 5)])
-    def test_checks_lie_between_nodes(self, counts):
-        places = checks(counts)
-        assert 1 <= len(places) <= 8
-        assert len(set(places)) == len(places)
-        assert all(-1 <= at <= 1 for place in places for at in place)
-
-    def test_linear_weights_sum_to_one(self):
-        at = np.linspace(-1.5, 1.5, 31)
-        for count in (1, 2, 3, 5):
-            np.testing.assert_allclose(linear_weights(at, nodes(count)).sum(axis=0), 1)
-
-    def test_the_worst_scene_reaches_the_worst_difference(self):
-        """The difference is largest for a scene with light only where the second kernel exceeds the first."""
-        rng = np.random.default_rng(0)
-        a, b = rng.random((1, 5, 5)), rng.random((1, 7, 7))
-        padded = b - np.pad(a, ((0, 0), (1, 1), (1, 1)))
-        box = np.zeros((8, 8))
-        for i, j in np.ndindex(2, 2):
-            box[i : i + 7, j : j + 7] += padded[0] / 4
-        expected = max(box[box > 0].sum(), -box[box < 0].sum())
-        assert worst_difference([(1, b), (-1, a)], 2) == pytest.approx(expected)
-
-    def test_a_quadratic_family_errs_as_predicted(self):
-        """Linear interpolation of t² between nodes at the distance h has an error of h²/4."""
-        choice = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
-        assert [choice.error((n,)) for n in (3, 5, 9)] == pytest.approx([1 / 4, 1 / 16, 1 / 64])
-        assert choice.choose(0.1).counts == (5,)
-        with pytest.raises(AccuracyError, match=r"9 test nodes leave 2\.0e-02"):
-            choice.choose(0.001)
 
 
 @pytest.mark.parametrize(

@@ -65,5 +65,5 @@ def amplitude_across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
 
 
 def strehl_at_centre(pupil: optics.Pupil) -> float:
-    """Return light on the axis relative to that of a perfect wave through the same aperture."""
+    """Return the light on the axis relative to that of a perfect wave through the same aperture."""
     return float(across(pupil, np.array([0.0, 0.1]))[0])
