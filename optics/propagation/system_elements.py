@@ -10,6 +10,7 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion
+from optics.elements.torch_numbers import torch_numbers
 from optics.numerics.arguments import complexes, in_range, positive, shape_2d
 from optics.numerics.autodiff import Scalar, number, of_torch
 from optics.numerics.grid import Grid
@@ -81,6 +82,8 @@ def stops_of(elements: Sequence[Element], backward: bool, window: Grid) -> list[
             distance, touching = distance + sign * element.distance, False
         elif not isinstance(element, (Pupil, Misaligned)):
             raise ValueError(f"elements holds {element!r}: must be Pupil, Misaligned or FreeSpace")
+        elif torch_numbers(element):
+            raise ValueError("elements: a pupil requires a derivative of PyTorch, but only those of Dr.Jit are carried")
         elif touching:
             raise ValueError("elements: two pupils touch; put FreeSpace between them, or make them one Pupil")
         else:
