@@ -5,7 +5,7 @@ Run                             an opened run directory: candidates, tables, fig
 Candidate                       a genome, its animal, and the outcome of training and evaluation
 RunConfig                       all settings of a run, with the sections EyeConfig, SearchConfig, LearningConfig,
                                 EvaluationConfig and CostsConfig
-GENES, Gene, GeneConfig         quantities that evolution can change, and their use in a run
+GENES, Gene, GeneConfig         quantities that evolution can change, and their settings in a run
 Genotype, Phenotype, develop    encoding of genes in a genome, eyes and brain of an animal, and development of a genome
 load_policy                     trained policy from a file
 ConfigError, RunError           errors in settings, and in operations on run directories

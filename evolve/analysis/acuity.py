@@ -11,9 +11,10 @@ __all__ = ["acuity_cpd", "acuity_vertical_cpd"]
 def acuity_cpd(phenotype: Phenotype) -> float:
     """Return the horizontal acuity: the frequency of the finest vertical grating that is resolved [cycles/degree].
 
-    It is 1 / (2 min(range/(n_eyes - 1), fov/columns)), after Tiwary, Young et al. (2025). The first term is the angle
-    between neighbouring eyes, the second the angle between neighbouring columns of receptors. With a single eye, or if
-    all eyes look in the same direction, only the second term counts, because no angle separates the eyes.
+    It is 1 / (2 min(a, b)), after Tiwary, Young et al. (2025). The angle between neighbouring eyes is
+    a = `placement_range_deg` / (`n_eyes` - 1), and that between neighbouring columns of receptors is b = `fov_deg` /
+    columns. With a single eye, or if all eyes look in the same direction, only b counts, because no angle separates the
+    eyes.
     """
     between_receptors = phenotype.fov_deg / phenotype.resolution[1]
     if phenotype.n_eyes == 1 or phenotype.placement_range_deg == 0:

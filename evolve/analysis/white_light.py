@@ -80,7 +80,7 @@ def eye_image_quality(phenotype: Phenotype, config: EyeConfig, medium: str = "ai
     The quality is averaged over frequencies up to the Nyquist frequency of the receptors. A perfect lens has contrast 1
     at all frequencies.
 
-    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
+    medium: medium of the run's worlds: "air", "clear_ocean", "coastal_water" or "fog"
 
     Raises:
         optics.AccuracyError: the PSF cannot be computed accurately enough.

@@ -27,7 +27,7 @@ def every(text: str) -> int:
     """Return the number of actions from one image to the next, in the text of an argument.
 
     Raises:
-        ArgumentTypeError: the text is not a whole number from 1 to MOST_EVERY.
+        ArgumentTypeError: the text is not a whole number from 1 to 1,000,000.
     """
     if not text.isdecimal() or len(text) > LONGEST or not 1 <= int(text) <= MOST_EVERY:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 1 to {MOST_EVERY:,}")
@@ -38,7 +38,7 @@ def searches(text: str) -> int:
     """Return the number of searches with random fitness, in the text of an argument.
 
     Raises:
-        ArgumentTypeError: the text is not a whole number from 2 to MOST_SEARCHES.
+        ArgumentTypeError: the text is not a whole number from 2 to 100,000.
     """
     if not text.isdecimal() or len(text) > LONGEST or not 2 <= int(text) <= MOST_SEARCHES:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 2 to {MOST_SEARCHES:,}")

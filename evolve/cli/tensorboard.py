@@ -53,10 +53,10 @@ class TensorBoardWriter:
         """Do nothing while a candidate trains, because only scalars from the record are written."""
 
     def evaluated(self, candidate: Candidate) -> None:
-        """Write the scalars of a candidate after each rung of its training.
+        """Write the scalars of a candidate after each rung of its training; a failed candidate has none.
 
         Outcome and genes are plotted against the candidate's id, and the learning curve against training steps. If the
-        candidate's generation is complete, statistics of this generation are written too.
+        candidate's generation is complete, statistics of its successful candidates are written too.
         """
         if candidate.failure is None:
             values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}

@@ -113,7 +113,7 @@ def check_gene_use(gene: Gene, use: GeneConfig) -> None:
 def suggestion(word: Any, known: Iterable[str]) -> str:
     """Return "did you mean X?" if `word` is similar to the known word X; else a list of known words, as text.
 
-    Two words also count as similar if only their parts after the last dot are. The list contains the first MOST_LISTED
+    Two words also count as similar if only their parts after the last dot are. The list contains the first 36
     known words, and states the number of the others.
     """
     known, word = list(known), str(word)
@@ -149,7 +149,7 @@ def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> A
 
 
 def quoted(value: Any) -> str:
-    """Return a value as text for a message, on one line and with at most SHOWN characters before "..."."""
+    """Return a value as text for a message, on one line and with at most 200 characters before "..."."""
     try:
         whole = repr(value) if isinstance(value, str) else shown(value)
     except ValueError:  # more digits than Python converts to text

@@ -26,7 +26,7 @@ def lint(config: RunConfig) -> list[str]:
 def coarse_bands(config: RunConfig) -> list[str]:
     """Return a warning if the error of signals, which is due to few spectral bands, exceeds a receptor's noise.
 
-    The result is a list with one line, or [].
+    Errors up to 0.001 of the signal of a white surface are ignored. The result is a list with one line, or [].
 
     The error is computed for the measured spectra of the task's world, and for white and black in the run's medium.
     Without a medium, it is not computed for user tasks, whose reflectances are unknown, nor for grey worlds.

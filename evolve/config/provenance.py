@@ -56,7 +56,7 @@ def _spellings(key: str) -> Iterator[list[str]]:
 
 
 def _line_of(text: str, path: list[str]) -> int | None:
-    """Return the number of a setting's last line; None if a value in the text spans more lines than LONGEST_VALUE.
+    """Return the number of a setting's last line; None if a value in the text spans more than 100 lines.
 
     tomllib does not report line numbers. If the first n lines contain the setting, any larger number of lines also
     contains it. Bisection therefore finds the smallest n.

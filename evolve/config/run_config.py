@@ -58,11 +58,11 @@ __all__ = [
 class RunConfig:
     """All settings that determine the outcome of a run, and the number of its processes.
 
-    task: one of TASKS, or FILE.py:CLASS of a user task
+    task: name of a built-in task, or FILE.py:CLASS of a user task
     seed: seed of search, training and evaluation
     workers: number of worker processes; 0: one per core
     task_sha256: SHA-256 of a user task's file; "" for a built-in task
-    genome: use of each gene of the animals (`GeneConfig`), by name. A run needs at least one open gene
+    genome: settings of each gene of the animals (`GeneConfig`), by name. A run needs at least one open gene
     code: code of the user task, if the user has named the task in the command or call; else None. The code of a task
         that is named only in a file is never executed
 

@@ -57,7 +57,7 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
     """Return the sources of a preset: its settings, then its scale, whose settings override them.
 
     name: name of the preset; None: no preset, and the result is []
-    scale: name of the scale; None: the first of SCALES, if the preset has several scales
+    scale: name of the scale; None: "laptop", if the preset has several scales
 
     Raises:
         ConfigError: the preset or the scale is unknown, or `scale` is given although the preset has only one scale.

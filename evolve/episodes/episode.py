@@ -32,7 +32,7 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Episode:
-    """Recording of one evaluation episode. In the shapes of arrays, t is the time step.
+    """Recording of one episode in mode "evaluation" or "test". In the shapes of arrays, t is the time step.
 
     Row t of the arrays contains the signals at time t, the action that followed, and the results of this action:
     rewards and other entries of the observation.

@@ -169,7 +169,7 @@ def _arrays(path: Path | str) -> dict[str, Any]:
 
     Raises:
         OSError: the file cannot be read, or is not a regular file.
-        ValueError: the archive would unpack to more than `MOST_BYTES`.
+        ValueError: the archive would unpack to more than 2 GiB.
     """
     with regular_files.opened(Path(path)) as content:
         with zipfile.ZipFile(content) as archive:

@@ -13,7 +13,9 @@ __all__ = ["held_out_episodes"]
 def held_out_episodes(
     run: Run, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None
 ) -> Episodes:
-    """Play evaluation episodes in the test set of a run. The same arguments give the same episodes.
+    """Play evaluation episodes in the test set of a run, and return their results.
+
+    The same arguments give the same episodes.
 
     candidate_id: id of the candidate; None: the best candidate
     seed: seed of the episodes

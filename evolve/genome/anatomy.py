@@ -74,7 +74,8 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     are not high enough. If eyes overlap, they are spread over a larger part of the head. If the searched range of their
     placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number of its
     receptors, the numbers of eyes and of receptors are instead reduced in the same proportion. Rhabdoms become at most
-    as wide as the shorter side of a receptor; all other genes stay within their searched ranges.
+    as wide as the shorter side of a receptor, but not narrower than the valid range of their gene; all other genes stay
+    within their searched ranges.
 
     For compound eyes, see `evolve.genome.head_surface`.
 

@@ -1,4 +1,4 @@
-"""The genes: quantities that evolution can change, with their units, valid ranges and default use in a run."""
+"""The genes: quantities that evolution can change, with their units, valid ranges and default settings."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ LAMBDA_MAX: Mapping[str, float] = {f"lambda_max_{i}_nm": peak for i, peak in enu
 
 @dataclass(frozen=True)
 class GeneConfig:
-    """Use of one gene in a run. Values are in the unit of the gene, and `RunConfig` checks them.
+    """Settings of one gene in a run. Values are in the unit of the gene, and `RunConfig` checks them.
 
     The search varies an open gene within [low, high], beginning at `start`; `low` must be below `high`. A frozen gene
     (`open` is False) has the value `start`.
@@ -78,18 +78,12 @@ class GeneConfig:
 
 
 def lowest(name: str, uses: Mapping[str, GeneConfig]) -> float:
-    """Return the lowest value that a gene can have in a run.
-
-    uses: use of each gene in the run, by name
-    """
+    """Return the lowest value that a gene can have in a run. `uses` contains the settings of all genes, by name."""
     return uses[name].low if uses[name].open else uses[name].start
 
 
 def highest(name: str, uses: Mapping[str, GeneConfig]) -> float:
-    """Return the highest value that a gene can have in a run.
-
-    uses: use of each gene in the run, by name
-    """
+    """Return the highest value that a gene can have in a run. `uses` contains the settings of all genes, by name."""
     return uses[name].high if uses[name].open else uses[name].start
 
 
@@ -98,10 +92,10 @@ class Gene:
     """One gene, a quantity that evolution can change.
 
     name: name of the gene in settings, tables and records
-    cluster: one of CLUSTERS
+    cluster: "morphological", "optical", "neural" or "spectral"
     kind: "real" or "integer"
     range: valid values in any run
-    default: use of the gene in a run whose settings do not mention it
+    default: settings of the gene in a run that does not mention it
     unit: unit of the values; "" for a number without a unit
     meaning: description for tables and messages
     """
@@ -123,7 +117,7 @@ class Gene:
         """Return the gene's value at a coordinate. Each value of an integer gene has an interval of the same length.
 
         u: coordinate in [0, 1], which is not checked
-        use: use of the gene in a run; the coordinates 0 and 1 correspond to `use.low` and `use.high`
+        use: settings of the gene in a run; the coordinates 0 and 1 correspond to `use.low` and `use.high`
         """
         if self.kind == "real":
             return use.low + u * (use.high - use.low)
@@ -131,6 +125,8 @@ class Gene:
 
     def encode(self, value: float, use: GeneConfig) -> float:
         """Return the coordinate u of a value, the inverse of `decode`; for an integer, the middle of its interval.
+
+        use: settings of the gene in a run; real values from `use.low` to `use.high` have coordinates from 0 to 1
 
         Raises:
             ZeroDivisionError: the gene is real, and `use.low` equals `use.high`.
@@ -148,6 +144,7 @@ class Gene:
         sigma: step size, as a fraction of the gene's range
         normal: random number from a standard normal distribution
         step: change of the value of an integer gene, a whole number such as 1 or -1
+        use: settings of the gene in a run
         """
         if self.kind == "integer":
             value = self.decode(u, use) + step
@@ -164,12 +161,12 @@ def gene_table(
     optional: frozenset[str] = frozenset(),
     pupils: bool = True,
 ) -> Mapping[str, Gene]:
-    """Return all genes by name, in the order of the genome.
+    """Return the genes of animals with these kinds of eyes by name, in the order of the genome.
 
     relief_points: number of relief genes along one side; the relief has relief_points² genes
     relief_symmetric: True if the relief has only the genes of an eighth of its area
     square: True if eyes are square and have one gene for both sides
-    optional: genes of OPTIONAL that the animals have
+    optional: names of the genes in OPTIONAL that the animals have
     pupils: True if eyes have a pupil with a relief, and not facets
     """
     relief = set(representatives(relief_points, relief_symmetric)) if pupils else set()
@@ -267,7 +264,7 @@ def _gene(
     """Return a gene that is open by default.
 
     valid: (low, high) of the valid values
-    search: (low, high, start) of the default use
+    search: (low, high, start), the default search range and start value
     """
     low, high, start = map(float, search)
     return Gene(name, cluster, kind, Interval(*valid), GeneConfig(True, low, high, start), unit, meaning)

@@ -21,7 +21,7 @@ class Genotype:
 
     A gene that opens in a later generation has a place in the genome from the first generation, with its start value.
 
-    uses: use of each gene of the animals, by name
+    uses: settings of each gene of the animals, by name: open or frozen, search range, start value
     """
 
     uses: Mapping[str, GeneConfig]

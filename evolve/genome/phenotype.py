@@ -58,13 +58,13 @@ class Phenotype:
     memory_frames: number of frames that the brain sees
     neurons: number of neurons in each hidden layer of actor and critic
     layers: number of hidden layers of actor and critic
-    aperture_shape: index into APERTURE_SHAPES
+    aperture_shape: index of the pupil's shape in APERTURE_SHAPES (circle, annulus, slit ...)
     dispersion: 1 / Abbe number of the relief's material; 0: no dispersion
     lambda_max_nm: wavelengths at which the pigments of the receptor types absorb most [nm]; None: the setting
         `eye.receptors` of the run determines the receptors
     encoder: number of neurons in each of the brain's first layers, of which there is one for each eye
     elevation_deg: elevation of the eyes [deg]; None in built-in tasks, in which eyes look along the floor
-    rhabdom_diameter_um: diameter of the rhabdoms [µm]; None: receptors are squares that absorb all incident light
+    rhabdom_diameter_um: diameter of the rhabdoms [µm]; None: receptors are rectangles that absorb all incident light
     vertical_fov_deg: an eye's vertical field of view [deg]; None: receptors are square
     time_constant_ms: time constant of the receptors [ms]; None: they have no memory
     facet_diameter_um, rhabdom_length_um: width of the facets and length of the rhabdoms of compound eyes [µm]
@@ -148,7 +148,7 @@ class Phenotype:
     def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
         """Return the waveguide that each receptor of a camera eye forms, at most as wide as the receptor.
 
-        It is None for square receptors and for compound eyes.
+        It is None for receptors without rhabdoms, which are rectangles, and for compound eyes.
         """
         if self.rhabdom_diameter_um is None or self.facet_diameter_um is not None:
             return None
@@ -203,7 +203,7 @@ class Phenotype:
     def eye(self, eye: EyeConfig, medium: str = "air") -> optics.Eye | sim.CompoundEye:
         """Return one eye in the medium of a run's worlds: a camera eye or a compound eye.
 
-        medium: one of `MEDIA_OF_WORLDS`, in which a camera eye is immersed; it does not change a compound eye
+        medium: "air", "clear_ocean", "coastal_water" or "fog"; a camera eye is immersed in it; compound eyes ignore it
 
         Raises:
             ValueError: the medium is unknown, or a field is outside the range that `sim.Eyes` allows.
@@ -217,7 +217,8 @@ class Phenotype:
     def to_json(self) -> dict[str, Any]:
         """Return the fields by name, as values that JSON can represent, for a run's record.
 
-        The last four fields and `time_constant_ms` are omitted if they are None. Other fields are always present.
+        `time_constant_ms` and the fields of compound eyes (`facet_diameter_um`, `f_number`, `rhabdom_length_um` and
+        `acute_zone`) are omitted if they are None. Other fields are always present.
         """
         found = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
         return {name: value for name, value in found.items() if value is not None or name not in OMITTED}
@@ -284,7 +285,7 @@ def repaired(genome: NDArray[np.float64], config: Settings) -> tuple[str, ...]:
 
 
 def _aperture(shape: str) -> Any:
-    """Return the aperture with a name in APERTURE_SHAPES, scaled to the radius 1."""
+    """Return the aperture with this name, such as "circle", scaled to the radius 1."""
     import optics
 
     if shape == "circle":

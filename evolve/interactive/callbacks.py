@@ -55,7 +55,9 @@ class Callbacks:
             raise ConfigError(f"callbacks = {quoted(given)}: must be a list of functions of a run and a candidate")
 
     def carry_on(self, run: Run) -> None:
-        """Continue a locked run to its end. If a callback raises an exception, the run stops and can be resumed.
+        """Continue a run, whose lock this process holds, to its end.
+
+        If a callback raises an exception, the run stops and can be resumed.
 
         Raises:
             RunError: the record cannot be written, or the search proposes candidates that differ from those on record.

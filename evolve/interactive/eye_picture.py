@@ -29,7 +29,7 @@ def eye_picture(phenotype: Phenotype, config: EyeConfig, medium: str = "air") ->
     are drawn. For compound eyes, the acceptance function is drawn instead of relief and PSF.
 
     phenotype, config: the animal, and the settings of its run's eyes
-    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
+    medium: medium of the run's worlds: "air", "clear_ocean", "coastal_water" or "fog"
 
     Raises:
         optics.AccuracyError: the PSF cannot be computed accurately enough.

@@ -39,7 +39,7 @@ class OpenedCandidate(Candidate):
     """A candidate of an opened run, with the settings that are needed to show its eyes.
 
     eye: settings shared by all eyes of the run
-    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
+    medium: medium of the run's worlds: "air", "clear_ocean", "coastal_water" or "fog"
     """
 
     eye: EyeConfig = field(default_factory=EyeConfig)

@@ -135,7 +135,7 @@ def _toml(value: Any) -> str:
     values are converted to Python values.
 
     Raises:
-        ConfigError: the value is neither a number, nor text, nor true or false.
+        ConfigError: the value cannot be written as JSON.
     """
     try:
         return json.dumps(value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value)

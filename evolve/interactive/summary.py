@@ -34,10 +34,11 @@ def animal_as_html(candidate: Candidate) -> Html:
     """Return an HTML table with a candidate's outcome, eyes and brain."""
     animal = candidate.phenotype
     height, width = animal.resolution
+    parts = "receptors" if animal.facet_diameter_um is None else "ommatidia"
     facts = {
         "fitness": candidate.failure or _fitness(candidate),
         "episodes solved": "–" if candidate.failure else f"{100 * candidate.success_rate:.0f} %",
-        "eyes": f"{animal.n_eyes} of {height} × {width} receptors, {field_of_view(animal)}",
+        "eyes": f"{animal.n_eyes} of {height} × {width} {parts}, {field_of_view(animal)}",
         "acuity": acuity_text(animal, "cycles per degree"),
         "brain": f"{animal.layers} layers of {animal.neurons} neurons, {animal.memory_frames} frames of memory",
     }

@@ -58,7 +58,11 @@ class Adam:
         self.values.addcdiv_(self.mean, spread, value=-self.param_groups[0]["lr"] / unbias_mean)
 
     def state_dict(self) -> dict[str, Tensor | int]:
-        """Return the state that later steps need in addition to the parameters: "mean", "square" and "steps"."""
+        """Return the state that later steps need in addition to the parameters, by name.
+
+        It consists of the running means of the gradient ("mean") and of its square ("square"), and the number of
+        "steps".
+        """
         return {"mean": self.mean, "square": self.square, "steps": self.steps}
 
     @torch.no_grad()

@@ -29,7 +29,7 @@ class CheckpointError(ValueError):
 
 
 class CheckpointWarning(UserWarning):
-    """A checkpoint that cannot be used was renamed; training starts from an earlier checkpoint or the beginning."""
+    """An unusable checkpoint was renamed; training starts from an earlier checkpoint or from the beginning."""
 
 
 def metadata_of(content: bytes) -> dict[str, str]:
@@ -60,6 +60,8 @@ def sealed(content: bytes) -> bytes:
 
 def read_owned(path: Path, owner: Mapping[str, Any]) -> tuple[bytes, dict[str, Any]] | None:
     """Return the bytes of a checkpoint, and the numbers in its metadata; None if the file does not exist.
+
+    owner: training run to which the checkpoint must belong, see `TrainingRung.owners`
 
     Raises:
         CheckpointError: the file is damaged or unreadable, has no checksum, or belongs to another owner.

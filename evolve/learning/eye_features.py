@@ -38,7 +38,7 @@ UNITS = nn.LeakyReLU  # units of all hidden layers; the gradient of a leaky unit
 class Felt(nn.Module):
     """Normalisation of proprioception: each element by its own running mean and standard deviation (Welford 1962).
 
-    Normalised elements are clipped to [-FARTHEST, FARTHEST].
+    Normalised elements are clipped to [-10, 10].
     """
 
     def __init__(self, size: int) -> None:
@@ -127,12 +127,18 @@ class EyeFeatures(BaseFeaturesExtractor):
         return dict(zip(self.normalised, joined.split(self._sizes, dim=-1), strict=True))
 
     def _encode(self, frames: Tensor) -> Tensor:
-        """Return codes (eye, code, a, b) of frames (a, b, eye, channel, height, width)."""
+        """Return codes (eye, code, a, b) of frames (a, b, eye, channel, height, width).
+
+        For compound eyes, frames have the axes (a, b, ommatidium, channel), and `eye` has the length 1.
+        """
         a, b = frames.shape[:2]
         return self.encoder(self._signals(frames)).unflatten(2, (a, b))
 
     def _signals(self, frames: Tensor) -> Tensor:
-        """Return frames (..., eye, channel, height, width) as the encoders' inputs (eye, inputs, sample)."""
+        """Return frames as the encoders' inputs (eye, inputs, sample).
+
+        frames: (..., eye, channel, height, width), or (..., ommatidium, channel) of compound eyes
+        """
         return self.grid(frames).reshape(-1, self.n_eyes, self.n_inputs).permute(1, 2, 0)
 
     def adapt(self, frames: Tensor, beside: Mapping[str, Tensor] | None = None) -> None:

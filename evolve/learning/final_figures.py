@@ -19,13 +19,15 @@ __all__ = ["UnfitPolicy", "final_episodes", "require_fit", "require_test_set"]
 
 
 class UnfitPolicy(ValueError):
-    """A policy was trained for an animal with other eyes."""
+    """A policy was trained for an animal whose eyes have signals of another shape."""
 
 
 def final_episodes(
     phenotype: Phenotype, config: RunConfig, policy: EyePolicy, seed: int = 0, episodes: int | None = None
 ) -> Episodes:
-    """Play evaluation episodes in the mode "test". The same arguments give the same episodes.
+    """Play evaluation episodes in the mode "test", and return their results.
+
+    The same arguments give the same episodes.
 
     A run with `world.layouts = "family"` has a set of layouts for this mode. In other runs with built-in tasks, the
     episodes take place in the worlds of the evaluation, but begin in other states than the evaluation's episodes.
@@ -49,10 +51,10 @@ def final_episodes(
 
 
 def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
-    """Check that a policy was trained with the eyes of these worlds.
+    """Check that the signals of the eyes have the same shape in these worlds as in the policy's training.
 
     Raises:
-        UnfitPolicy: the shape of the eyes' signals differs.
+        UnfitPolicy: the shape differs.
     """
     own, here = (space["eyes"].shape for space in (policy.observation_space, worlds.observation_space))
     if own != here:

@@ -108,7 +108,7 @@ class MemoryLinear(PerEyeLinear):
 
 
 class _Slide(torch.autograd.Function):
-    """Sum of the terms W[lag] codes[lag : lag + steps] over all lags, with its gradient.
+    """Sum of the terms W[lag] codes[lag : lag + steps] over all lags, with weights W, and the gradient of this sum.
 
     Each term is a matrix product (GEMM) on the stored codes. A version that copied the last frames for each step took
     four times as long, both forward and backward.

@@ -154,7 +154,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
     """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
 
     brain: size and wiring of the brain
-    first_actions: mean and standard deviation of each element of untrained actions; None: 0 and FIRST_SPREAD
+    first_actions: mean and standard deviation of each element of untrained actions; None: 0 and 0.5
     """
 
     def __init__(

@@ -49,7 +49,7 @@ class Training:
     """Result of a training run.
 
     policy: policy at the best evaluation
-    steps: number of agent steps, in whole rollouts
+    steps: number of agent steps; training stops only after a whole rollout
     curve: (steps, mean return) of each evaluation during training
     end: state at the end of training, from which it can continue
     """
@@ -258,7 +258,7 @@ def train(
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
-    """Return whether none of the last `patience` evaluations of a learning curve exceeded the best earlier one."""
+    """Return whether a learning curve has an earlier evaluation that none of its last `patience` ones exceeds."""
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 

@@ -20,7 +20,7 @@ def first_step_size(configured: float, neurons: int) -> float:
     """Return Adam's initial step size for a brain with `neurons` units in each hidden layer.
 
     A layer sums over the units of the previous layer, so the effect of a step on its output grows with the number of
-    units. Above UNITS_AT_FULL_STEP units, the step size is therefore proportional to 1/√units.
+    units. Above 64 units, the step size is therefore proportional to 1/√units.
 
     configured: step size in the settings
     """

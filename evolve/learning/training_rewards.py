@@ -46,7 +46,7 @@ class RewardsInUnits(VecEnvWrapper):
 def ramped_share(steps: int, ramp: int) -> float:
     """Return the weight of a reward term after `steps`, as a fraction of its final weight.
 
-    It is FIRST_SHARE for the first third of the ramp, and then rises exponentially to 1. The ramp is meant for the cost
+    It is 0.1 for the first third of the ramp, and then rises exponentially to 1. The ramp is meant for the cost
     of contact. If contact has its full cost from the start, agents learn to stand still before they can steer, because
     standing still costs nothing. They then never learn to steer.
 

@@ -143,7 +143,7 @@ def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
 
 
 def _shown(value: Any) -> str:
-    """Return a value as text, in the form in which `--set` accepts it."""
+    """Return a value as text, in the form in which `--set` accepts it; "-" for a missing value."""
     if isinstance(value, bool):
         return str(value).lower()
     return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

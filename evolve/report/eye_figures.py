@@ -36,7 +36,7 @@ def eye_figures(phenotype: Phenotype, config: EyeConfig, medium: str = "air") ->
     For compound eyes, see `facet_figures`. If the PSF cannot be computed accurately enough, a line of text with the
     reason replaces a figure.
 
-    medium: medium of the run's worlds, one of `MEDIA_OF_WORLDS`
+    medium: medium of the run's worlds: "air", "clear_ocean", "coastal_water" or "fog"
     """
     eye = phenotype.eye(config, medium)
     if not isinstance(eye, optics.Eye):
@@ -150,8 +150,8 @@ def _psf(light: WhiteLight) -> Html:
 def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
     """Return the central part of the PSF in white daylight [1/m²], (y, x), and half the width of this part [m].
 
-    It contains most of the light (SHOWN_POWER). The PSF is averaged over blocks, so that the part has at most PIXELS
-    along a side.
+    It contains at least 98 % of the light, up to rounding, and is at least 3 receptors wide if the PSF is. The PSF is
+    averaged over blocks, so that the part has at most 161 pixels along a side.
     """
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
@@ -168,7 +168,10 @@ def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
 
 
 def _cuts(light: WhiteLight) -> Html:
-    """Return the figure of the PSF in several bands, along the line y = 0 through the optical axis."""
+    """Return the figure of the PSF along the line y = 0 through the optical axis.
+
+    It shows all bands, or six evenly spaced ones if there are more.
+    """
     psf = light.psf
     _, half = middle_of_psf(light)
     inside = np.abs(psf.x) <= half
@@ -184,8 +187,8 @@ def _cuts(light: WhiteLight) -> Html:
         axes.set(xlabel="x on the retina [µm]", ylabel="PSF [1/µm²]")
         axes.legend(frameon=False, loc="best", handlelength=1.2, labelcolor=MUTED)
         _degrees(axes, light.eye, 1e6 * half)
-        svg = inline(drawn, "psf-bands", "Cuts through the point spread function, one per spectral band.")
-    caption = html("<b>PSF per band</b>: cuts along x through the optical axis.")
+        svg = inline(drawn, "psf-bands", "Cuts through the point spread function in up to six spectral bands.")
+    caption = html("<b>PSF in up to six bands</b>: cuts along x through the optical axis.")
     return figure(svg, caption)
 
 
@@ -227,7 +230,7 @@ def _mtf(light: WhiteLight) -> Html:
 
 
 def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
-    """Return the MTF in white daylight of a circular aperture of the same width without aberrations, (frequency,).
+    """Return the MTF in white daylight of a circular pupil of the same width without aberrations, (frequency,).
 
     In each band, the MTF is (2/π)(arccos s - s √(1 - s²)) for s < 1, else 0, where s is the frequency divided by the
     cutoff frequency (Goodman, Fourier Optics, §6.3.3). The bands are weighted by daylight and by the mean sensitivity

@@ -1,4 +1,4 @@
-"""Figures of a compound eye's ommatidia: acceptance function, and cuts through it in each band."""
+"""Figures of a compound eye's ommatidia: acceptance function, and cuts through it in up to six bands."""
 
 from __future__ import annotations
 
@@ -63,16 +63,21 @@ def _acceptance(eye: sim.CompoundEye, phenotype: Phenotype) -> Html:
 
 
 def _cuts(eye: sim.CompoundEye) -> Html:
-    """Return the figure of the acceptance function in each band, along a horizontal line through the axis."""
+    """Return the figure of the acceptance function along a horizontal line through the axis.
+
+    It shows all bands, or six evenly spaced ones if there are more.
+    """
     angles, _ = white_acceptance(eye)
     accepted = eye.acceptance(0)
     middle = len(accepted.sines) // 2
     part = slice(middle - len(angles) // 2, middle + len(angles) // 2 + 1)
     with drawing(*SIZE) as drawn:
         axes = drawn.subplots()
-        for wavelength, values, colour in zip(eye.spectral_bands.wavelengths, accepted.values, LINES, strict=False):
-            axes.plot(angles, values[middle, ::-1][part], color=colour, lw=1.2, label=f"{1e9 * wavelength:.0f} nm")
+        chosen = np.unique(np.linspace(0, len(accepted.values) - 1, len(LINES)).astype(int))
+        for band, colour in zip(chosen, LINES, strict=False):
+            label = f"{1e9 * eye.spectral_bands.wavelengths[band]:.0f} nm"
+            axes.plot(angles, accepted.values[band, middle, ::-1][part], color=colour, lw=1.2, label=label)
         axes.set(xlabel="right [°]", ylabel="fraction of the light", ylim=(0, None))
         axes.legend(frameon=False, handlelength=1.2, labelcolor=MUTED)
-        svg = inline(drawn, "acceptance-bands", "Cuts through the acceptance function, one per spectral band.")
-    return figure(svg, html("<b>Acceptance per band</b>: cuts along a horizontal line through the axis."))
+        svg = inline(drawn, "acceptance-bands", "Cuts through the acceptance function in up to six spectral bands.")
+    return figure(svg, html("<b>Acceptance in up to six bands</b>: cuts along a horizontal line through the axis."))

@@ -105,7 +105,7 @@ def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> H
 
 
 def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
-    """Draw each candidate as a dot at its generation and fitness, connected with the nearest of its parents.
+    """Draw each successful candidate at its generation and fitness, connected with the nearest of its parents.
 
     The line of descent of the best candidate has the accent colour.
     """

@@ -115,7 +115,7 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
     Raises:
         RunError: the runs differ in settings other than their seeds, two runs have the same seed, or a run has no
             complete generation.
-        ValueError: there are fewer than two searches, or more than MOST_SEARCHES.
+        ValueError: there are fewer than two searches, or more than 100,000.
     """
     if not 2 <= searches <= MOST_SEARCHES:
         raise ValueError(f"searches = {searches}: must be from 2 to {MOST_SEARCHES:,}")

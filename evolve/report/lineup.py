@@ -49,7 +49,7 @@ def _heading(generation: int) -> str:
 
 
 def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:
-    """Return at most MOST of the best animals, including the first and the last."""
+    """Return at most 60 of the best animals, including the first and the last."""
     if len(best) <= MOST:
         return best
     return [best[round(i * (len(best) - 1) / (MOST - 1))] for i in range(MOST)]

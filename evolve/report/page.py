@@ -46,7 +46,7 @@ VISION = {
 
 
 def header(run: Run) -> Html:
-    """Return the header: title, aim of the run, and a sentence on the best candidate."""
+    """Return the header: title, aim of the run, and a sentence on the best candidate if there is one."""
     card = run.config.card
     return html(
         '<header><p class="kicker">rhabdom · evolution report · {}</p>\n<h1>{}</h1>\n'
@@ -56,7 +56,7 @@ def header(run: Run) -> Html:
 
 
 def _best_in_a_sentence(run: Run) -> Html:
-    """Return a sentence on the best candidate's eyes and its success."""
+    """Return a sentence on the best candidate's eyes and its success; empty if no candidate has succeeded."""
     if (best := run.best) is None:
         return Html()
     animal = best.phenotype
@@ -154,7 +154,7 @@ def _relief(run: Run, genes: list[Gene]) -> Html:
 
 
 def vision_section(run: Run, doing: Doing) -> Html:
-    """Return the section with four measures (`VISION`) of the best eyes so far in each generation."""
+    """Return the section with four measures of image quality (`VISION`) of the best eyes so far in each generation."""
     best = champions(run.candidates)
     if not best:
         return Html()

@@ -44,7 +44,8 @@ def episode_sentence(episode: Episode) -> str:
     terms = ", ".join(f"{name} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
     parts = f" ({terms})" if terms else ""
     end = "" if episode.failure is None else f" It ended because the task failed: {episode.failure}."
-    return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total}{parts}.{end}"
+    name = f"{episode.mode.capitalize()} episode with seed {episode.seed}"
+    return f"{name}: {len(episode)} actions, return {total}{parts}.{end}"
 
 
 def player(episode: Episode) -> Html:

@@ -110,7 +110,7 @@ def results() -> TextIO:
 
 
 def say(text: str, end: str = "\n", flush: bool = False) -> None:
-    """Print a part of a command's result on stdout, with the arguments `end` and `flush` of `print`."""
+    """Print a part of a command's result on stdout, unless it is silenced; `end` and `flush` are those of `print`."""
     print(text, end=end, file=results(), flush=flush)
 
 
@@ -137,7 +137,7 @@ def voices(patient: bool, private: bool = False) -> Iterator[None]:
 
 @contextmanager
 def silenced() -> Iterator[None]:
-    """Discard the results of a command within the context."""
+    """Discard the text that `say` prints within the context."""
     with open(os.devnull, "w", encoding="utf-8") as null, _results_on(null):
         yield
 

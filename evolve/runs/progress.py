@@ -91,7 +91,7 @@ class Tally:
         return statistics.median(fitness) if fitness else None
 
     def summary(self) -> str:
-        """Return the generation (counted from 0), best and median fitness, pace and remaining time as text."""
+        """Return generation (counted from 0) and pace as text and, if known, best and median fitness and time left."""
         run = self._run
         search = run.config.search
         last = search.generations - 1

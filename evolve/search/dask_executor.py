@@ -33,7 +33,7 @@ class _Trial:
     """A submitted job.
 
     counter: variable of the scheduler that counts the attempts
-    order: the job as text
+    order: the job in the form that is sent to a worker
     """
 
     job: Job
@@ -45,7 +45,7 @@ class _Trial:
 class DaskExecutor:
     """Executor with the workers of a Dask scheduler. Each worker evaluates one candidate at a time.
 
-    The executor is a context manager. A candidate whose worker dies is evaluated again, up to `ATTEMPTS` times in
+    The executor is a context manager. A candidate whose worker dies is evaluated again, up to 3 times in
     total. If the connection to the scheduler is lost, all unfinished jobs are submitted again after reconnecting.
 
     scheduler: the scheduler, or its address
@@ -170,7 +170,7 @@ class DaskExecutor:
             return True
 
     def _done(self, under_way: dict[Any, _Trial]) -> list[Any]:
-        """Wait up to LISTEN_S for a result, and return all futures that are no longer pending."""
+        """Wait up to 0.5 s for a result, and return all futures that are no longer pending."""
         from distributed import wait
 
         with contextlib.suppress(Exception):  # no result within LISTEN_S, or a lost connection, which `run` handles

@@ -46,10 +46,10 @@ class _Unwanted(Exception):
 
 @dataclass(frozen=True)
 class Order:
-    """A job as text.
+    """A job in a form that can be sent to a worker.
 
     function: "module:name" of the function that evaluates the candidate
-    id, seed: see `Job`
+    id, seed: id of the candidate, and seed of its training and evaluation
     phenotype: the phenotype as JSON
     config: the settings of the run as TOML
     counter: name of the scheduler's variable that counts the attempts
@@ -74,7 +74,7 @@ class Order:
 
 
 def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Order:
-    """Return a job as text.
+    """Return a job in a form that can be sent to a worker.
 
     toml: settings of the run
     function, counter, topic: see `Order`

@@ -26,7 +26,9 @@ class Job:
     """One candidate to evaluate.
 
     id: id of the candidate
-    phenotype, config, seed, policy_path: see `evolve.learning.fitness.evaluate`
+    phenotype, config: eyes and brain of the candidate, and settings of the run
+    seed: seed of training and evaluation
+    policy_path: file to which the trained policy is written
     rung: rung at whose end training stops; None: training is not divided into rungs
     """
 

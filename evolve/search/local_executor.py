@@ -47,7 +47,7 @@ class LocalExecutor:
 
     The executor is a context manager, which ends its processes on exit. If `evaluate` raises an exception, the
     candidate counts as failed; the exceptions OSError, MemoryError and ConfigError end the run instead. A worker that
-    dies is replaced, and its candidate is evaluated again, up to `ATTEMPTS` times in total. After the last attempt, the
+    dies is replaced, and its candidate is evaluated again, up to 3 times in total. After the last attempt, the
     candidate counts as failed. If SIGKILL ended every attempt, however, the run ends, because operating systems kill
     processes in this way when memory runs out.
 
@@ -163,7 +163,7 @@ def cores() -> int:
 
 
 def _end(worker: _Worker) -> None:
-    """Wait for a process to end; after STOPPING_S, kill it."""
+    """Wait for a process to end; after 5 s, kill it."""
     worker.process.join(STOPPING_S)
     if worker.process.is_alive():
         worker.process.kill()

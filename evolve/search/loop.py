@@ -55,7 +55,7 @@ class Watcher(Protocol):
 
 
 def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
-    """Evaluate all candidates that a locked run still lacks.
+    """Evaluate all candidates that a run still lacks. The caller must hold the lock of the run.
 
     executor: evaluates the candidates
     watcher: receives the progress of training and each evaluated candidate

@@ -121,6 +121,8 @@ def _search(
     """Return, for each quantity, its mean in each generation, and the number of candidates that have it.
 
     The mean is NaN if no candidate has the quantity.
+
+    spread: standard deviation of task fitness in each generation, needed only if there are costs
     """
     found: dict[str, tuple[list[float], list[int]]] = {}
     for proposals in _proposals(config, generations, spread):
@@ -135,6 +137,9 @@ def _search(
 
 def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> Iterator[list[Proposal]]:
     """Yield the proposals of one generation after the other, and report a random fitness for each proposal.
+
+    If animals have costs, the fitness is a random task fitness, with the standard deviation `spread` of its generation,
+    minus the costs.
 
     With `search.steady_state`, a fitness is reported before each new proposal, as in a run.
     """
@@ -166,7 +171,7 @@ def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> 
 
 
 def last_generations(config: RunConfig, generations: int) -> list[range]:
-    """Return the final LAST generations of each phase, or all generations of a shorter phase.
+    """Return the final 3 generations of each phase, or all generations of a shorter phase.
 
     A phase consists of the generations between two changes of the set of genes that vary.
 
@@ -181,8 +186,8 @@ def p_value(values: Sequence[float], ends: Floats) -> float:
 
     The value of a single run counts as an additional sample of the null model (Davison and Hinkley 1997, §4.2).
     Therefore, p is at least 2 / (searches + 1). For several runs, their mean is compared with the means of random
-    groups of searches. The number of searches in a group is the number of runs. Here, too, p is at least
-    2 / (searches + 1).
+    groups of searches, drawn with a fixed seed. The number of searches in a group is the number of runs. Here, too, p
+    is at least 2 / (searches + 1).
 
     values: final value of a quantity in each run
     ends: final values of the quantity in the searches, from `NullModel.ends`, (search,)

@@ -31,7 +31,7 @@ OWN = ("CMA", "mutation")  # names of optimizers that are defined here
 class Space:
     """Search space, in which each coordinate is in [0, 1], with the start and the seed of the search.
 
-    genes: the genes that vary, each with its use in the run; only the optimizer "mutation" needs them
+    genes: the genes that vary, each with its settings in the run; only the optimizer "mutation" needs them
     start: genome from which the search starts, (dimension,)
     seed: seed of random numbers, as integers for NumPy's `SeedSequence`
     """
@@ -69,7 +69,7 @@ class Mutation:
 
     The parent is drawn at random from the fittest candidates of the last two populations with known fitness. The number
     of these candidates is a quarter of a population. Older candidates are excluded, so that a fitness that was high by
-    chance has no permanent effect.
+    chance has no permanent effect. Before any fitness is known, the parent is the start genome.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:

@@ -30,9 +30,9 @@ LIBRARIES = ("nevergrad", "cma", "numpy")
 class SameSearch:
     """Comparison of a search's proposals with a run's record.
 
-    The first generation follows from the settings alone, so its tolerance is ROUNDING. Later generations have the wider
-    tolerance TAKEN_FOR_ANOTHERS, but only if the optimizer's libraries have the same versions as at the start of the
-    run. With other versions, the tolerance of all generations is ROUNDING.
+    The first generation follows from the settings alone, so its tolerance is 10⁻⁹. Later generations have the wider
+    tolerance 0.02, but only if the optimizer's libraries have the same versions as at the start of the run. With other
+    versions, the tolerance of all generations is 10⁻⁹.
     """
 
     def __init__(self, run: Run) -> None:

@@ -87,7 +87,7 @@ class Scheduler:
 
         Raises:
             ConfigError: the address requires certificates, but there are none.
-            ExecutorError: the scheduler does not answer within ANSWER_S, or Dask is not installed.
+            ExecutorError: the scheduler does not answer within 5 s, or Dask is not installed.
         """
         self.security()
         found = ADDRESS.fullmatch(self.address)
@@ -140,7 +140,7 @@ class Scheduler:
         raise ExecutorError(f"no Dask scheduler answers at {self.address}: {self._reason(client)}") from None
 
     def _reason(self, error: Exception) -> str:
-        """Return the reason of a failed connection in one line, with the remedy if encryption is the cause."""
+        """Return the reason for a failed connection in one line, with the remedy if encryption is the cause."""
         from distributed.comm.core import CommClosedError
 
         # Tornado raises a ValueError if the answer to the handshake is not TLS and arrives early.

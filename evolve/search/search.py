@@ -102,7 +102,7 @@ class Search:
     def tell(self, fitness: Sequence[tuple[int, float]]) -> None:
         """Receive (candidate id, fitness) of proposed candidates.
 
-        A failed candidate has the fitness -inf. The optimizer receives the lowest fitness so far instead, or LOWEST if
+        A failed candidate has the fitness -inf. The optimizer receives the lowest fitness so far instead, or -10⁹ if
         no candidate has succeeded.
 
         Raises:

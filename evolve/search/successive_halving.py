@@ -6,8 +6,8 @@ rung starts from the checkpoint of the previous rung, in new worlds whose seeds 
 The result of a rung therefore depends only on its seeds and its checkpoint. If a run is killed within a rung, the rung
 is repeated, with the same result.
 
-The setting `search.rungs` is the number of rungs. A candidate has one line in the record for each rung; `rung` is the
-number of the rung after which the line was written.
+The setting `search.rungs` is the number of rungs. A candidate has one line in the record for each rung that it reaches;
+`rung` is the number of the rung, counted from 0, after which the line was written.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def harmed(folder: Path) -> str | None:
     """Return a message about the EXR files in a folder that do not match their checksums; None if all match.
 
     Deleted files are not reported, because they can be exported again. If a file or the list cannot be read, or if the
-    files are larger than MOST_BYTES together, the message says so instead.
+    files are larger than 4 GiB together, the message says so instead.
     """
     try:
         known = {match[2]: match[1] for line in _lines(folder) if (match := ENTRY.fullmatch(line))}

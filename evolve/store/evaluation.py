@@ -47,9 +47,9 @@ class Evaluation:
 
 
 def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
-    """Return the KINDS most frequent messages with their numbers of episodes, the most frequent first.
+    """Return the 4 most frequent messages with their numbers of episodes, the most frequent first.
 
-    If there are other messages, their total number of episodes follows under the name OTHERS.
+    If there are other messages, their total number of episodes follows under the name "others".
 
     failures: number of episodes that ended with each message
     """
@@ -76,7 +76,7 @@ def escaped(text: str) -> str:
 
 
 def shortened(failure: str) -> str:
-    """Return the message of a failure with at most LONGEST_FAILURE characters; long messages lose their middle."""
+    """Return the message of a failure with at most 1000 characters; long messages lose their middle."""
     if len(failure) <= LONGEST_FAILURE:
         return failure
     half = LONGEST_FAILURE // 2 - 4

@@ -30,6 +30,8 @@ def lost(candidates: Iterable[Candidate], where: Callable[[int], Path]) -> str |
 def require_policy(candidate: Candidate, path: Path) -> None:
     """Check that a file is the policy with which a candidate was evaluated.
 
+    If the record contains no checksum of the policy, as in older records, the content of the file is not checked.
+
     Raises:
         RunError: the file is missing or has a different content, or the candidate has failed.
         OSError: the file cannot be read.

@@ -60,7 +60,7 @@ def _guide(diameter: float, length: float, proximal: float | None = None) -> Wav
 
 
 def _by_angle(diameter: float, focal_length: float, angle_deg: float, length: float) -> Facet:
-    """Return a facet whose rhabdom has the width f · angle, so that it subtends `angle_deg` in the visual field."""
+    """Return a facet whose rhabdom has the width focal length · angle: it subtends `angle_deg` in the visual field."""
     return Facet(diameter, focal_length, focal_length * math.radians(angle_deg), length)
 
 
@@ -76,9 +76,10 @@ HONEYBEES = {
 def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
     """Return an eye of a worker honeybee, for the receptors "honeybee".
 
-    Source: Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1. The diameters d of
-    rhabdoms follow from the article's Δρ = d/f. The mean interommatidial angle of 2.1° is an estimate for all four
-    species. It assumes that the 5432 facets of *Apis mellifera* cover a hemisphere.
+    Source: Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1. The diameters of
+    rhabdoms follow from the article's acceptance angles, which are diameter / focal length. The mean interommatidial
+    angle of 2.1° is an estimate for all four species. It assumes that the 5432 facets of *Apis mellifera* cover a
+    hemisphere.
 
     species: "mellifera", "cerana", "florea" or "dorsata".
     rings: rings of ommatidia around the central one.
@@ -107,9 +108,10 @@ def fruit_fly(rings: int = 15) -> AppositionEye:
 def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
     """Return the frontal eye of a blowfly, *Calliphora*, with the rhabdomeres R1-6, for the receptors "blowfly".
 
-    Source: Stavenga, J. Exp. Biol. 207, 1703, 2004, fig. 4: D = 25 µm, F = 2.2, tips of 1.4 to 2 µm, length 250 µm. The
-    rhabdomeres taper to 1 µm at their ends. In the article, the taper is a parabola whose equation has not been read;
-    here it is linear. The interommatidial angle of 1.3° is a typical value, for which no source has been read.
+    Source: Stavenga, J. Exp. Biol. 207, 1703, 2004, fig. 4: facets of 25 µm, an F-number of 2.2, and rhabdomeres with
+    tips of 1.4 to 2 µm and a length of 250 µm, which taper to 1 µm at their ends. In the article, the taper is a
+    parabola whose equation has not been read; here it is linear. The interommatidial angle of 1.3° is a typical value,
+    for which no source has been read.
 
     rings: rings of ommatidia around the central one.
     rhabdomere: diameter [m] of the rhabdomere's tip. Rhabdomeres of at most 1 µm do not taper.
@@ -140,9 +142,10 @@ def dragonfly(rings: int = 20) -> AppositionEye:
 def megalopta(rings: int = 10) -> AppositionEye:
     """Return an eye of the nocturnal bee *Megalopta genalis*, for the receptors "honeybee".
 
-    Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. D = 36 µm, f = 97 µm, d = 8 µm, l = 350 µm and the
-    interommatidial angle of 1.4° are quoted from later articles. Only the abstract has been read: the facets are nearly
-    twice as wide and the rhabdoms four to five times as wide as those of bees that are active by day.
+    Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. The facet's diameter of 36 µm, the focal length of
+    97 µm, the rhabdom's diameter of 8 µm and length of 350 µm, and the interommatidial angle of 1.4° are quoted from
+    later articles. Only the abstract has been read: the facets are nearly twice as wide and the rhabdoms four to five
+    times as wide as those of bees that are active by day.
 
     rings: rings of ommatidia around the central one.
 
@@ -155,10 +158,10 @@ def megalopta(rings: int = 10) -> AppositionEye:
 def cirolana() -> Eye:
     """Return one ommatidium of the marine isopod *Cirolana borealis*, with an acceptance angle of 45°.
 
-    Source: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981: D = 150 µm, Δρ = 45°. The rhabdom has too many modes
-    to be modelled as a waveguide, and the focus of the lens lies below the rhabdom's tip. The eye is therefore modelled
-    as a lens in front of a single square receptor of 45°. No source has been read for the focal length of 100 µm, which
-    does not affect the acceptance angle.
+    Source of the facet's diameter of 150 µm and of this angle: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981.
+    The rhabdom has too many modes to be modelled as a waveguide, and the focus of the lens lies below the rhabdom's
+    tip. The eye is therefore modelled as a lens in front of a single square receptor of 45°. No source has been read
+    for the focal length of 100 µm, which does not affect the acceptance angle.
     """
     focal = 100e-6
     pupil = Pupil(75e-6, thin_lens_focal_length=focal, medium_n=CRUSTACEAN_N)

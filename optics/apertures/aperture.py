@@ -73,7 +73,11 @@ class SoftAperture(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Quadrature nodes over an aperture: positions x, y [R] and weights [R²], as flat float64 arrays for Dr.Jit."""
+    """Quadrature nodes over an aperture, as flat float64 arrays for Dr.Jit.
+
+    x, y: positions [pupil radii].
+    weight: weights [squared pupil radii].
+    """
 
     x: np.ndarray
     y: np.ndarray
@@ -93,7 +97,7 @@ class Aperture(ABC):
     @property
     @abstractmethod
     def area(self) -> float:
-        """Area in units of R²."""
+        """Area in squared pupil radii."""
 
     @property
     @abstractmethod
@@ -107,7 +111,7 @@ class Aperture(ABC):
 
     @property
     def rings(self) -> tuple[tuple[float, float], ...]:
-        """Inner and outer radii of the open rings, in units of R. Only valid for rotationally symmetric apertures."""
+        """Inner and outer radii of the open rings, in pupil radii. Only valid for rotationally symmetric apertures."""
         return ((0.0, 1.0),)
 
     @property
@@ -124,7 +128,7 @@ class Aperture(ABC):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return a mask of the points that lie within the aperture. Points on the edge may belong to either side.
 
-        x, y: positions in units of R, in arrays whose shapes broadcast.
+        x, y: positions in pupil radii, in arrays whose shapes broadcast.
 
         Raises:
             ValueError: a position is not a real number.
@@ -150,9 +154,9 @@ class Aperture(ABC):
     def soften(self, passband: float, ripple: float, widest_reach: float = EDGE_REACH) -> SoftAperture:
         """Return the aperture after a low-pass filter.
 
-        The filter leaves frequencies up to `passband` [cycles per R] unchanged, to within `ripple`. The soft edge
-        extends at most `widest_reach` [R] beyond the aperture. Within this limit, the filter has the transition width
-        that needs the fewest samples.
+        The filter leaves frequencies up to `passband` [cycles per pupil radius] unchanged, to within `ripple`. The soft
+        edge extends at most `widest_reach` [pupil radii] beyond the aperture. Within this limit, the filter has the
+        transition width that needs the fewest samples.
 
         Raises:
             ValueError: passband is outside [0, 1e90], ripple is outside [1e-13, 0.5], or widest_reach is not positive.
@@ -163,9 +167,10 @@ class Aperture(ABC):
         return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))
 
     def with_edge(self, passband: float, stopband: float, ripple: float) -> SoftAperture:
-        """Return the aperture after a low-pass filter that falls from `passband` to `stopband` [cycles per R].
+        """Return the aperture after a low-pass filter that falls between two frequencies [cycles per pupil radius].
 
-        `SoftAperture` describes both frequencies and the ripple. `soften` chooses the stopband itself.
+        Frequencies below `passband` stay unchanged and those above `stopband` vanish, to within `ripple`. `soften`
+        chooses the stopband itself.
         """
         return _with_edge(self, SoftEdge(passband, stopband, ripple))
 

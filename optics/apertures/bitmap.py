@@ -23,7 +23,7 @@ MOST_EDGES = 4000  # choice: an outline of this many straight edges takes about 
 class Bitmap(ReadOnlyArrays):
     """A shape made of the open pixels of a square image: `union(Bitmap(image))` is the aperture.
 
-    The pixels fill the square [-1, 1]² in units of R, and their edges are exact. `union` closes all parts outside the
+    The pixels fill the square [-1, 1]² in pupil radii, and their edges are exact. `union` closes all parts outside the
     pupil's circle.
 
     image: array (y, x) of n x n pixels, 1 or True where the shape is open, 0 or False where it is closed. y ascends
@@ -50,7 +50,7 @@ class Bitmap(ReadOnlyArrays):
             raise ValueError(f"image has {edges} straight edges: must be at most {MOST_EDGES}; draw it more coarsely")
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points (x, y) [R] that lie in open pixels; ValueError unless they are real."""
+        """Return a mask of the points (x, y) [pupil radii] that lie in open pixels; ValueError unless they are real."""
         n = len(self.image)
         column, row = (np.floor((reals(name, at) + 1) * (n / 2)).astype(int) for name, at in (("x", x), ("y", y)))
         inside = (row >= 0) & (row < n) & (column >= 0) & (column < n)

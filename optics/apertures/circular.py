@@ -153,10 +153,11 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
 def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Nodes:
     """Return nodes over a ring: Gauss-Legendre nodes along the radius, and equidistant nodes around each circle.
 
-    Smaller circles have fewer nodes. `Aperture.nodes` describes cycles and digits.
+    Smaller circles have fewer nodes. The rule represents the edge exactly and converges spectrally. Over a full disk,
+    the mean around a ring is a smooth function of r². For few cycles, a rule in r² therefore needs fewer nodes.
 
-    The rule represents the edge exactly and converges spectrally. Over a full disk, the mean around a ring is a smooth
-    function of r². For few cycles, a rule in r² therefore needs fewer nodes.
+    cycles: highest spatial frequency of the integrand [cycles per pupil radius].
+    digits: digits of the integral, relative to the area.
     """
     r, weight, count = _ring_rule(inner, outer, cycles, digits)
     place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)

@@ -42,7 +42,7 @@ class Combined(Aperture):
 
     Raises:
         ValueError: the rule is unknown, an argument is not a shape, there is no shape (or only one, for a difference),
-            the open area is below 1e-9 R², or edges almost coincide.
+            the open area is below 1e-9 squared pupil radii, or edges almost coincide.
     """
 
     rule: str

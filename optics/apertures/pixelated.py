@@ -96,7 +96,7 @@ class PixelatedAperture(Aperture):
         return float(self._widths.max())
 
     def rows(self, across: int) -> np.ndarray:
-        """Return the ascending positions of the rows (and of the columns) of nodes in units of R, (count · across,).
+        """Return the ascending positions of the rows (and of the columns) of nodes in pupil radii, (count · across,).
 
         across: number of nodes along a pixel.
         """
@@ -104,7 +104,7 @@ class PixelatedAperture(Aperture):
         return (self._centres[:, None] + (u - 0.5) * self._widths[:, None]).ravel()
 
     def weights(self, across: int) -> np.ndarray:
-        """Return the weights of the nodes [R²], (row, column)."""
+        """Return the weights of the nodes [squared pupil radii], (row, column)."""
         return _weights(self, across)
 
     @cached_property

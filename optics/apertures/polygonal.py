@@ -27,11 +27,11 @@ MOST_SIDES = 10_000  # choice: the search for crossing edges then takes seconds;
 class Polygon(Aperture):
     """A simple polygon (its edges meet only at its vertices), convex or not.
 
-    vertices: (n, 2), x and y in units of R, clockwise or counterclockwise. They are stored counterclockwise.
+    vertices: (n, 2), x and y in pupil radii, clockwise or counterclockwise. They are stored counterclockwise.
 
     Raises:
         ValueError: vertices are not numbers of shape (n, 2), are fewer than 3, or are not all finite and within the
-            unit circle. An edge is shorter than 1e-9 R, or edges cross or touch.
+            unit circle. An edge is shorter than 1e-9 pupil radii, or edges cross or touch.
     """
 
     vertices: np.ndarray
@@ -72,7 +72,10 @@ class Polygon(Aperture):
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return a mask of the points inside: those from which a ray towards +x crosses an odd number of edges.
 
-        Arguments and errors: see `Aperture.contains`.
+        x, y: positions in pupil radii, in arrays whose shapes broadcast.
+
+        Raises:
+            ValueError: a position is not a real number.
         """
         x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
         inside = np.zeros(x.shape, dtype=bool)
@@ -100,7 +103,7 @@ class Polygon(Aperture):
 
 @dataclass(frozen=True)
 class Slit(Aperture):
-    """A centred rectangle of full `width` along x and `height` along y, in units of R.
+    """A centred rectangle of full `width` along x and `height` along y, in pupil radii.
 
     Raises:
         ValueError: a side is not positive, or the diagonal is longer than the unit circle's diameter.

@@ -26,7 +26,7 @@ MOST = 500  # choice: largest number of radii
 class Rings(Aperture):
     """Concentric open rings: from the first radius to the second, from the third to the fourth, and so on.
 
-    radii: an even number of radii in ascending order, in units of R. They lie in [0, 1]; a first radius of 0 means an
+    radii: an even number of radii in ascending order, in pupil radii. They lie in [0, 1]; a first radius of 0 means an
         open centre.
 
     Raises:
@@ -51,7 +51,8 @@ class Rings(Aperture):
         """Return a zone plate: every second Fresnel zone for a focal length and a wavelength. All lengths are in m.
 
         Parallel light from these zones arrives in phase at one focal length behind the pupil. Zone n ends at the radius
-        √(nλf + n²λ²/4) (Fresnel). A tenth of the incident light, 1/π², reaches this focus.
+        √(nλf + n²λ²/4), for the focal length f and the wavelength λ (Fresnel). A tenth of the incident light, 1/π²,
+        reaches this focus.
 
         wavelength: wavelength behind the pupil, which is that in vacuum divided by `Pupil.medium_n`.
         open_centre: True if the central zone is open, False if its neighbour is.

@@ -28,12 +28,12 @@ class Shape(Protocol):
         """Edge of the shape. It may contain further pieces that do not belong to the edge."""
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points (x, y) [R] that lie within the shape; ValueError unless they are real."""
+        """Return a mask of the points (x, y) [pupil radii] within the shape; ValueError unless they are real."""
 
 
 @dataclass(frozen=True)
 class Disk:
-    """A disk of the given radius about a centre (x, y), in units of R.
+    """A disk of the given radius about a centre (x, y), in pupil radii.
 
     Raises:
         ValueError: the radius is not positive or is above 10, or a coordinate of the centre is beyond ±10.
@@ -49,18 +49,18 @@ class Disk:
 
     @property
     def outline(self) -> Outline:
-        """See `Shape.outline`."""
+        """Edge of the disk."""
         return Outline.circles((float(self.radius),), self.centre)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """See `Shape.contains`. Points on the edge belong to the shape."""
+        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge; ValueError unless real."""
         x, y = reals("x", x), reals("y", y)
         return np.asarray(np.hypot(x - self.centre[0], y - self.centre[1]) <= self.radius)
 
 
 @dataclass(frozen=True)
 class Oblong:
-    """A rectangle about a centre (x, y). `width` and `height` are full lengths in units of R.
+    """A rectangle about a centre (x, y). `width` and `height` are full lengths in pupil radii.
 
     rotation_deg: counterclockwise rotation about the rectangle's own centre, from x towards y.
 
@@ -84,14 +84,14 @@ class Oblong:
 
     @property
     def outline(self) -> Outline:
-        """See `Shape.outline`."""
+        """Edge of the rectangle."""
         x, y = self.width / 2, self.height / 2
         turn = np.exp(1j * np.deg2rad(self.rotation_deg))
         corners = turn * np.array([-x - 1j * y, x - 1j * y, x + 1j * y, -x + 1j * y])
         return Outline.polygon(np.column_stack([corners.real, corners.imag]) + self.centre)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """See `Shape.contains`. Points on the edge belong to the shape."""
+        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge; ValueError unless real."""
         x, y = reals("x", x), reals("y", y)
         place = (x - self.centre[0] + 1j * (y - self.centre[1])) * np.exp(-1j * np.deg2rad(self.rotation_deg))
         return np.asarray((np.abs(place.real) <= self.width / 2) & (np.abs(place.imag) <= self.height / 2))
@@ -102,7 +102,7 @@ class Spider:
     """The vanes that support a telescope's secondary mirror. They run outwards from the centre at equal angles.
 
     vanes: number of vanes, 1 to 64.
-    width: full width of each vane in units of R.
+    width: full width of each vane in pupil radii.
     rotation_deg: angle of the first vane from the x axis, counterclockwise.
 
     Raises:
@@ -121,7 +121,7 @@ class Spider:
 
     @property
     def rectangles(self) -> list[Oblong]:
-        """The vanes, from the centre to 1.5 R."""
+        """The vanes, from the centre to 1.5 pupil radii."""
         angles = self.rotation_deg + 360 / self.vanes * np.arange(self.vanes)
         middles = BEYOND / 2 * np.exp(1j * np.deg2rad(angles))
         return [
@@ -131,11 +131,11 @@ class Spider:
 
     @property
     def outline(self) -> Outline:
-        """See `Shape.outline`."""
+        """Edges of all vanes, including the parts within other vanes."""
         return Outline.joined([rectangle.outline for rectangle in self.rectangles])
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """See `Shape.contains`. Points on the edge belong to the shape."""
+        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge; ValueError unless real."""
         return np.any([rectangle.contains(x, y) for rectangle in self.rectangles], axis=0)
 
 

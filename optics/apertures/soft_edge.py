@@ -24,7 +24,10 @@ MOST_STEPS = 60
 
 @dataclass(frozen=True)
 class SoftEdge:
-    """Radially symmetric kernel whose spectrum falls from 1 at `passband` to 0 at `stopband`."""
+    """Radially symmetric kernel whose spectrum falls from 1 at `passband` to 0 at `stopband`, to within `ripple`.
+
+    Lengths are in pupil radii, and frequencies in cycles per pupil radius.
+    """
 
     passband: float
     stopband: float
@@ -36,10 +39,10 @@ class SoftEdge:
     ) -> SoftEdge:
         """Return the kernel that needs the fewest samples for an aperture with these half widths.
 
-        Let t be the width of the transition, h_x and h_y the half widths, s = h_x + h_y, and b = β/π = reach · t. The
-        number of samples is proportional to (h_x + b/t) (h_y + b/t) (2 passband + t)². It is smallest at the only
-        positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband. If the reach b/t would exceed
-        `widest_reach` at this root, t is b/widest_reach instead.
+        Let t be the width of the transition, h_x and h_y the half widths, s = h_x + h_y, and b = β/π = reach · t, with
+        Kaiser's parameter β. The number of samples is proportional to (h_x + b/t) (h_y + b/t) (2 passband + t)². It is
+        smallest at the only positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband. If the reach b/t
+        would exceed `widest_reach` at this root, t is b/widest_reach instead.
         """
         b = _beta(ripple) / pi
         (h_x, h_y), s = half_widths, sum(half_widths)
@@ -54,7 +57,7 @@ class SoftEdge:
 
     @property
     def reach(self) -> float:
-        """Half width of the soft edge, β/(π t) with the width t of the transition between passband and stopband."""
+        """Half width of the soft edge, β/(π t) with Kaiser's parameter β and the width t from passband to stopband."""
         return self.beta / (pi * (self.stopband - self.passband))
 
     @property

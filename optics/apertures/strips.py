@@ -31,7 +31,7 @@ def strips(
     """Yield x, y and weights of the nodes in each panel of the enclosed part of a box (left, right, bottom, top).
 
     The nodes suit integrands that are a wave of `cycles` cycles per unit of length, times a polynomial of the given
-    degree in x and in y. `Aperture.nodes` explains the digits.
+    degree in x and in y. Integrals have an error of at most 10^-digits times the area.
     """
     left, right, bottom, top = box
     within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])

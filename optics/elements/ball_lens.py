@@ -28,7 +28,7 @@ Shape: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 def parabola(u: np.ndarray) -> np.ndarray:
-    """Return Matthiessen's profile 1 - u² at u = r/R."""
+    """Return Matthiessen's profile 1 - u² at distances u from the centre, relative to the radius."""
     return 1 - u * u
 
 
@@ -69,10 +69,10 @@ class BallLens:
 
     @classmethod
     def luneburg(cls, radius: float, medium_n: float, focal_ratio: float = 1.0) -> BallLens:
-        """Return a lens that focuses parallel light perfectly at the distance focal_ratio · R behind its centre.
+        """Return a lens that focuses parallel light perfectly, `focal_ratio` times its radius R behind its centre.
 
-        With focal_ratio = 1 it is Luneburg's lens, n = n_medium √(2 - (r/R)²). A ratio of about 2.5 describes the
-        lenses of fish (Matthiessen, Pflügers Archiv 27, 510, 1882).
+        With focal_ratio = 1 it is Luneburg's lens, with n = n_medium √(2 - (r/R)²) at the distance r from the centre. A
+        ratio of about 2.5 describes the lenses of fish (Matthiessen, Pflügers Archiv 27, 510, 1882).
 
         Raises:
             ValueError: focal_ratio is outside [1, 20], or another argument is outside its valid range.
@@ -83,7 +83,7 @@ class BallLens:
 
     @classmethod
     def maxwell(cls, radius: float, medium_n: float = 1.0) -> BallLens:
-        """Return Maxwell's fish-eye, n = 2 n_medium/(1 + (r/R)²).
+        """Return Maxwell's fish-eye of radius R, with n = 2 n_medium/(1 + (r/R)²) at the distance r from the centre.
 
         It images each point of its surface on the opposite point.
 
@@ -107,8 +107,8 @@ class BallLens:
     def turning(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
         """Return the angle ψ [rad] about the centre between a ray's entry and its exit.
 
-        height: distance [m] at which the ray would pass the centre without the lens, above 0 and below R, an array of
-            any shape. The result has the same shape.
+        height: distance [m] at which the ray would pass the centre without the lens, above 0 and below the lens's
+            radius R, an array of any shape. The result has the same shape.
 
         Raises:
             ValueError: a height is not between 0 and R, both excluded, the wavelength is invalid, or a ray is totally
@@ -119,7 +119,7 @@ class BallLens:
     def deviation(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
         """Return the angle [rad] by which the lens bends rays towards the axis: ψ + 2 arcsin(h/R) - π.
 
-        ψ is the angle of `turning`.
+        ψ is the angle of `turning`, and R the radius of the lens.
 
         height: distance h [m] of parallel rays from the axis.
 
@@ -161,7 +161,7 @@ class BallLens:
         pupil's amplitude is uniform over its plane, although rays are denser or sparser towards the rim of a thick
         lens.
 
-        aperture_radius: largest distance [m] of parallel rays from the axis, below R.
+        aperture_radius: largest distance [m] of parallel rays from the axis, below the lens's radius R.
         wavelength: vacuum wavelength [m]. The focal length and `medium_n` of the pupil are those for this wavelength.
 
         Raises:

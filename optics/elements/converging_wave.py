@@ -107,8 +107,9 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
         is the projection of the object's x axis.
 
     Raises:
-        ValueError: a number of the object or the normal is invalid, no ray has light, or the pupil is obscured or not
-            convex.
+        ValueError: a number of the object or the normal is invalid, the attributes have different lengths, no ray has
+            light, the samples lie on another sphere than `radius` or on a line, or the pupil is obscured or not convex,
+            or neither a circle nor an ellipse and sampled too coarsely.
     """
     normal = _unit(ON_Z if image_normal is None else image_normal)
     x, y, z, opd, intensity = _alike(system)
@@ -144,8 +145,9 @@ def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWav
     distance: distance [m] of the samples from the image plane.
 
     Raises:
-        ValueError: the wavelengths differ, the data are not finite or not two-dimensional, or the pupil is dark,
-            obscured, not convex or unevenly illuminated.
+        ValueError: the wavelengths differ, dx is not positive, the data are not finite or not two-dimensional, the
+            illuminated samples lie on a line, or the pupil is dark, obscured, not convex or unevenly illuminated, or
+            neither a circle nor an ellipse and sampled too coarsely.
     """
     data, own = complexes("data", system.data), _one("wavelength", system.wavelength)
     pitch = positive("dx", _one("dx", system.dx), "mm") * MM
@@ -204,7 +206,7 @@ def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
 
 
 def _flat(name: str, values: Any) -> np.ndarray:
-    """Convert an array of NumPy, or a tensor, to a flat float64 array; ValueError unless it contains real numbers."""
+    """Convert an array or a tensor to a flat float64 array; ValueError about `name` unless it contains real numbers."""
     values = full_precision(name, values)
     plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
     try:
@@ -214,7 +216,7 @@ def _flat(name: str, values: Any) -> np.ndarray:
 
 
 def _one(name: str, value: Any) -> float:
-    """Return a number, or the first of an array, in the other program's unit; ValueError if it is 0 or not finite."""
+    """Return a number, or the first of an array, in its own unit; ValueError about `name` if it is 0 or not finite."""
     found = _flat(name, value)
     if value is None or found.size == 0 or not abs(found[0]) > 0 or not np.isfinite(found[0]):
         raise ValueError(f"{name} = {shown(value)}: must be a finite number that is not 0")

@@ -130,7 +130,7 @@ def read_exit_pupil(
         [µm], like prysm's Wavefront in a pupil. Its phase must change by less than half a wave between samples.
     wavelength: vacuum wavelength [m].
     medium_n: refractive index of the image space.
-    focal_length: distance from pupil to image [m]. It is required if the object does not contain this distance (prysm).
+    focal_length: distance from pupil to image [m], which only objects of the second kind require. Others contain it.
     order: highest radial order of the fitted Zernike modes.
     image_normal: normal (x, y, z) of the image plane in the object's coordinates. None: the z axis, which is the axis
         of the lens. Objects of the second kind contain no directions; their image plane is parallel to the pupil.

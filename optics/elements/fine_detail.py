@@ -13,10 +13,10 @@ CUBIC = 4  # coefficients of a cubic polynomial along an axis; slopes alone desc
 
 
 def band_of(samples: np.ndarray, level: float) -> float:
-    """Return the frequency [cycles per half a side] above which the samples vary by less than `level` (rms).
+    """Return the frequency [cycles per half a side], at least 1, above which the samples vary by less than `level`.
 
-    Interpolation by cubic splines repeats a component of frequency f around multiples of the sampling rate. A copy at
-    the frequency F is weaker by the factor (f/F)⁴.
+    The variation is a root mean square. Interpolation by cubic splines repeats a component of frequency f around
+    multiples of the sampling rate. A copy at the frequency F is weaker by the factor (f/F)⁴.
     """
     if max(samples.shape) < 4:
         return 1.0

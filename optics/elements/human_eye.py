@@ -124,9 +124,10 @@ class HumanEye:
         return _not_negative(cycles_per_degree) * (180 / math.pi) / self._nodal_distance
 
     def sensor_width(self, fov_deg: float) -> float:
-        """Return the side [m] of the retinal patch that sees a square field of this width, 2 (f/n) tan(fov/2).
+        """Return the side [m] of the retinal patch that sees a square field of this width: 2 tan(fov/2) f/n.
 
-        Use it as `sensor_width` of an `optics.Eye` with this eye's pupil.
+        f is `focal_length`, and n the index of the eye's medium. Use the result as `sensor_width` of an `optics.Eye`
+        with this eye's pupil.
 
         Raises:
             ValueError: fov_deg is outside [1e-3, 170].
@@ -157,7 +158,10 @@ class HumanEye:
         return slopes
 
     def _aspheric(self, order: int, radius: float) -> float:
-        """Return the Zernike coefficient [µm] of Z_order^0 in the path difference n (√(r² + f²) - f) - n r²/2f."""
+        """Return the Zernike coefficient [µm] of Z_order^0 in the path difference n (√(r² + f²) - f) - n r²/2f.
+
+        r is the distance from the axis, f the focal length, and n the index of the eye's medium.
+        """
         at, weights = np.polynomial.legendre.leggauss(NODES)
         rho = (at + 1) / 2
         r, f = radius * rho, self.focal_length
@@ -180,7 +184,7 @@ def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
     where D is the MTF of a perfect lens at 555 nm. Source: Watson, J. Vision 13(6):18, 2013, eq. 4 and 5, without
     stray light.
 
-    cycles_per_degree: frequencies of 0 or more, an array of any shape. The result has the same shape.
+    cycles_per_degree: frequencies u of 0 or more, an array of any shape. The result has the same shape.
     pupil_diameter: d [m], 2 to 6 mm.
 
     Raises:

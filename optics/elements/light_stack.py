@@ -39,7 +39,7 @@ class StackSlopes(ReadOnlyArrays):
 
     @cached_property
     def steepest(self) -> np.ndarray:
-        """Largest slope over the disk, (beam,)."""
+        """Largest slope at these points, (beam,)."""
         found: np.ndarray = np.sqrt((np.square(self.along_x) + np.square(self.along_y)).max(axis=1))
         return read_only(found)
 
@@ -54,7 +54,7 @@ class LightStack:
     beams: tuple[Beam, ...]
 
     def part(self, places: Sequence[int] | np.ndarray) -> LightStack:
-        """Return some of the beams."""
+        """Return the light of the beams with these indices."""
         found = LightStack(tuple(self.beams[place] for place in places))
         chosen = set(map(int, places))
         coefficients, others = self._polynomials

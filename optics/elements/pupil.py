@@ -38,6 +38,8 @@ SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a 
 class Pupil:
     """A thin element with the amplitude transmittance A(x, y) M(x, y) exp(ik [(n - object_n) h(x, y) - W(x, y)]).
 
+    k is 2π/λ with the vacuum wavelength λ, and r the distance from the axis.
+
     aperture_radius: R [m].
     height: h. None; an array [m] (y, x) of samples at cell centres over [-R, R]² (HeightMap); or any Relief.
     n: refractive index of the relief, constant or dispersive.
@@ -112,7 +114,7 @@ class Pupil:
 
     @cached_property
     def radius(self) -> float:
-        """R [m], without derivative."""
+        """Radius of the aperture [m], without derivative."""
         return number(self.aperture_radius)
 
     @property
@@ -146,7 +148,7 @@ class Pupil:
         return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
     def amplitude(self, x: Array, y: Array) -> Array:
-        """Return the amplitude that the mask transmits at points in units of R, arrays as in `Relief.height`."""
+        """Return the mask's amplitude at points [radii], arrays as in `Relief.height`; 1 without a mask."""
         if self.mask is None:
             return like(x, 1.0)
         radius = like(x, self.aperture_radius)
@@ -249,7 +251,10 @@ class Pupil:
         return all_slopes(level, same, number(source.distance), source.plain.angle, self.pieces(same))
 
     def pieces(self, wavelength: float) -> int:
-        """Return the number of polynomial pieces of relief and wavefront across the pupil."""
+        """Return the larger number of polynomial pieces across the pupil, of the relief or of the wavefront.
+
+        An absent wavefront counts 0, and so does a relief that does not bend light of this wavelength.
+        """
         pieces = [self.height.knots if self.bends(wavelength) else 0]
         pieces += [0 if self.wavefront is None else self.wavefront.knots]
         return max(pieces)

@@ -20,7 +20,8 @@ __all__ = ["lens_path", "relief_height", "wavefront_ahead"]
 def lens_path(pupil: Pupil, x: Array, y: Array) -> Array | None:
     """Return the length [m] by which the ideal lens shortens the path at points (x, y) [m]; None without a lens.
 
-    It is √(r² + f²) - f, a path in vacuum. x and y are arrays as in `Relief.height`.
+    It is √(r² + f²) - f, a path in vacuum, at the distance r from the axis, for a focal length f > 0. For f < 0, it is
+    the negative of the length for |f|. x and y are arrays as in `Relief.height`.
     """
     if pupil.thin_lens_focal_length is None:
         return None

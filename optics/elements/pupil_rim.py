@@ -55,15 +55,21 @@ class Rim:
         return self.aperture.contains((x - self.middle[0]) * scale, (y - self.middle[1]) * scale)
 
     def onto_plane(self, distance: float) -> Rim:
-        """Return a rim in sines of directions, projected onto a plane at a distance [m] from the image."""
+        """Return this rim, which is in sines of directions, on a plane at a distance [m] from the image.
+
+        The result is centred on the origin.
+        """
         return self._scaled(lambda r: distance * r / math.sqrt(1 - r * r))
 
     def in_sines(self, distance: float) -> Rim:
-        """Return a rim on a plane at a distance [m] from the image, converted to sines of directions."""
+        """Return this rim, which lies on a plane at a distance [m] from the image, in sines of directions.
+
+        The result is centred on the origin.
+        """
         return self._scaled(lambda r: r / math.hypot(r, distance))
 
     def _scaled(self, of_radius: Callable[[float], float]) -> Rim:
-        """Return a rim around the origin; `of_radius` maps distances of points from the middle to new distances."""
+        """Return this rim around the origin; `of_radius` maps distances of points from the middle to new distances."""
         radius = of_radius(self.radius)
         if self.vertices is None:
             return Rim(np.zeros(2), radius)
@@ -142,7 +148,10 @@ def _cut(hull: Any, dark: np.ndarray, apart: float) -> np.ndarray:
 
 
 def _round(hull: Any) -> tuple[np.ndarray, float, np.ndarray | None, float]:
-    """Return centre, radius, vertices (None for a circle) and relative residual of the better of circle and oval."""
+    """Return centre and radius of a circle, the vertices of an oval if it fits better (else None), and the residual.
+
+    The residual is that of the oval or, if there is none, of the circle. It is relative to the radius.
+    """
     corners, area = hull.points[hull.vertices], hull.volume  # Qhull calls the area of a plane hull its volume
     middle, radius, ragged = _circle(corners)
     if area < FULL * math.pi * radius**2:

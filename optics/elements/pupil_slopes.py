@@ -30,7 +30,10 @@ class HasPath(Protocol):
 
 @lru_cache(maxsize=64)
 def all_slopes(pupil: HasPath, wavelength: float, distance: float, angle: tuple[float, float], pieces: int) -> Slopes:
-    """Return slopes on a grid that resolves all polynomial pieces, of which there are `pieces` across the pupil."""
+    """Return slopes on a grid that resolves `pieces` polynomial pieces across the pupil, with at most 1025² points.
+
+    distance, angle: distance [m] of the source and direction of its light, as in `PointSource`.
+    """
     n = int(min(MOST, max(MANY if pieces else FEW, 4 * pieces + 1)))
     grid = _grid(pupil, n)
     x, y = grid.coordinates(precision("float64"))

@@ -187,6 +187,8 @@ def medium(name: str) -> Dispersion:
 def index_of(name: str, value: Any) -> Dispersion:
     """Return the dispersion curve for a number or a curve, without derivatives.
 
+    name: name of the argument, for error messages.
+
     Raises:
         ValueError: the index is neither a number in [1, 10] nor a curve, or carries a derivative.
     """
@@ -206,6 +208,8 @@ def _constant(n: float) -> RefractiveIndex:
 
 def material(name: str, value: Any) -> Dispersion:
     """Return the dispersion curve for a number or a curve, which may carry derivatives.
+
+    name: name of the argument, for error messages.
 
     Raises:
         ValueError: the index is neither a number in [1, 10] nor a curve.

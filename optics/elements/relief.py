@@ -110,7 +110,7 @@ class BSplineRelief(Relief):
     def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
         """Return h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
 
-        With curvature = medium_n / ((n - object_n) f), it is the paraxial lens exp(-ik medium_n r²/2f).
+        With curvature = medium_n / ((n - object_n) f), it is the lens exp(-ik medium_n r²/2f) of a focal length f.
 
         On uniform knots the polar form of x² has the control values X_i² - δ²/3, with the Greville abscissae X_i = (2i
         - 3) a, the knot spacing δ = 2a and the radius a.
@@ -185,7 +185,7 @@ class HeightMap(Relief):
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbours if it exceeds half the span, as in a wrapped lens; else 0."""
+        """Largest step [m] between neighbours if it exceeds half the span of at least 16 x 16 samples; else 0."""
         many = min(self._heights.shape) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0

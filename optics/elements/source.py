@@ -16,12 +16,12 @@ STEEPEST = 1.5  # choice [rad]: largest angle of the light to the axis
 
 @dataclass(frozen=True)
 class PointSource:
-    """A point source. Its wave on the pupil is exp(ik(ρ(x, y) - ρ(0, 0))), with ρ the distance from the source.
+    """A point source. Its wave on the pupil is exp(ik(ρ(x, y) - ρ(0, 0))), with the distance ρ from the source.
 
     distance: distance [m] in front of the pupil, along the axis. An infinite distance gives a plane wave, and ρ is then
         the path along its direction.
-    angle: (θx, θy) [rad], the direction in which the light travels at the pupil's centre. A thin lens focuses
-        parallel light near f (tan θx, tan θy), with the off-axis aberrations of a single stigmatic lens.
+    angle: (θx, θy) [rad], the direction in which the light travels at the pupil's centre. A thin lens of focal length f
+        focuses parallel light near f (tan θx, tan θy), with the off-axis aberrations of a single stigmatic lens.
 
     These numbers may carry derivatives.
 
@@ -58,7 +58,7 @@ class PointSource:
     def path(self, x: Array, y: Array) -> Array:
         """Return the optical path [m] in vacuum at points (x, y) [m] of the pupil, relative to the centre.
 
-        x, y: see `Relief.height`.
+        x, y: arrays of NumPy or PyTorch whose shapes broadcast, or flat Float64 arrays of Dr.Jit.
         """
         carried = any(map(is_differentiable, self.angle))
         own, angle = (library(x), [like(x, part) for part in self.angle]) if carried else (math, self.angle)

@@ -35,13 +35,13 @@ ROUNDING = 1e-9  # margin for n r in the check of a profile
 
 @dataclass(frozen=True, eq=False)
 class SphericalIndex:
-    """The index of a sphere, relative to its medium, as a polynomial in t = (r/R)²."""
+    """The index of a sphere of radius R, relative to its medium, as a polynomial in (r/R)², with the distance r."""
 
     index: Chebyshev
 
     @classmethod
     def from_function(cls, relative: Callable[[np.ndarray], np.ndarray]) -> SphericalIndex:
-        """Interpolate a relative index, given as a function of r/R, at Chebyshev points in (r/R)².
+        """Interpolate a relative index, a function of the relative distance r/R, at Chebyshev points in (r/R)².
 
         Raises:
             ValueError: n r decreases somewhere, at values below 1. Just outside the sphere it is 1, so light could stay
@@ -55,7 +55,7 @@ class SphericalIndex:
         return found
 
     def turning(self, h: np.ndarray) -> np.ndarray:
-        """Return the angle ψ [rad] by which rays turn about the centre, for heights h relative to R (an array).
+        """Return the angle ψ [rad] by which rays turn about the centre, for heights h relative to the radius (array).
 
         Raises:
             ValueError: a ray is totally reflected at the surface.
@@ -67,9 +67,9 @@ class SphericalIndex:
         return np.asarray(2 * np.arcsin(end) - 2 * h * end * (bend @ gauss_legendre(NODES)[1]))
 
     def path(self, h: np.ndarray) -> np.ndarray:
-        """Return the optical path lengths of rays inside the sphere, in units of R times the medium's index.
+        """Return the optical path lengths of rays inside the sphere, in units of its radius times the medium's index.
 
-        h: heights of the rays relative to R, an array of any shape. The result has the same shape.
+        h: heights of the rays relative to the radius, an array of any shape. The result has the same shape.
 
         Raises:
             ValueError: see `turning`.
@@ -78,9 +78,10 @@ class SphericalIndex:
         return np.asarray(2 * end * ((n * n * y / radial) @ gauss_legendre(NODES)[1]))
 
     def power(self) -> float:
-        """Return R/f of rays near the axis, the limit of their deviation divided by their height h relative to R.
+        """Return R/f of rays near the axis, with the sphere's radius R and the focal length f.
 
-        It is 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n² d(r/R) with t = (r/R)².
+        It is the limit of a ray's deviation, divided by its height relative to R: 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n²
+        d(r/R), with the index n at the distance r and t = (r/R)².
         """
         u, weights = gauss_legendre(NODES)
         bend = self.index.deriv()(u * u) / self.index(u * u) ** 2
@@ -125,7 +126,7 @@ def _solved(rising: Callable[[np.ndarray], np.ndarray], value: np.ndarray) -> np
 def generalized_luneburg(focal_ratio: float) -> Callable[[np.ndarray], np.ndarray]:
     """Return the relative index n as a function of r/R for a sphere that focuses parallel light.
 
-    The focus lies at the distance focal_ratio · R behind the centre of the sphere:
+    The focus lies at the distance focal_ratio · R behind the centre of the sphere, which has the radius R:
 
         n(ρ) = exp ω(ρ),   ω(ρ) = 1/π ∫ arcsin(x/s) / √(x² - ρ²) dx  from ρ to 1,   r/R = ρ exp(-ω),   s = focal_ratio
 

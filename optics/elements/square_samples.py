@@ -33,7 +33,7 @@ def square_samples(samples: Any, name: str = "height", what: str = "heights [m]"
 def map_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
     """Return rows and columns of samples without derivatives, as a read-only array.
 
-    name, what: see `square_samples`.
+    name, what: name of the argument, and description of its values, for error messages.
 
     Raises:
         ValueError: the array is not two-dimensional, is empty, is of half precision, or contains anything other than

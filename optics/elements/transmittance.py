@@ -60,7 +60,7 @@ class Mask(ABC):
 
 @dataclass(frozen=True, eq=False)
 class GaussianMask(Mask):
-    """The amplitude exp(-r²/w²), as of a laser beam or the guided mode of a photoreceptor.
+    """The amplitude exp(-r²/w²) at the distance r from the axis, as of a laser beam or a photoreceptor's guided mode.
 
     At r = w the intensity is 1/e².
 
@@ -80,13 +80,18 @@ class GaussianMask(Mask):
         return library(x).exp(-(x * x + y * y) / (waist * waist))
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return the frequency [1/m] at which the mask's spectrum exp(-π²w²f²) falls to `level`; at least 1/(πw)."""
+        """Return the frequency f [1/m] at which the spectrum exp(-π²w²f²) falls to `level`; at least 1/(πw).
+
+        w is the waist.
+        """
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """Return the frequency f [1/m] beyond which the mask sends at most `light`, see `Mask.detail`.
+        """Return the frequency f [1/m] beyond which the mask sends at most a given amount of light.
 
-        The fraction exp(-2π²w²f²) of the transmitted light lies beyond f.
+        The fraction exp(-2π²w²f²) of the transmitted light lies beyond f, for the waist w.
+
+        light: this amount, averaged over the disk of the pupil, in units of the incident light.
         """
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)

@@ -107,7 +107,7 @@ class TurbidMedium:
         The maximum is taken over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
         The reference is the integral over the spectrum in steps of 1 nm. Without attenuation the error is 0.
 
-        receptors: as in `optics.receptors_of`
+        receptors: `Receptors`, or a name or peak wavelengths for `optics.receptors_of`
 
         Raises:
             ValueError: bands is outside 1 to 64, or the receptors are unknown.
@@ -134,9 +134,10 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
     """Return sea water with the concentration C of chlorophyll [mg/m³], in [0, 30].
 
     Absorption and scattering follow the classic model of case 1 waters, with λ in nm. Absorption is a = a_w + a_p + 0.2
-    a_p(440) exp(-0.014 (λ - 440)) with a_p = 0.06 A(λ) C^0.65. Scattering is b = b_w + 0.30 C^0.62 (550/λ). Pure sea
-    water scatters b_w = 16.06 · 4.72e-4 (400/λ)^4.32. The veiling light is ½ b/(a + b): water scatters light that comes
-    from above, equally from all directions of the upper hemisphere.
+    a_p(440) exp(-0.014 (λ - 440)), where pure water absorbs a_w, and phytoplankton absorbs a_p = 0.06 A(λ) C^0.65.
+    Scattering is b = b_w + 0.30 C^0.62 (550/λ). Pure sea water scatters b_w = 16.06 · 4.72e-4 (400/λ)^4.32. The veiling
+    light is ½ b/(a + b): water scatters light that comes from above, equally from all directions of the upper
+    hemisphere. The attenuation is c = a + b.
 
     Sources: Gordon & Morel (1983), Remote Assessment of Ocean Color; Morel (1974); Mobley (1994), Light and Water,
     equations 3.27 and 3.40. The sources of the absorption are in `water_absorption` and `phytoplankton_absorption`.

@@ -120,6 +120,7 @@ class Zernike(Aberration):
         """Return the wavefront whose coefficients are numbered after Noll.
 
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
+        radius: radius [m] of the circle. None: the pupil's radius.
 
         Noll's polynomials have the normalisation of OSA, a variance of 1. They are used in astronomy and by poppy.
         A row that is a Dr.Jit array is not accepted.
@@ -134,6 +135,7 @@ class Zernike(Aberration):
         """Return the wavefront whose coefficients have Fringe numbers.
 
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
+        radius: radius [m] of the circle. None: the pupil's radius.
 
         Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. Their
         coefficients are therefore divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use
@@ -155,7 +157,7 @@ class Zernike(Aberration):
         return total
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """Return W [m] at positions in units of the radius, as a NumPy array. The polynomials continue beyond 1.
+        """Return the wavefront [m] at positions in units of the radius. The polynomials continue beyond 1.
 
         Raises:
             ValueError: a position is not a real number, or the shapes of x and y do not broadcast.
@@ -168,7 +170,7 @@ class Zernike(Aberration):
 
     @property
     def rms(self) -> float:
-        """Root mean square of W [m] over the whole circle, without piston: √Σc²."""
+        """Root mean square of the wavefront [m] over the whole circle, without piston."""
         return UM * math.sqrt(sum(value**2 for key, value in self.modes.items() if key != (0, 0)))
 
     def bandwidth(self, level: float) -> float:

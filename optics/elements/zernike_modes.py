@@ -17,8 +17,9 @@ MOST_CACHED = 4_000_000  # choice, limited by memory: largest number of values o
 
 
 def mode(n: int, m: int, x: Any, y: Any) -> Any:
-    """Return Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
+    """Return the Zernike polynomial Z_n^m at (x, y) in units of the circle's radius, arrays of any library.
 
+    It is norm(n, m) ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos mθ, sin |m|θ}, with k = (n - |m|)/2 and Jacobi's polynomials P.
     The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
     """
     sine, cosine = x * 0, x * 0 + 1.0
@@ -37,7 +38,9 @@ def mode(n: int, m: int, x: Any, y: Any) -> Any:
 
 
 def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: Any) -> Any:
-    """Return Σ w Z_n^m at (x, y). The polynomials are cached, since many wavefronts are evaluated at the same points.
+    """Return Σ w Z_n^m at (x, y) for weights w of the modes `named`, (n, m).
+
+    Unless they are too large, the polynomials are cached, since many wavefronts are evaluated at the same points.
 
     weights, x, y: arrays of NumPy or PyTorch, in float64. Positions carry no derivatives.
     """

@@ -39,7 +39,7 @@ def choose_bands(
         with 2n bands.
 
     tolerance: largest error, 1e-6 to 0.5.
-    receptors: see `optics.receptors_of`.
+    receptors: `Receptors`, or a name or peak wavelengths for `optics.receptors_of`.
     kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
         side of a receptor. None: the kernel is the same for all wavelengths.
     white: fraction of a white surface's signal that kernels transmit if they are wide enough to contain all light.
@@ -74,7 +74,8 @@ def choose_bands(
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
     """Return the largest error for the coloured surfaces of `choose_bands`, over all phases φ and all channels.
 
-    It is half the modulus of the error of Σ w d e^{2πiλ/Λ}, with the bands' weights w and daylight d.
+    It is half the modulus of the error of Σ w d e^{2πiλ/Λ}, with the bands' weights w, daylight d, and the width Λ of
+    `range_nm`.
     """
     period = (range_nm[1] - range_nm[0]) * 1e-9
 

@@ -129,9 +129,10 @@ def camera_image(
 def camera_eye(
     lens: Pupil, sensor: Sensor | None, sensor_distance: Scalar | None = None, tolerance: float = 1e-2
 ) -> Eye:
-    """Return the eye that a pupil and a sensor form: its receptors are the pixels, and it has no receptor noise.
+    """Return the eye that a pupil and a sensor form: its receptors are the pixels, and its only noise is shot noise.
 
-    Its kernels, PSFs and spectral bands are those of the camera. Arguments as in `camera_image`.
+    Its kernels, PSFs and spectral bands are those of the camera. The arguments are those of `camera_image`, except that
+    `lens` must be a pupil, and `sensor` must not be None.
 
     Raises:
         ValueError: an argument is invalid, sensor_distance carries a derivative, or the lens forms no real image of

@@ -63,8 +63,11 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
     The integrand is the spline through the samples. The cells lie around the middle sample.
 
     If tiles.from_cell is True, the integrals are also averaged over all source positions in a scene cell: PSF ⊗ cell ⊗
-    cell. The spline's coefficients c solve C c = s, where C contains the B-splines at the samples. The integrals are Q
-    c, so the matrix is Q C⁻¹.
+    cell. The spline's coefficients c solve C c = s, where s are the samples and C contains the B-splines at them. The
+    integrals are Q c, where Q contains the B-splines' integrals over cells. The matrix is therefore Q C⁻¹.
+
+    samples: number of samples.
+    pitch: distance [m] between neighbouring samples.
     """
     x = sample_positions(samples, pitch)
     degree = min(DEGREE, (samples - 2) // 2 * 2 + 1)
@@ -91,7 +94,7 @@ def _knots(x: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _over_samples(integrals: np.ndarray, degree: int) -> np.ndarray:
-    """Return Q C⁻¹ (cell, sample), see `cell_integrals`.
+    """Return the matrix Q C⁻¹ (cell, sample), where C contains the B-splines at the samples.
 
     integrals: Q, the integrals of B-splines over cells, (cell, B-spline).
     """

@@ -63,7 +63,9 @@ class DepthRange:
 
 
 def layers_for(z: Any) -> tuple[str, tuple[float, ...]]:
-    """Return the `depth_layers` that `Eye.see` uses for a scene, and the distances [m] on which the kernels depend.
+    """Return the `depth_layers` of `Eye.see` for a scene, "distinct" or "auto", and the distances [m] of its kernels.
+
+    With "auto", these are the farthest and the nearest distance.
 
     z: distances [m] in the scene, a number or an array.
     """

@@ -103,8 +103,8 @@ class Eye(EyeSpec):
     def psf(self, z: Scalar = math.inf) -> PSFResult:
         """Return the PSF on the retina for a point at the distance z [m] along the axis.
 
-        The point lies in the viewing direction of the patch, and the PSF covers the window of `kernel`. The PSF of the
-        perfect lens is one sample with all power.
+        The point lies in the viewing direction of the patch. The window loses less than the fraction `tolerance` of the
+        light (exceptions: see `kernel`). The PSF of the perfect lens is one sample with all power.
 
         Raises:
             ValueError: z is not positive.
@@ -118,20 +118,20 @@ class Eye(EyeSpec):
     def kernel(
         self, samples_per_receptor: int, z: Scalar = math.inf, direction_deg: tuple[float, float] | None = None
     ) -> np.ndarray | Array:
-        """Return the receptive kernel (band, ky, kx) in the orientation of the visual field, with odd ky and kx.
+        """Return the receptive kernel (band, ky, kx) in the orientation of the visual field.
 
-        It is the PSF, integrated over cells. A receptor consists of samples_per_receptor² cells of its own shape.
+        It is the PSF, integrated over cells; ky and kx are odd. A receptor has samples_per_receptor² equal cells.
 
         z: distance [m] of the scene along the axis, positive or infinite.
         direction_deg: direction (right, up) of the light from the axis (None: the patch's eccentricity). The centre
             cell is its geometric image. Angles are -80 to 80.
 
         The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
-        enough to lose less than the tolerance (limits: see `visual_kernel`). Light of a steep relief may count as
-        blocked if it lands farther from the image than the longer side of the retina. A perfect lens has the kernel 1,
-        a single cell. The kernel treats the light of each scene cell as coming from the cell's centre. Signals are then
-        a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b), averaged over each receptor's cells. By default, `see` assumes
-        light from all over each cell instead (see `light_from` of `sight`).
+        enough to lose less than the tolerance, except for light at more than 50° from the receptor's direction. Light
+        of a steep relief may count as blocked if it lands farther from the image than a side of the retina. A perfect
+        lens has the kernel 1, a single cell. The kernel treats the light of each scene cell as coming from its centre.
+        Signals are then `aperture_throughput` Σ_b `spectral_bands.weights[c, b]` (kernel_b ⊗ radiance_b), averaged over
+        each receptor's cells. By default, `see` assumes light from all over a cell (see `light_from` of `sight`).
 
         With waveguides, the kernel is the fraction of each scene cell's light that a receptor accepts, averaged over
         the cell. The cells lie around the receptor's direction. Signals are not averaged over the receptor. ky and kx

@@ -125,7 +125,10 @@ class EyeSpec:
 
     @property
     def retina_distance(self) -> Scalar:
-        """Distance [m] from pupil to retina: f n/n₀ at 550 nm, with the indices n behind the pupil and n₀ in front."""
+        """Distance [m] from pupil to retina: `sensor_distance` n/n₀, with the indices n behind and n₀ before the pupil.
+
+        The indices are those at 550 nm.
+        """
         return behind_pupil(self.pupil, self.sensor_distance)
 
     @property
@@ -200,12 +203,15 @@ class EyeSpec:
 
     @property
     def relative_aperture(self) -> Scalar:
-        """Relative aperture a = 2 R / L, or 2 R / `full_aperture`; 1 for the perfect lens."""
+        """Diameter of the pupil, relative to that of a pupil with a throughput of 1; 1 for the perfect lens.
+
+        It is 2 `pupil.aperture_radius` divided by `full_aperture`, or by `sensor_width` if that is None.
+        """
         return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.widest_pupil
 
     @property
     def throughput(self) -> Scalar:
-        """Throughput: a², times the open fraction of the aperture's disk, times the mask's transmission."""
+        """Throughput: squared `relative_aperture`, times the disk's open fraction, times the mask's transmission."""
         return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
 
     @property
@@ -220,7 +226,7 @@ class EyeSpec:
     def parallax(self) -> float:
         """Shift of the image between opposite edges of the pupil, per unit of 1/distance [1/m].
 
-        The unit of the shift is the shorter side of an average receptor.
+        The unit of the shift is the shorter side of an average receptor. For the perfect lens, it is 0.
         """
         if self.pupil is None:
             return 0.0

@@ -36,7 +36,12 @@ def focal_length(width: float, fov_deg: Scalar) -> Scalar:
 def receptor_size(
     resolution: tuple[int, int], width: float, fov_deg: Scalar, vertical_fov_deg: float | None
 ) -> tuple[float, float]:
-    """Return the height and width [m] of a receptor on a retina of this width [m], see `Eye`."""
+    """Return the height and width [m] of a receptor on a retina of this width [m].
+
+    Receptors are square if `vertical_fov_deg` is None.
+
+    resolution: number of receptors (height, width).
+    """
     rows, columns = resolution
     if vertical_fov_deg is None:
         return width / columns, width / columns
@@ -45,14 +50,20 @@ def receptor_size(
 
 
 def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
-    """Return the distance [m] from pupil to retina: f, or f n/n₀ at 550 nm if the media differ."""
+    """Return the distance [m] from pupil to retina: `focal` n/n₀, with the indices n behind and n₀ before the pupil.
+
+    The indices are those at 550 nm. Without a pupil, or with the same medium on both sides, the distance is `focal`.
+    """
     if pupil is None or pupil.object_n is None:
         return focal
     return focal * (pupil.index_behind(MIDDLE) / pupil.index_before(MIDDLE))
 
 
 def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
-    """Raise a ValueError unless `pupil` is None, or a Pupil at most as wide as one with a throughput of 1."""
+    """Raise a ValueError for a pupil that is not a Pupil, or is wider than `full_aperture` [m]; None is valid.
+
+    width: width [m] of the retina, which replaces `full_aperture` if that is None.
+    """
     if full_aperture is not None:
         positive("full_aperture", full_aperture)
     if pupil is None:
@@ -80,12 +91,19 @@ def check_vertical(vertical_fov_deg: float | None, fov_deg: Scalar) -> None:
 
 
 def etendue(widest_pupil: float, receptor_area: float, focal: float) -> float:
-    """Return the etendue [m² sr] of a receptor [m²] behind a pupil with a throughput of 1."""
+    """Return the etendue [m² sr] of a receptor of this area [m²], behind a pupil with a throughput of 1.
+
+    widest_pupil: diameter [m] of this pupil.
+    focal: focal length [m].
+    """
     return math.pi / 4 * receptor_area * (widest_pupil / focal) ** 2
 
 
 def direction(name: str, value: Any) -> tuple[float, float]:
-    """Return the angles (right, up) [degrees] of a direction off the axis, or raise a ValueError."""
+    """Return the angles (right, up) [degrees] of a direction, or raise a ValueError if one is beyond ±80°.
+
+    name: name of the argument, for error messages.
+    """
     right, up = point_2d(name, value, "angles (right, up) [degrees]")
     return in_range(name, right, -WIDEST_DEG, WIDEST_DEG), in_range(name, up, -WIDEST_DEG, WIDEST_DEG)
 

@@ -75,12 +75,15 @@ def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, receptor: tupl
 def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
     """Return the fraction of light that a receptor accepts from each cell around its direction: Dr.Jit (band, ky, kx).
 
-    ky and kx are even if `guide.cells` is even. The orientation is that of `visual_kernel.visual_kernel`, which also
-    documents the other arguments.
+    ky and kx are even if `guide.cells` is even. Rows run from the top of the visual field to the bottom, columns from
+    left to right.
+
+    z: distance [m] of the scene along the axis.
+    direction: tangents (right, down) of the receptor's direction in the visual field.
 
     Raises:
         ValueError: the waveguide has no guided mode at one of the wavelengths, or an argument carries a derivative.
-        AccuracyError: the receptor's field needs too many samples.
+        AccuracyError: the receptor's field needs too many samples, or the light covers too many cells.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     spot = spot_of(beams, retina)

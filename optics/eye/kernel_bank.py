@@ -100,9 +100,12 @@ def prepare(
 
     kernel_at: function of (z, right, down) that returns a kernel. Positions in the field run from -1 to 1, the edges of
         the retina.
+    resolution: number of receptors (height, width).
+    samples_per_receptor: number of cells along a receptor's side.
     z: distances [m] in the scene, a number or an array.
     counts: number of depth layers, and of zones across the longer side of the retina; or "auto", or "distinct" for one
         layer at each distance.
+    tolerance: largest error of a receptor's signal, relative to the signal of a white surface.
     mean: number of cells along the side of the square over which errors are averaged, as in a receptor's signal (None:
         samples_per_receptor).
     white: function that returns the fraction of the signal of a white surface that the kernels transmit.

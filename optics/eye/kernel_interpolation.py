@@ -50,17 +50,17 @@ class Choice:
 
 
 def nodes(count: int) -> np.ndarray:
-    """Return the positions of nodes in [-1, 1]."""
+    """Return evenly spaced positions of nodes from -1 to 1; 0 for a single node."""
     return np.linspace(-1, 1, count) if count > 1 else np.zeros(1)
 
 
 def checks(counts: tuple[int, ...]) -> list[Place]:
-    """Return the places with the largest error for these numbers of nodes along each axis.
+    """Return the places at which the error is measured, for these numbers of nodes along each axis.
 
-    With a single node, these are the ends of the range. With more, they are the points halfway between nodes along
-    every axis. If there are many such points, only a few are used: evenly spaced ones along one axis, and on two axes
-    those next to all four corners and a few between them, because the error of a pupil without symmetry may be largest
-    at any corner.
+    With a single node, these are the ends of the range, or on two axes the corners and the middles of the sides. With
+    more, they are the points halfway between nodes along every axis. If there are many such points, only a few are
+    used: evenly spaced ones along one axis, and on two axes those next to all four corners and a few between them,
+    because the error of a pupil without symmetry may be largest at any corner.
     """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
@@ -100,7 +100,7 @@ class NodeChoice:
     known: dict[Place, np.ndarray] = field(default_factory=dict)
 
     def choose(self, tolerance: float, most: float | None = None) -> Choice:
-        """Return the first candidate whose predicted error is within the tolerance.
+        """Return the first candidate whose predicted error is within `most` or, if that is None, the tolerance.
 
         most: part of the tolerance that is available for this stage (None: all).
 

@@ -24,6 +24,8 @@ def retinal_image(
 ) -> Array:
     """Return the image, Dr.Jit (band, *shape), of a scene whose near surfaces hide far ones, see `occlusion`.
 
+    If `bank.parallax` is 0, no surface hides another one.
+
     light: radiance (band, Y, X).
     inverse_distance: 1/z [1/m] of the cells, (Y, X).
     """

@@ -47,7 +47,8 @@ def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[La
     """Yield the layers of a depth map from the nearest to the farthest.
 
     inverse_distance: 1/z [1/m] of the cells, (Y, X).
-    parallax: see `KernelBank`.
+    parallax: shift of the image [cells] between opposite edges of the pupil, per difference of 1/z [1/m]. With 0, no
+        surface hides another one.
     """
     from scipy.ndimage import distance_transform_edt
 

@@ -18,7 +18,7 @@ MOST_PHOTONS = 1e18  # counts of photons must fit into 64-bit integers
 
 
 def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
-    """Return the throughput: a² times the open fraction of the aperture's disk.
+    """Return the throughput: squared `relative_aperture` times `open_share`, the open fraction of the aperture's disk.
 
     This is the pupil's open area divided by the area of the widest pupil. The result is a Dr.Jit array if
     relative_aperture is a Dr.Jit array.
@@ -30,9 +30,11 @@ def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
 
 
 def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, types: Precision) -> Array:
-    """Return the signals a² Σ_b weights[c, b] irradiance[b] of channels c: Dr.Jit (band, y, x) -> (channel, y, x).
+    """Return the signals of channels c, `gathered` Σ_b weights[c, b] irradiance[b].
 
-    gathered: the throughput a².
+    The irradiance is a Dr.Jit tensor (band, y, x), the result one of (channel, y, x).
+
+    gathered: throughput of the aperture.
     """
 
     bands, height, width = irradiance.shape

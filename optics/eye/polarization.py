@@ -34,10 +34,10 @@ STEEP = 0.62
 
 
 def microvilli_of(given: Any) -> Tile | None:
-    """Convert one Microvilli for all receptors, or rows of them, to rows of microvilli.
+    """Convert one Microvilli for all receptors, or rows of them, to rows of microvilli; None remains None.
 
     Raises:
-        ValueError: `given` is neither of these, or rows have different lengths.
+        ValueError: `given` is none of these, or rows have different lengths.
     """
     if given is None:
         return None
@@ -79,9 +79,10 @@ def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
 def taken_by(
     tile: Tile | None, resolution: tuple[int, int], radiance: np.ndarray, polarization: Any
 ) -> list[tuple[np.ndarray, Any]]:
-    """Return the Stokes parameters I, Q and U of a radiance (band, Y, X), each with its weight in the signals.
+    """Return the radiance (band, Y, X) and, if it is polarised, Stokes parameters Q and U, each with its weight.
 
-    A weight is a number, or an array (h, w) with one entry per receptor.
+    The weighted sum of the three gives the signals. A weight is a number, or an array (h, w) with one entry per
+    receptor.
 
     polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
 

@@ -130,6 +130,7 @@ def density_on(
 ) -> np.ndarray:
     """Return the relative density (row, column) on equal cells of the retina, from the top left of the visual field.
 
+    resolution: number of receptors (height, width).
     halves: half height and half width of the field on the plane at distance 1.
     middle: tangents (right, down) of the direction of the field's middle.
 

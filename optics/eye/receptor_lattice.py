@@ -24,7 +24,9 @@ NARROWEST = 0.01  # choice: smallest side of a receptor, relative to the average
 
 @dataclass(frozen=True, eq=False)
 class ReceptorLattice(ReadOnlyArrays):
-    """Rectangles of receptors, in the coordinates of this module.
+    """Rectangles of receptors: x to the right and y down, from the middle of the retina.
+
+    The units are the width and the height of an average receptor.
 
     rows: edges of the rows, from the top, (h + 1,).
     columns: edges of the receptors in each row, from the left, (h, w + 1).
@@ -69,7 +71,8 @@ class ReceptorLattice(ReadOnlyArrays):
     def angles_deg(self, size: tuple[float, float], middle: tuple[float, float]) -> np.ndarray:
         """Return the angles [degrees] that the receptors subtend vertically and horizontally, (2, h, w).
 
-        Arguments as in `directions_deg`.
+        size: width and height of an average receptor on the plane at distance 1.
+        middle: tangents (right, down) of the direction of the field's middle.
         """
         at, half = self.middles * size + middle, self.sides * np.reshape(size[::-1], (2, 1, 1)) / 2
         found = []
@@ -122,7 +125,7 @@ class ReceptorLattice(ReadOnlyArrays):
 
 
 def even_lattice(resolution: tuple[int, int]) -> ReceptorLattice:
-    """Return receptors that are all alike."""
+    """Return receptors that are all alike, for a resolution (height, width)."""
     rows, columns = (np.arange(n + 1) - n / 2 for n in resolution)
     return ReceptorLattice(rows, np.tile(columns, (resolution[0], 1)))
 
@@ -133,7 +136,9 @@ def receptor_lattice(
 ) -> ReceptorLattice | None:
     """Return the receptors of a density, or None if the density is constant and all receptors are alike.
 
-    Arguments as in `density_on`.
+    resolution: number of receptors (height, width).
+    halves: half height and half width of the field on the plane at distance 1.
+    middle: tangents (right, down) of the direction of the field's middle.
 
     Raises:
         ValueError: see `density_on`, or a receptor is far narrower than the average.

@@ -53,7 +53,7 @@ class CellsError(AccuracyError):
 
 @contextmanager
 def more_time() -> Iterator[None]:
-    """Add advice to errors about a predicted time: the value of `most_seconds` that is sufficient for it."""
+    """Within this context, an AccuracyError about too long a computing time also states a sufficient `most_seconds`."""
     try:
         yield
     except AccuracyError as refused:

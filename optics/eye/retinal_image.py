@@ -20,7 +20,7 @@ __all__ = ["at_receptors", "blur", "centred", "mean_over", "receptor_average", "
 def blur(
     scenes: Sequence[np.ndarray], kernels: Sequence[np.ndarray | Array], shape: tuple[int, int], types: Precision
 ) -> Array:
-    """Return the middle part of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], Dr.Jit (band, *shape).
+    """Return the middle part of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u] at cells v, Dr.Jit (band b, *shape).
 
     scenes: arrays (band, Y, X). Scenes are dark outside.
     kernels: one tensor or array (band, ky, kx) per scene, with odd ky and kx.
@@ -144,7 +144,7 @@ def mean_over(lattice: ReceptorLattice, image: Array, types: Precision) -> Array
 def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> Array:
     """Return the value at each receptor's middle, or in the next cell if the middle lies between two cells.
 
-    See `with_centre`.
+    In the second case, `with_centre` has shifted the kernels by half a cell.
     """
     return _of_receptors(image, np.arange(samples_per_receptor) == samples_per_receptor // 2, types)
 

@@ -25,7 +25,7 @@ def signals(eye: EyeSpec, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelB
     parts: components of the light, (band, Y, X), each with its weight in the signals, a number or one per receptor (h,
         w).
     s: samples_per_receptor.
-    z: see `Eye.see`.
+    z: distance [m] of the scene along the axis, a number or one per cell (Y, X).
     """
     types, shape = precision(eye.dtype), (eye.resolution[0] * s, eye.resolution[1] * s)
     depth = inverse_distances_in(parts[0][0].shape[1:], z)

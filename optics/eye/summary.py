@@ -33,18 +33,20 @@ class Description:
 
     relative_aperture: a, the pupil's diameter relative to that of a pupil with a throughput of 1.
     throughput: a², times the open fraction of the aperture's disk, times the mask's transmission.
-    f_number: f/2R. f is the focal length that relates a distance x on the retina to the angle x/f; it is n₀/n times the
-        distance to the retina. The brightness of the image is proportional to 1/f_number².
+    f_number: focal length f, divided by the pupil's diameter. A distance x on the retina corresponds to the angle x/f,
+        so f is n₀/n times the distance to the retina, with the indices n behind and n₀ before the pupil. The brightness
+        of the image is proportional to 1/f_number².
     wavelength: mean wavelength [m] of daylight, weighted by the receptors.
     diffraction_cpd: cut-off frequency of diffraction at the pupil, 2 sin θ/λ on the retina, where θ is half the angle
         of the cone of light.
     sampling_cpd: Nyquist frequency of the receptors, 1/(2 Δφ), horizontally.
-    noise_cpd: lowest frequency at which the contrast of the optics falls below `noise` divided by `white_signal`.
+    noise_cpd: lowest frequency at which the contrast of the optics falls below `noise` divided by `white_signal`, or
+        the cut-off frequency if it never does.
     acuity_cpd: horizontal acuity, the smallest of these three frequencies; NaN if one is unknown.
     acuity_vertical_cpd: vertical acuity, with the Nyquist frequency of the receptors' rows.
     binding: name of the smallest known limit: "diffraction", "sampling" or "noise".
     strehl_ratio: Strehl ratio of the band nearest `wavelength`.
-    image_quality: see `optics.image_quality`.
+    image_quality: mean of the contrast above the noise, up to the Nyquist frequency, times `white_signal`.
     noise: standard deviation of the signal of a receptor that sees white, from all sources of noise.
     photons: photons that such a receptor absorbs per integration time, averaged over channels (None: no photon budget).
     acceptance_angle_deg: full width at half maximum of a receptor's angular sensitivity, horizontally.

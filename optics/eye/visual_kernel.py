@@ -84,7 +84,7 @@ class Spot:
 
 
 def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
-    """Return the PSF, integrated over the retina's cells: Dr.Jit (band, ky, kx), both odd.
+    """Return the PSF of a point at distance z [m], integrated over the retina's cells: Dr.Jit (band, ky, kx), both odd.
 
     The cells lie around the geometric image. Their rows ascend with y and their columns with x. The image on the retina
     is inverted, so that this is also the order of the visual field, from top to bottom and from left to right.
@@ -94,7 +94,7 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
     Raises:
         ValueError: the retina's distance carries derivatives, and the source is off the axis.
-        AccuracyError: see `retinal_psf`, or the light covers too many cells.
+        AccuracyError: no method reaches the tolerance within the limits, or the light covers too many cells.
     """
     import drjit as dr
 
@@ -115,8 +115,7 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
     types, kernels = precision(retina.dtype), []
     for request, picture in zip(requests, found, strict=True):
         window = request.problem.window
-        # Samples and cells both run backwards. A symmetric pupil thus has the same sums, in the same order, as a turned
-        # one, whose samples run forwards.
+        # Samples and cells run backwards, so a symmetric pupil has the same sums in the same order as a turned one.
         down, across = (
             types.Tensor(padded_for_packets(sums), sums.shape)
             for samples, tiles in zip(window.shape, (rows, columns), strict=True)
@@ -129,12 +128,14 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float]) -> PSFResult:
-    """Return the PSF of a point at distance z, on a window that loses less than the tolerance at every wavelength.
+    """Return the PSF of a point at distance z [m], with a loss below the fraction `tolerance` at every wavelength.
 
-    See `visual_kernel` for the arguments.
+    If the relief is too steep for this, light farther from the image than a side of the retina counts as blocked.
+
+    direction: tangents (right, down) of the point's direction in the visual field.
 
     Raises:
-        AccuracyError: no method reaches the tolerance within the limits on memory and time.
+        AccuracyError: no method reaches the tolerance within the limits, or the light covers too many cells.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     return _on_spot(lambda spot: _spread(beams, spot, retina), beams, retina)
@@ -229,8 +230,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     The window may lose the fraction `tolerance` of the light. Half of this fraction is for diffraction at the pupil's
     edge, and half for rays that hit the retina outside the window. If masks, pixels or fine detail scatter light, the
     second half is divided equally between rays and scattered light. A spatial frequency is a sine divided by λ.
-    Diffraction that adds a frequency f thus increases the sine of a ray's angle θ by λf. The ray then hits the retina
-    at z tan θ.
+    Diffraction that adds a frequency f thus increases the sine of a ray's angle by λf.
 
     centre: geometric image (x, y) [m].
     """

@@ -56,17 +56,17 @@ class GridSampling(SpectrumSampling):
 
     @cached_property
     def pupil(self) -> Grid:
-        """Grid that covers the soft disk."""
+        """Grid in the pupil's plane that covers the aperture with its soft edge; at most one period wide."""
         pitch = self.period / self.pupil_period
         across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz} of a plane wave."""
         return self.whole_phase(_angular_spectrum(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
 
     @property
@@ -128,8 +128,11 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
 def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
     """Return the period [m] and the number of its samples.
 
-    The period covers the pupil and the non-paraxial displacement z (tan θ - sin θ). Fresnel's integral repeats the
-    field at distances of λz divided by the pitch. The samples are so dense that these copies do not reach the window.
+    The period covers the pupil and the non-paraxial displacement z (tan θ - sin θ), with the distance z of the window
+    and the angle θ at which the taper ends. Fresnel's integral repeats the field at distances of λz divided by the
+    pitch. The samples are so dense that these copies do not reach the window.
+
+    outermost: distance [m] from the axis at which the pupil ends.
     """
     relay = outermost + taper.blur + problem.distance * (taper.tangent - taper.sine)
     period = 2 * relay
@@ -163,7 +166,8 @@ def _spectrum_cost(how: GridSampling, dtype: str) -> tuple[float, float]:
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
     """Return the field over the window, U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10).
 
-    A split spectrum omits a phase that does not affect the intensity.
+    U₀ is the field behind the pupil, F the Fourier transform and H the transfer function. A split spectrum omits a
+    phase that does not affect the intensity.
     """
     spectrum = _spectrum(beam, how, types)
     found = arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)

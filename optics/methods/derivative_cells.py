@@ -45,7 +45,7 @@ def derivative_cells(
     The error is the relative L2 error of the derivatives with respect to all samples, for a random functional of the
     PSF. It is at most NODES_PART times the tolerance. Cells are halved if they would need more than MOST_NODES nodes.
 
-    cycles: local frequencies [cycles per R] of the integrand at points that are evenly spread over the opening.
+    cycles: local frequencies [cycles per radius] of the integrand at points that are evenly spread over the opening.
     """
     for halvings in count():
         cells = _divided(opening, knots.borders, halvings)

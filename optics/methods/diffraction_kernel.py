@@ -14,7 +14,7 @@ FAR = 1 / 300  # choice: largest 1/(kD) at which the modulus of the near-field f
 
 
 def near_field(wavelength: float | np.ndarray, distance: np.ndarray) -> tuple[np.ndarray | float, np.ndarray]:
-    """Return modulus and phase [waves] of the factor 1 + i/(kD).
+    """Return modulus and phase [waves] of the factor 1 + i/(kD), with the wave number k.
 
     wavelength: wavelength in the medium [m].
     distance: distances D [m].
@@ -33,7 +33,8 @@ def diffraction_kernel(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return modulus [1/m²] and phase [waves] of i times the kernel, without the spherical phase e^{ikρ}.
 
-    ρ is the distance from the centre of the pupil. All arrays are broadcast.
+    The kernel is z/(λD²) (1/(kD) - i) e^{ikD}. D and ρ are the distances of the point of the window from the point and
+    from the centre of the pupil, z is that of the window's plane, and k the wave number. All arrays are broadcast.
 
     wavelength: wavelength in the medium [m].
     distance: distance of the window's plane [m].

@@ -44,8 +44,9 @@ POINTS = 150  # choice: points of the pupil at which the slow factors of nodes a
 class FarFieldSampling:
     """Samples of the pupil and of direction cosines, and nodes over the window.
 
-    The pitch of the direction cosines is λ / (period x pitch of the pupil). The nodes are Chebyshev points in the angle
-    atan(x/z), because the kernel as a function of x has poles at ±iz, with z the distance of the window.
+    The pitch of the direction cosines is the wavelength, divided by period x pitch of the pupil. The nodes are
+    Chebyshev points in the angle atan(x/z), because the kernel as a function of x has poles at ±iz, with z the distance
+    of the window.
     """
 
     edge: PupilEdge
@@ -59,7 +60,7 @@ class FarFieldSampling:
     model_error: float = 0.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:

@@ -51,7 +51,7 @@ class ParaxialSampling:
         return model_error(self.problem, self.method == "fresnel")
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         u = beam.behind(self.edge.aperture, self.pupil, precision(problem.dtype))
         curved = self.method == "fresnel"
         return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, curved).intensity

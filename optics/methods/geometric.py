@@ -143,7 +143,7 @@ def geometric(problem: Problem) -> list[RaySampling]:
 def pinhole(problem: Problem) -> list[PinholeSampling]:
     """Return a list with the sampling that puts all light into one sample; empty for a pupil of pixels.
 
-    The error is predicted as 100 %, even for a very small exact PSF, because samples of the exact PSF are intensities
+    The predicted error exceeds 100 %, even for a very small exact PSF, because samples of the exact PSF are intensities
     at points and not means over cells. "auto" therefore never chooses this method.
     """
     if problem.pixelated is not None:
@@ -206,8 +206,8 @@ def _ray_error(problem: Problem) -> float:
     """Return the relative L2 error of the ray density.
 
     The error is due to the fringes along the rim of the shadow, which are as wide as a Fresnel zone or a cell. The
-    error is 1 if rays cross, or if their hit points are concentrated in an area that is smaller than diffraction or
-    cells allow.
+    error exceeds 1 if rays cross, if a mask scatters light, or if hit points are concentrated in an area that is
+    smaller than diffraction or cells allow.
 
     If the rays magnify the pupil by m, the fringes of an edge are those at the distance z/m without a lens, magnified
     by m. The reason is that a quadratic phase only scales Fresnel's integral (Goodman, eq. 4-17).

@@ -61,13 +61,13 @@ class HankelSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         types = precision(problem.dtype)
         profile = _hankel(beam, problem, self, types).intensity
         return self.line.onto(profile, problem.window, types)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz} of a plane wave."""
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
@@ -116,7 +116,7 @@ def _round_up(n: int) -> int:
 
 
 def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision) -> Field:
-    """Return the field at the radii of `how.line`, without the carrier e^{ikz}."""
+    """Return the field at the radii of `how.line`, without the carrier e^{ikz} of a plane wave."""
     import drjit as dr
 
     nodes, weights = _on_rings(problem.aperture.rings, how.radii)
@@ -145,7 +145,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
 
 
 def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return quadrature nodes and weights over the open rings, in units of R."""
+    """Return quadrature nodes and weights over the open rings, in units of the pupil's radius."""
     parts = [
         (inner + (outer - inner) * nodes, (outer - inner) * weights)
         for (inner, outer), (nodes, weights) in zip(rings, map(gauss_legendre, counts), strict=True)

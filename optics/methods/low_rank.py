@@ -35,8 +35,8 @@ class LowRankSampling:
 
     rank: number of Chebyshev points per axis of the window.
     half_width: distance [m] from the window's centre within which these points lie.
-    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c}, with u the position in the window. It is 1 if samples are
-        sines.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. It is 1
+        if samples are sines.
     """
 
     pupil: PupilSamples
@@ -50,11 +50,11 @@ class LowRankSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         return _low_rank(beam, problem, self, precision(problem.dtype)).intensity
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz} of a plane wave."""
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:

@@ -16,7 +16,7 @@ class WithField(Protocol):
     """The additional interface of all exact methods except "far_field": the complex field."""
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the field U over the window, for unit amplitude at the pupil, without the carrier e^{ikz}."""
+        """Return the field for unit amplitude at the pupil, without the carrier e^{ikz} of a plane wave."""
 
 
 class Sampling(Protocol):
@@ -48,7 +48,7 @@ class Sampling(Protocol):
         """Relative L2 error of the intensity with infinitely many samples; 0 for exact methods."""
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the square over which rounding errors are spread.

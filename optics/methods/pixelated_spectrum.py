@@ -50,13 +50,13 @@ class PixelSpectrum(SpectrumSampling):
     padding: float = 1.0
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz} of a plane wave."""
         types = precision(problem.dtype)
         spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
         return self.whole_phase(arrived(spectrum, beam, problem, self).scaled(1 / self.period**2), beam, problem)
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         types = precision(problem.dtype)
         spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
         return arrived(spectrum, beam, problem, self).scaled(1 / self.period**2).intensity
@@ -112,7 +112,7 @@ def _timed(sampling: PixelSpectrum, problem: Problem) -> PixelSpectrum:
 
 
 def _spectrum(u: Field, beam: Beam, how: PixelSpectrum, types: Precision) -> Field:
-    """Return Σ u(ξ) e^{-2πi f·ξ} at all frequencies of the grid, by two matrix products W u Wᵀ, W = e^{-2πi f ξ}."""
+    """Return Σ u(ξ) e^{-2πi f·ξ} over the nodes ξ at all frequencies f of the grid, by two matrix products."""
     import drjit as dr
 
     nodes, grid = len(how.pupil.at), how.spectrum

@@ -58,7 +58,7 @@ class Problem:
         beyond it may be wrong, and edge-diffracted light less accurate. None: the whole window must be accurate.
     medium_n: refractive index behind the pupil.
     masked: True if a mask scatters light where no rays arrive. Approximations then cannot predict their error.
-    spread: spread of the light over the pupil, see `light_spread`.
+    spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
     differentiated: True if the PSF carries derivatives.
     moves: True if derivatives with respect to the distance are requested.
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
@@ -203,7 +203,7 @@ class Problem:
 
     @property
     def _beyond_rim(self) -> float:
-        """Distance [R] beyond the rim up to which nodes may lie: the diagonal of the largest cell."""
+        """Distance [radii] beyond the rim up to which nodes may lie: the diagonal of the largest cell."""
         assert self.knots is not None
         return math.sqrt(2) * max(after - before for before, after in pairwise(self.knots.borders))
 

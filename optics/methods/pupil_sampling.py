@@ -141,7 +141,8 @@ def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, rad
 def cell_samples(problem: Problem, band: float | None = None) -> PixelSamples | None:
     """Return the nodes that derivatives with respect to samples of maps require; None if there would be too many cells.
 
-    band: see `Problem.cells`.
+    band: highest frequency [1/m] in the pupil's plane of the light that the nodes must resolve. None: they resolve the
+        combined phase of pupil and path for all points of the window.
     """
     cells = problem.cells(band)
     return None if cells is None or cells.fixed is None else PixelSamples(cells, cells.fixed, problem.radius)

@@ -65,7 +65,7 @@ class NodeSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)
@@ -74,7 +74,7 @@ class NodeSampling:
         return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz} of a plane wave."""
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)
@@ -136,10 +136,10 @@ def node_rule(problem: Problem) -> tuple[float, float]:
 def turns(problem: Problem, digits: float) -> float:
     """Return the cycles per radius that the nodes must resolve.
 
-    These are the cycles of the phase. In addition, the kernel has poles at the height z above the pupil's plane. If z
-    is short, the poles slow convergence: with n nodes, the errors of Gauss-Legendre rules over [0, R] fall like
-    e^{-4nz/R}, and those of the trapezoid rule around a ring of radius R like e^{-nz/R}. Additional cycles then
-    represent the poles. In a focus, where the phase is constant, only the poles matter.
+    These are the cycles of the phase. In addition, the kernel has poles at the height z above the pupil's plane, the
+    distance of the window. If z is short, the poles slow convergence: with n nodes, the errors of Gauss-Legendre rules
+    over [0, R] fall like e^{-4nz/R}, and those of the trapezoid rule around a ring of radius R like e^{-nz/R}.
+    Additional cycles then represent the poles. In a focus, where the phase is constant, only the poles matter.
     """
     phase, poles = problem.radius * problem.turning_inside, digits * math.log(10) / (2 * math.pi)
     nearness = problem.radius / problem.distance
@@ -219,7 +219,7 @@ def _added(
 ) -> tuple[Array, Array]:
     """Return real and imaginary part of `total` plus the sum over some nodes, float64.
 
-    rule: x, y [R] and weight [R²] of the nodes.
+    rule: x, y and weight of the nodes, in units of the pupil's radius.
     at: points (x, y) [m] of the image.
     total: real and imaginary part of the sum over the previous nodes, at these points.
     """

@@ -63,16 +63,16 @@ def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
     The bound is valid for light of any polarisation. The window must contain the brightest point of the light and a few
     samples around it.
 
-    spread: see `light_spread`.
+    spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
     """
     return MARGIN * spread / ROUND * float(np.interp(sine, *_TABLE)) * min(sine, 1.0) ** 2
 
 
 def light_spread(pupil: Pupil) -> float:
-    """Return the mean square distance [R²] between the axis and the points of the pupil, weighted by their light.
+    """Return the mean square distance between the axis and the points of the pupil, weighted by the amplitude there.
 
-    Distances are measured along one direction, the one with the largest result. The result is a quarter for a disk, a
-    half for a thin ring, and 1 for two pinholes on opposite sides of the rim.
+    Its unit is the squared radius. Distances are measured along one direction, the one with the largest result. The
+    result is a quarter for a disk, a half for a thin ring, and 1 for two pinholes on opposite sides of the rim.
     """
     if pupil.mask is None:
         return _open_spread(pupil.aperture)

@@ -81,7 +81,7 @@ class SineSamples:
 
     @property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points ξ (x, y) [m] of all samples, (y, x)."""
+        """Points (x, y) [m] of the pupil, (y, x) for all samples."""
         x, y, _ = self.layout
         return x, y
 
@@ -171,7 +171,10 @@ def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """Return the fewest samples that resolve the combined phase of pupil and path; see `evenly_in_sines`."""
+    """Return the fewest samples that resolve the combined phase of pupil and path; None if they would be too uneven.
+
+    The result is also None if the grid would be too large.
+    """
     edge = problem.soft_edge(problem.turning)
     return evenly_in_sines(problem, edge, problem.turning + edge.stopband)
 

@@ -75,7 +75,8 @@ class SineStack(SineGeometry):
     at: sines along either axis minus those of the pupil's centre, (pupil, sample), evenly spaced.
     edges: soft apertures, (pupil,).
     radius: radii [m], (pupil,).
-    curvature: curvatures of waves that are smoothed with the edges, see `curved_ring`, (pupil,).
+    curvature: local frequencies at the rim [cycles per radius] of waves that are smoothed with the edges; 0 for others,
+        (pupil,).
     """
 
     at: np.ndarray
@@ -123,7 +124,8 @@ class SineStack(SineGeometry):
         """Return the contribution of each sample to the field at the middle of the window, (beam, y, x), complex.
 
         It is the light behind the pupils, times the areas of the samples, times z/(λD²) (1/(kD) - i) e^{ik(D - ρ)}, up
-        to a constant phase.
+        to a constant phase. D and ρ are the distances of this point from the sample and from the pupil's centre, z is
+        that of the window, and k the wave number.
 
         dtype: type of the real and imaginary parts, in which the phase is rounded, "float32" or "float64".
         """
@@ -147,6 +149,8 @@ class SineStack(SineGeometry):
 
     def _sizes(self, dtype: str) -> np.ndarray:
         """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x).
+
+        z is the distance of the window, and D that of a sample from the middle of the window.
 
         The transmittance of smoothed waves is complex.
         """

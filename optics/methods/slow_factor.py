@@ -128,7 +128,8 @@ def slow_factor(
 ) -> np.ndarray:
     """Return the slow factor (z/D)² (1 + i/(kD)) e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
 
-    D is the distance from ξ to u, and ρ the distance from the pupil's centre to u. All arrays are broadcast.
+    D is the distance from ξ to u, ρ that from the pupil's centre to u, and z that of the window. k is the wave number.
+    All arrays are broadcast.
 
     pupil: points ξ (x, y) [m].
     directions: directions s of these points in the Fourier kernel e^{-ik s·u}.
@@ -161,8 +162,8 @@ def remaining_factor(
 ) -> np.ndarray:
     """Return the slow factor, relative to the middle of the window, divided by both axis factors.
 
-    It varies even more slowly over the window. Arguments: see `slow_factor`. With dtype="float32", short paths are
-    computed in float32, too.
+    It varies even more slowly over the window. The arguments are those of `slow_factor`, but the samples determine the
+    points. With dtype="float32", short paths are computed in float32, too.
     """
     none, points = np.zeros((1,) * directions[0].ndim), samples.points_at(*directions)
     if dtype == "float32" and path.short(samples.steepest):
@@ -229,10 +230,13 @@ def cross_term(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return factors a and b, so that the slow factor divided by both axis factors is about 1 + a b.
 
-    The product a b is the term -ik us vt/D of the exponent, with the mean of 1/D over the pupil. Because a depends on u
-    and s, and b on v and t, the term costs as much as a second Fourier kernel along either axis.
+    The product a b is the term -ik us vt/D of the exponent, where k = 2π/λ, and 1/D is the mean inverse distance over
+    the pupil. Because a depends on u and s, and b on v and t, the term costs as much as a second Fourier kernel along
+    either axis.
 
-    directions: s and t. window: u and v. Their last two axes broadcast.
+    directions: s and t, sines of samples along x and y minus those of the pupil's centre. Their last two axes, and
+        those of `window`, broadcast.
+    window: u and v, positions along x and y relative to the middle of the window [m].
     """
     (s, t), (u, v) = directions, window
     wavelength, z = path.numbers(s.ndim)

@@ -85,7 +85,7 @@ class SmoothSpectrum(SpectrumSampling):
         return self.pupil_period / self.pupil.shape[0]
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         assert problem.reach is not None
         types, window = precision(problem.dtype), problem.window
         found = intensity_of(self._propagated(self._light(beam, types.dtype), self._transfer(beam, problem), window))

@@ -23,8 +23,9 @@ class Taper:
 
     It blurs the field by `blur` [m].
 
-    The taper is an error function. The transform of its derivative falls to the ripple within the distance `blur`.
-    Light that the taper removes must therefore land at least this far outside the window.
+    The taper is an error function. The transform of its derivative falls to the allowed error of the amplitude, the
+    ripple, within the distance `blur`. Light that the taper removes must therefore land at least this far outside the
+    window.
 
     sine, tangent: sine and tangent of the angle at which the taper ends.
     """

@@ -98,7 +98,7 @@ class VectorSum:
         return pupil.radius * turning / beam.wavelength + detail + poles
 
     def _pupil(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return points x, y [m] of the pupil, and their weights -ik/2π P g e^{ik(L + D - z)} dξ (see the module)."""
+        """Return points x, y [m] of the pupil, and the complex amplitudes of their plane waves at the image."""
         beam, pupil, types = self.beam, self.beam.pupil, precision("float64")
         k, z, radius = 2 * math.pi * beam.index / beam.wavelength, number(beam.distance), pupil.radius
         nodes = cached_nodes(pupil.aperture, self._cycles, DIGITS)

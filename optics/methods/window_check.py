@@ -70,6 +70,8 @@ def _at_points(
     with weights L_a and L_b:
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v) Σ_ηξ L_b A_v e^{-ik v t} P L_a A_u e^{-ik u s}.
+
+    G is this quotient, P the contribution of a sample with the sines (s, t), and k the wave number.
     """
     (u, v), dtype = place, str(field.real.dtype)
     nodes, ratio, apart = _ratios(samples, path, place, dtype, INTERPOLATED * tolerance)

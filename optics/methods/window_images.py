@@ -22,7 +22,7 @@ def window_images(
 
     samples: samples of the pupils, one for each beam or one for all.
     rank: rank of the slow factor over the window.
-    crossed: True to include `cross_term`.
+    crossed: True to include `cross_term`, which replaces interpolation of the slow factor.
     dtype: "float32" or "float64".
     """
     path = Path(stack.wavelength, stack.distance, window)

@@ -33,7 +33,7 @@ class WindowPlan:
 
     tolerance: tolerances of the PSFs, (beam,).
     derivatives: additional needs of the PSFs if derivatives are requested, else None.
-    smoothed: see `WindowEdges`.
+    smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
     """
 
     stack: LightStack
@@ -139,8 +139,8 @@ class WindowPlan:
     def _pitch(self, density: np.ndarray) -> np.ndarray:
         """Return the largest spacing of sines at which a pupil has `density` samples per radius everywhere.
 
-        The distance of two points in the pupil is at most z/cos³θ times the distance of their sines, with θ the angle
-        of the steepest ray.
+        The distance of two points in the pupil is at most z/cos³θ times the distance of their sines, where z is the
+        distance of the window, and θ the angle of the steepest ray.
         """
         steepest = np.minimum(self._rims[1], 1 - 1e-12)
         found: np.ndarray = self.stack.radius * (1 - np.square(steepest)) ** 1.5 / (self.stack.distance * density)

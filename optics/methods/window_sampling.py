@@ -54,7 +54,7 @@ class WindowSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the intensity |U|² over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
+        """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
         if problem.differentiated:
             return self._recorded(beam, problem).intensity
         return precision(problem.dtype).Float(padded_for_packets(self.plain_intensity(beam, problem)))
@@ -65,7 +65,7 @@ class WindowSampling:
         return window_images(problem.stack, samples, self.rank, self.crossed, problem.window, problem.dtype).ravel()
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return the complex amplitude U over the window, without the carrier e^{ikz}."""
+        """Return the complex amplitude U over the window, without the carrier e^{ikz} of a plane wave."""
         if problem.differentiated:
             return on_window(self._recorded(beam, problem), beam, problem)
         u = Field.from_numpy(self._field(beam, problem), problem.window.dx, precision(problem.dtype))

@@ -40,7 +40,7 @@ def window_field(pupil: Any, kernel: Any, down: Any, across: Any) -> Any:
 def pupil_gradient(cotangent: Any, kernel: Any, down: Any, across: Any) -> Any:
     """Return the gradient of a loss L with respect to the pupil's light P, ∂L/∂Re P + i ∂L/∂Im P, (..., η, ξ).
 
-    It is the adjoint of `window_field` and takes about as long.
+    It is the adjoint of `window_field`, whose result is U, and takes about as long.
 
     cotangent: ∂L/∂Re U + i ∂L/∂Im U, (..., y, x). For a loss on the intensity |U|², it is 2U ∂L/∂|U|².
     """

@@ -61,9 +61,9 @@ def shown(value: Any) -> str:
 
 
 def finite(name: str, value: float, *, carried: bool = False) -> float:
-    """Return `value` as a float; ValueError unless it is a finite number.
+    """Return `value` as a float; ValueError about `name` unless it is a finite number.
 
-    carried: True if `value` may carry a derivative; see `without_derivative`.
+    carried: True if `value` may carry a derivative, which is otherwise refused.
     """
     number = _number(name, value, carried)
     if not math.isfinite(number):
@@ -72,17 +72,18 @@ def finite(name: str, value: float, *, carried: bool = False) -> float:
 
 
 def flag(name: str, value: Any) -> bool:
-    """Return `value` as a bool; ValueError unless it is True or False."""
+    """Return `value` as a bool; ValueError about `name` unless it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
         raise ValueError(f"{name} = {shown(value)}: must be True or False")
     return bool(value)
 
 
 def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False) -> float:
-    """Return `value` as a float; ValueError unless it is positive and its square is within double precision.
+    """Return `value` as a float; ValueError about `name` unless it is in [1e-15, 1e15], where squares are accurate.
 
+    unit: unit of `value`, for the message.
     infinite: True if infinity is allowed.
-    carried: see `without_derivative`.
+    carried: True if `value` may carry a derivative, which is otherwise refused.
     """
     number = _number(name, value, carried)
     if infinite and number == math.inf:
@@ -95,7 +96,7 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
 
 
 def without_derivative(name: str, value: Any) -> Any:
-    """Return `value`; ValueError if `value`, or an entry of it, carries a derivative, which would be lost.
+    """Return `value`; ValueError about `name` if it, or an entry of it, carries a derivative, which would be lost.
 
     The other checks of this module include this check, unless they are called with carried=True.
     """
@@ -112,7 +113,7 @@ def without_derivative(name: str, value: Any) -> Any:
 
 
 def vacuum_wavelength(value: Any) -> float:
-    """Return `value` [m] as a float; ValueError unless it is positive and at most LONGEST_WAVE.
+    """Return `value` [m] as a float; ValueError unless it is positive and at most 1 m.
 
     The upper limit catches wavelengths in nanometres.
     """
@@ -143,7 +144,7 @@ def wavelength_row(values: Any) -> np.ndarray:
 
 
 def in_range(name: str, value: float, low: float, high: float, *, carried: bool = False) -> float:
-    """Return `value` as a float; ValueError unless low <= value <= high. carried: see `without_derivative`."""
+    """Return `value` as a float; ValueError about `name` unless low <= value <= high. carried: see `finite`."""
     number = _number(name, value, carried)
     if not low <= number <= high:
         raise ValueError(f"{name} = {shown(value)}: must lie in [{low:g}, {high:g}]")
@@ -151,7 +152,7 @@ def in_range(name: str, value: float, low: float, high: float, *, carried: bool 
 
 
 def shape_2d(name: str, value: Any) -> tuple[int, int]:
-    """Return (height, width) as ints; ValueError unless both are whole numbers of at least 1."""
+    """Return (height, width) as ints; ValueError about `name` unless both are whole numbers of at least 1."""
     without_derivative(name, value)
     try:
         height, width = (int(n) for n in value)
@@ -165,7 +166,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
 
 
 def one_of(name: str, value: Any, options: Iterable[str]) -> str:
-    """Return `value`; ValueError, which suggests the most similar option, unless it is one of the options."""
+    """Return `value`; ValueError about `name`, with the most similar option, unless it is one of the options."""
     known = tuple(options)
     if not isinstance(value, str) or value not in known:
         raise ValueError(
@@ -193,13 +194,13 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
-    """Return (x, y) as floats; ValueError unless both are numbers within ±LARGEST."""
+    """Return (x, y) as floats; ValueError about `name` (two `what`) unless both are numbers within ±1e15."""
     x, y = pair(name, without_derivative(name, value), what)
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 
 def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
-    """Return the two entries of `value`, which may carry derivatives; ValueError unless there are two."""
+    """Return both entries of `value`, with any derivatives. Otherwise, a ValueError says `name` must be two `what`."""
     try:
         x, y = value
     except (TypeError, ValueError):
@@ -208,7 +209,7 @@ def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
 
 
 def reals(name: str, values: Any) -> np.ndarray:
-    """Return `values` as a float64 array of any shape; ValueError unless they are real numbers without derivatives."""
+    """Return `values` as a float64 array; ValueError about `name` unless they are real numbers without derivatives."""
     given = as_array(name, without_derivative(name, values))
     if given.dtype.kind not in "biuf":
         kind = "complex ones" if given.dtype.kind == "c" else shown(values)
@@ -222,7 +223,7 @@ def plain_reals(name: str, values: Any) -> np.ndarray:
 
 
 def complexes(name: str, values: Any) -> np.ndarray:
-    """Return `values` as an array of any shape; ValueError unless they are numbers without derivatives."""
+    """Return `values` as an array; ValueError about `name` unless they are numbers without derivatives."""
     given = as_array(name, without_derivative(name, values))
     if given.dtype.kind not in "biufc":
         raise ValueError(f"{name}: must be numbers, not {shown(values)}")
@@ -257,7 +258,7 @@ def is_sized(value: Any) -> bool:
 
 
 def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
-    """Return `values` as a tuple of instances of `kind`, or raise a ValueError that shows `example`."""
+    """Return `values` as a tuple; ValueError about `name`, with `example`, unless all are instances of `kind`."""
     try:
         found = tuple(values)
     except TypeError:
@@ -268,7 +269,7 @@ def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
 
 
 def whole(name: str, value: Any, low: int, high: int) -> int:
-    """Return `value` as an int; ValueError unless it is a whole number in [low, high]."""
+    """Return `value` as an int; ValueError about `name` unless it is a whole number in [low, high]."""
     without_derivative(name, value)
     try:
         fits = int(value) == value and low <= int(value) <= high
@@ -280,7 +281,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
 
 
 def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
-    """Return `value`; ValueError, which shows `example`, unless it is an instance of `kind`."""
+    """Return `value`; ValueError about `name`, with `example`, unless it is an instance of `kind`."""
     if not isinstance(value, kind):
         raise ValueError(f"{name} = {shown(value)}: must be a kind of {kind.__name__}, such as {example}")
     return value

@@ -66,9 +66,9 @@ def dft2(
     pitch: float,
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Field:
-    """Return the Fourier sum of a field at `shape` output samples; see the formula at the top of the module.
+    """Return the Fourier sum U[k] = Σ_j u[j] exp(± 2πi j·k / period) of a field u, at `shape` output samples k.
 
-    The result is a Field on a grid of the given output pitch.
+    j and k are counted from the centre samples n//2. The result is a Field on a grid of the given output pitch.
 
     sign: sign of the exponent: -1 for the forward, +1 for the inverse transform, both without normalisation.
     centre: (x, y) of the output's centre sample, in the unit of `pitch`.

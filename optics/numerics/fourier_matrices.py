@@ -53,7 +53,7 @@ def _halves_seconds(shape_in: Shape, shape_out: Shape) -> float:
 
 
 def by_whole_matrices(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """Return the sum as A_y u A_xᵀ, with one Fourier matrix per axis (`_matrix`)."""
+    """Return the Fourier sum of the field u as A_y u A_xᵀ, with the Fourier matrices A_y and A_x of both axes."""
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     u = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
     along_x = along_y = _matrix(types, mx, nx, period, sign)

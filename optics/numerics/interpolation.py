@@ -42,7 +42,10 @@ MARGIN = TABLE_TAPS // 2 - 1  # number of samples beyond either end of a table t
 
 @dataclass(frozen=True, eq=False)
 class Interpolant:
-    """Samples of a function at first + i step, i = -2 ... n + 1. The function is constant beyond the ends."""
+    """Samples of a function at first + i step, i = -2 ... n + 1, of which n lie within its range.
+
+    The function is constant beyond the ends.
+    """
 
     first: float
     step: float
@@ -130,7 +133,7 @@ def cubic_bsplines(t: Array) -> list[Array]:
 
 
 def tensor_product(value: Callable[[int, int], Array], across: list[Array], along: list[Array]) -> Array:
-    """Return Σ_ij a_i b_j value(i, j), with a_i the weights along y and b_j those along x."""
+    """Return Σ_ij a_i b_j value(i, j), with the weights a_i = along[i] along y and b_j = across[j] along x."""
     total = 0.0
     for i, down in enumerate(along):
         line = 0.0

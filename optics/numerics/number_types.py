@@ -17,7 +17,7 @@ DRJIT_HALF = "Float16", "f16"  # ends of names of Dr.Jit's types
 
 
 def readable(name: str, value: Any) -> Any:
-    """Return `value`, with PyTorch's lazy conjugation and negation carried out; ValueError if elements are masked.
+    """Return `value`, with PyTorch's lazy conjugation and negation carried out; errors are about the argument `name`.
 
     NumPy cannot read tensors that are marked as conjugate or negative, such as `tensor.conj()` and its imaginary part,
     or that are on a GPU. A copy on the processor is returned, unless the tensor requires a gradient. NumPy would use
@@ -42,7 +42,7 @@ def readable(name: str, value: Any) -> Any:
 
 
 def full_precision(name: str, value: Any) -> Any:
-    """Return `value` as `readable` does; ValueError if it, or an entry of it, is in half precision or less.
+    """Return `value` as `readable` does; ValueError about `name` if it, or an entry, is in half precision or less.
 
     Near 1 µm, the step of float16 is 60 nm, a tenth of a wavelength.
     """

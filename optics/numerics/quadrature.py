@@ -24,7 +24,7 @@ STEPS = 16  # choice: values per octave in `stepped_up`; on average, cycles incr
 
 
 def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
-    """Return the smallest m from which on 2 |J_m| <= 10^-digits for all arguments up to z.
+    """Return the smallest m from which on Bessel's functions fulfil 2 |J_m| <= 10^-digits for arguments up to z.
 
     The search starts at Debye's estimate, which is usually the result, so that two Bessel functions are enough.
     """

@@ -47,9 +47,10 @@ class RadialProfile:
     def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialProfile:
         """Return points that resolve spatial frequencies up to `band` [1/m] with a relative error of about `error`.
 
-        The number of points follows from Chebyshev coefficients over [-R, R]. Those of a wave of frequency b are 2
-        J_m(2πbR). Obliquity factors have poles at ±i distance, so their coefficients fall like e^{-m asinh(distance /
-        R)}. The pitch h of the table follows from the error of eight-point interpolation, LAGRANGE_8 (2πbh)⁸.
+        The number of points follows from Chebyshev coefficients over [-R, R], with the line's `radius` R. Those of a
+        wave of frequency b are 2 J_m(2πbR). Obliquity factors have poles at ±i distance, so their coefficients fall
+        like e^{-m asinh(distance / R)}. The pitch h of the table follows from the error of eight-point interpolation,
+        LAGRANGE_8 (2πbh)⁸.
         """
         digits = -math.log10(error)
         turns = 2 * math.pi * band * rim + 2 * rim / distance

@@ -27,7 +27,7 @@ TRANSFORM_NODES = 40
 
 
 class ScatteredSum:
-    """Fourier sums over scattered points.
+    """Fourier sums over scattered points, S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)} at samples k, and their transpose.
 
     p, q: coordinates of the points [turns per sample], flat.
     shape: number of samples (y, x) of the sums.

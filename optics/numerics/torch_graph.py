@@ -96,7 +96,10 @@ def torch_place() -> str:
 
 
 def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
-    """Return the device of all tensors; ValueError if they differ. Single numbers on the CPU fit any device."""
+    """Return the device of all tensors, or the CPU without any; ValueError if they differ.
+
+    Single numbers on the CPU fit any device.
+    """
     places = {name: t.device for name, t in numbers.items() if t.ndim or t.device.type != "cpu"}
     for first, known in places.items():
         for name, place in places.items():

@@ -83,7 +83,12 @@ class ModesAtPupil:
         return found / self.area
 
     def total(self, taken: np.ndarray) -> float:
-        """Return the integral of `power_on` over all sines, (λ/n₀)² Σ |P Ψ|² dξ / area, by Parseval's theorem."""
+        """Return the integral of `power_on` over all sines, (λ/n₀)² Σ |P Ψ|² dξ / area, by Parseval's theorem.
+
+        λ/n₀ is the wavelength in front of the pupil, and P Ψ dξ are the `weights`.
+
+        taken: weight of each mode.
+        """
         squares = (np.abs(self.weights) ** 2 / self.area_of).sum(axis=1)
         return float(taken @ squares) * (2 * math.pi / self.wavenumber) ** 2 / self.area
 

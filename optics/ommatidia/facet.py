@@ -59,7 +59,9 @@ class FacetLens:
             raise ValueError(f"radius_front = {self.radius_front:g}: must make a lens that focuses parallel light")
 
     def power(self, wavelength: float) -> float:
-        """Return the power P = P₁ + P₂ - t P₁P₂/n [1/m] at a vacuum wavelength [m], with the thickness t.
+        """Return the power P = P₁ + P₂ - t P₁P₂/n [1/m] at a vacuum wavelength [m].
+
+        P₁ and P₂ are the powers of the surfaces, t is the thickness and n the index of the lens.
 
         Raises:
             ValueError: the wavelength or an index at this wavelength is invalid, as in all methods of the lens.
@@ -68,11 +70,14 @@ class FacetLens:
         return front + back - self.thickness / n * front * back
 
     def focal_length(self, wavelength: float = MIDDLE) -> float:
-        """Return the focal length f' = n'/P [m] in the cone of index n', measured from the second principal plane."""
+        """Return the focal length [m] from the second principal plane: the index of the cone, divided by the power."""
         return self._index("medium_n", wavelength) / self.power(wavelength)
 
     def object_focal_length(self, wavelength: float = MIDDLE) -> float:
-        """Return the focal length f = n₀/P [m] in front of the lens. A receptor of width d sees the angle d/f."""
+        """Return the focal length f [m] in front of the lens: the index there, divided by the power.
+
+        A receptor of width d sees the angle d/f.
+        """
         return self._index("object_n", wavelength) / self.power(wavelength)
 
     def principal_planes(self, wavelength: float = MIDDLE) -> tuple[float, float]:

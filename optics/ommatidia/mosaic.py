@@ -112,7 +112,7 @@ class AppositionEye:
         It is the modulus of the Fourier transform of the normalised angular sensitivity. The contrast falls as the
         grating becomes finer. It is 0 beyond 2R n/λ cycles per radian, where R is the radius of the pupil and n the
         index in front of it. The spacing of the ommatidia is a separate limit: their array resolves gratings up to
-        1/(√3 Δφ).
+        1/(√3 Δφ), with the interommatidial angle Δφ.
 
         azimuth_deg: direction [degrees] along which the grating varies, from x towards y.
 

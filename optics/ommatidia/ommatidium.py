@@ -182,7 +182,7 @@ def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wave
     waveguide.
 
     diameter, rhabdom: diameters D of the facet and d of the rhabdom [m].
-    focal_length: focal length f = n₀/P [m] in front of the lens.
+    focal_length: focal length f [m] in front of the lens, the index there divided by the power of the lens.
     wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
 
     Raises:

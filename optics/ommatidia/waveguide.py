@@ -28,7 +28,7 @@ class Mode:
     It has l dark planes through the axis and m - 1 dark rings. Sources: Gloge, Appl. Opt. 10, 2252, 1971; Snyder &
     Love, Optical Waveguide Theory, ch. 14.
 
-    u, w: U and W, solutions of the mode equation with U² + W² = V².
+    u, w: U and W, solutions of the mode equation with U² + W² = V² for the waveguide parameter V (`v_number`).
     radius: radius b of the core [m].
     sine: True for a mode with sin lφ, False with cos lφ. Modes with l >= 1 come in such pairs.
     """
@@ -41,7 +41,10 @@ class Mode:
     sine: bool = False
 
     def field(self, x: Any, y: Any) -> np.ndarray:
-        """Return the amplitude ψ [1/m] at (x, y) [m], with ∫ψ² = 1: J_l(Ur/b) in the core and K_l(Wr/b) outside.
+        """Return the amplitude ψ [1/m] at (x, y) [m], with ∫ψ² = 1.
+
+        It is proportional to J_l(Ur/b) in the core of radius b and to K_l(Wr/b) outside, with Bessel's functions J and
+        K at the distance r from the axis, times cos lφ or sin lφ.
 
         x, y: positions relative to the waveguide's axis, in arrays whose shapes broadcast.
 
@@ -63,7 +66,7 @@ class Mode:
     def core_share(self) -> float:
         """Fraction of the mode's light that travels within the core and can be absorbed.
 
-        The fraction is (W² + U²κ)/V² with κ = K_l²/(K_{l-1} K_{l+1}) (Gloge 1971, eq. 17).
+        The fraction is (W² + U²κ)/V² with κ = K_l²/(K_{l-1} K_{l+1}) at W (Gloge 1971, eq. 17).
         """
         square = self.u**2 + self.w**2
         return 1 - self.u**2 / square * (1 - self._kappa())
@@ -131,7 +134,9 @@ class Waveguide:
                 raise ValueError(f"length = None: must be a length in m, because proximal_diameter = {end:g} m")
 
     def v_number(self, wavelength: float) -> float:
-        """Return V = πd/λ √(n_core² - n_clad²) of the tip at a vacuum wavelength [m]. Below 2.405, only LP01 exists.
+        """Return V = πd/λ √(n_core² - n_clad²) of the tip, of diameter d, at a vacuum wavelength λ [m].
+
+        Below 2.405, only the mode LP01 exists.
 
         Raises:
             ValueError: the index of the core is not above that of the surroundings, V is above 60, or the wavelength is
@@ -186,7 +191,9 @@ class Waveguide:
         return self.length if end > mode.cut_off or end == v else self.length * (v - mode.cut_off) / (v - end)
 
     def absorbed(self, mode: Mode) -> float:
-        """Return the fraction of a mode's light that is absorbed along the whole length, or up to its cut-off.
+        """Return the fraction of a mode's light that is absorbed along the length, or up to its cut-off.
+
+        It is 1 if `length` is None.
 
         For a taper, the mean of core_share comes from a quadrature over the length, with an error below 2e-6.
         """
@@ -231,7 +238,7 @@ def _brackets(l: int, count: int) -> list[tuple[float, float]]:
 
 @lru_cache(maxsize=4096)
 def _roots(l: int, v: float) -> tuple[float, ...]:
-    """Return U of all guided modes of azimuthal order l at V = v."""
+    """Return the mode parameters U of all guided modes of azimuthal order l at the waveguide parameter V = v."""
     found = (_root(l, low, high, v) for low, high in _brackets(l, int(v / math.pi) + 2) if low < v)
     return tuple(u for u in found if u is not None)
 

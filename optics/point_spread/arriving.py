@@ -132,7 +132,7 @@ def _at_edge(request: Request) -> Array:
 def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
     """Return the fraction of the pupil's light that the relief bends beyond grazing, and its uncertainty.
 
-    Diffraction spreads the light of a ray over sines of about √(λ/R).
+    Diffraction spreads the light of a ray over sines of about √(λ/R), with the wavelength λ and the pupil's radius R.
     """
     pupil, problem = request.beam.pupil, request.problem
     slopes = pupil.slopes(request.beam.wavelength, request.beam.source)
@@ -143,10 +143,11 @@ def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
 
 
 def _summed(request: Request, unsure: float = 1.0) -> Array | None:
-    """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum would take too long.
+    """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum cannot be fast enough.
 
     The fraction is ∫ |F(u)|² df / A over |f| < 1/λ, with the field u behind the pupil and the area A of its aperture.
-    Lengths are in units of the radius. |F(u)|² has no structure finer than one cycle per diameter.
+    Lengths are in units of the radius. |F(u)|² has no structure finer than one cycle per diameter. Pixelated reliefs
+    and pupils with more than 100 cycles per radius are left out.
 
     unsure: uncertainty of the estimate. The larger it is, the longer the sum may take.
     """
@@ -182,7 +183,7 @@ class _Sum:
     seen: Nodes
 
     def fraction(self, beam: Beam, wavelength: float) -> Array:
-        """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ and the waves W of the beam.
+        """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ, the pupil's radius R and the waves W.
 
         The outer sum is over the frequencies (sx, sy) of weight w, the inner sum over the pupil's nodes with amplitudes
         u.

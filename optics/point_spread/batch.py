@@ -120,9 +120,10 @@ def psf_batch(
     source_distances: sequence of distances [m] of sources on the axis.
     dx, shape, tolerance, method, dtype: see `optics.psf`.
 
-    At tolerances of 3e-4 or more, all PSFs are planned together, and PSFs with equal numbers of samples are computed as
-    stacks of matrix products. The error of each PSF is checked. Pupils with derivatives or pixels are excluded, as are
-    PSFs that remain inaccurate or take long. These are planned one by one, before the first of them is computed.
+    At tolerances of 3e-4 or more, with the method "auto", "exact" or "low_rank", all PSFs are planned together, and
+    PSFs with equal numbers of samples are computed as stacks of matrix products. The error of each PSF is checked.
+    Pupils with derivatives or pixels are excluded, as are PSFs that remain inaccurate or take long. These are planned
+    one by one, before the first of them is computed.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.

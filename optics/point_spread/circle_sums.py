@@ -34,7 +34,8 @@ PART = 0.1  # choice: error of interpolation and quadrature, in units of the ker
 class SoftCircles:
     """The sums Σ_j v_j w(ρ_j, R) over samples v for every radius R, as a product of matrices.
 
-    The top of the module defines w, the weight of a sample at the distance ρ_j from the centre.
+    w(ρ, R) is the weight of a sample at the distance ρ from the centre for a circle of radius R. J₀ and J₁ are Bessel's
+    functions.
 
     near: indices of the samples that contribute to any circle.
     samples: interpolation between these samples and evenly spaced distances (sample, distance), sparse.
@@ -53,7 +54,10 @@ class SoftCircles:
 
     @classmethod
     def around(cls, distance: np.ndarray, radii: np.ndarray, kernel: SoftEdge) -> SoftCircles:
-        """Return the sums over samples at these distances (sample,) for circles of these radii (radius,)."""
+        """Return the sums over samples at these distances (sample,) for circles of these radii (radius,).
+
+        Distances and radii are in units of 1/cutoff, where the cutoff is the intensity's highest frequency.
+        """
         from scipy.special import j0, j1
 
         error, end = PART * kernel.ripple, kernel.stopband

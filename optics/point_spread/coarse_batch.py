@@ -35,7 +35,7 @@ def coarse_psfs(
 ) -> Iterator[tuple[int, np.ndarray, Plan]]:
     """Yield index of the beam, PSF (y, x) [1/m²] and plan, if the PSF meets the tolerance and takes little time.
 
-    Nothing is yielded for tolerances below TIGHTEST. Beams with derivatives or pixelated reliefs are left out.
+    Nothing is yielded for tolerances below TIGHTEST, 3e-4. Beams with derivatives or pixelated reliefs are left out.
     """
     if tolerance < TIGHTEST:
         return

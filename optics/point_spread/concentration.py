@@ -38,7 +38,8 @@ def encircled_energy(
     The result for a `WhitePSF` is (type, radius). The fraction is computed as a weighted sum over samples. The weights
     are the circle, convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies
     that alias onto them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the
-    circle, which are computed if the window does not contain them.
+    circle, which are computed if the window does not contain them. If samples are means over cells
+    (`PSFResult.holds_cells`), each weight is about the part of the cell inside the circle.
 
     radii: a number or a row of numbers. At 0 the result is 0.
     centre: None for sample n//2 of the PSF.

@@ -29,9 +29,10 @@ ROOM = 0.5  # choice: an enlarged window exceeds the necessary width by √2 to 
 
 
 def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.02) -> MTF:
-    """Return |F{PSF}| divided by all the light that arrives (Goodman, Introduction to Fourier Optics, §6.3.2).
+    """Return the contrast, |F{PSF}| divided by all the light that arrives, with the Fourier transform F.
 
-    For a `WhitePSF` there is one MTF per receptor type. The result is the contrast, which is 1 at frequency 0.
+    It is 1 at frequency 0. For a `WhitePSF` there is one MTF per receptor type. Source: Goodman, Introduction to
+    Fourier Optics, §6.3.2.
 
     arriving: fraction of the pupil's power that arrives on the unbounded plane, a number or (wavelength,), in (0, 1].
         None: all light except the evanescent part, which the pupil's edge and steep slopes of its relief cause.
@@ -70,6 +71,7 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
     """Return the MTF of weighted sums over the PSF's wavelengths, see `mtf`.
 
     weights: (sum, wavelength). They may be negative.
+    tolerance: largest error of any contrast.
 
     Raises:
         ValueError: the tolerance is not positive.
@@ -91,10 +93,11 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
 
 
 def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: float) -> PSFResult:
-    """Return the PSF over a window that misses at most the fraction `tolerance` of the arriving light.
+    """Return the PSF over a window that is enlarged until it misses at most the fraction `tolerance` of arriving light.
 
-    The intensity of diffracted light falls like r⁻³ with the distance r, so the light that a window misses is inversely
-    proportional to its width. Widths and pitches change in steps, so that a small change of the pupil changes neither.
+    It is enlarged at most three times. The intensity of diffracted light falls like r⁻³ with the distance r, so the
+    light that a window misses is inversely proportional to its width. Widths and pitches change in steps, so that a
+    small change of the pupil changes neither.
 
     known, unsure: fraction of the light that arrives, and its uncertainty, (wavelength,).
 
@@ -163,7 +166,7 @@ def image_quality(
     throughput: T in [0, 1], such as a² for a pupil of the relative radius a. It may carry a derivative, and the result
         is 0 if T is 0.
     noise_sigma: σ, in units of the signal, 0 to 1e6.
-    tolerance: see `optics.mtf`. A known MTF has its own tolerance.
+    tolerance: largest error of any contrast of the MTF. A known MTF has its own tolerance.
     with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:

@@ -48,8 +48,8 @@ class DiskSum:
 
         Raises:
             ValueError: the disk extends beyond the window.
-            AccuracyError: suitable samples cannot be computed. If too many are needed, the message states a sufficient
-                pitch and shape.
+            AccuracyError: suitable samples cannot be computed, or `light` is not from `vector_focus`. If too many are
+                needed, the message states a sufficient pitch and shape.
         """
         positive("radius", without_derivative("radius", radius))
         middle = light.centre if centre is None else point_2d("centre", centre)

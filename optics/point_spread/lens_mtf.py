@@ -78,8 +78,9 @@ def lens_mtf(
 ) -> LensMTF:
     """Return the contrasts of a lens in light of all its wavelengths, with lateral colour, through focus.
 
-    The optical transfer function is the mean Σ w(λ) OTF(λ), with all PSFs relative to one point of the image plane. At
-    frequency 0, the result is the fraction of the light within the windows of the PSFs, slightly below 1.
+    The optical transfer function is the mean Σ w(λ) OTF(λ) over the wavelengths λ, with `weights` w, and with all PSFs
+    relative to one point of the image plane. At frequency 0, the result is the fraction of the light within the windows
+    of the PSFs, slightly below 1.
 
     lens: from `read_exit_pupils`.
     frequencies: spatial frequencies [1/m] on the image plane, a number or (frequency,).

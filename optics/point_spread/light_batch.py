@@ -84,7 +84,7 @@ class LightBatch:
     ) -> list[tuple[list[int], WindowStack]]:
         """Return stacks of members with the same pupil and sensor's distance, each with the indices of its members.
 
-        convert: see `WindowStack`.
+        convert: function that converts a NumPy array to the library of the computation, NumPy or PyTorch.
         """
         groups: dict[tuple[int, float], list[int]] = {}
         for place, (pupil, sensor, source) in enumerate(self.members):

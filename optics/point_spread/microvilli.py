@@ -39,7 +39,7 @@ class Microvilli:
     def absorbed(self, light: VectorFocus) -> np.ndarray:
         """Return the absorbed light, (y, x) [1/m²], with complete absorption of light polarised along the microvilli.
 
-        With m the direction of the microvilli, it is |E·m|² + (|E|² - |E·m|²)/ratio.
+        With the field E and the direction m of the microvilli, it is |E·m|² + (|E|² - |E·m|²)/`dichroic_ratio`.
 
         Raises:
             ValueError: `light` is not a VectorFocus.
@@ -99,7 +99,7 @@ class Microvilli:
         return float(most / least)
 
     def _along(self, light: VectorFocus) -> np.ndarray:
-        """Return E·m of each part of the light, (part, y, x), with m the direction of the microvilli."""
+        """Return E·m of each part of the light, (part, y, x): its field E along the direction m of the microvilli."""
         turn = math.radians(self.azimuth_deg)
         found: np.ndarray = math.cos(turn) * light.parts[:, 0] + math.sin(turn) * light.parts[:, 1]
         return found

@@ -123,7 +123,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def cutoff(self) -> np.ndarray:
-        """Highest frequency [1/m] of the intensity, 2R/√(R² + z²) n/λ with n behind the pupil, (wavelength,)."""
+        """Highest frequency [1/m] of the intensity, 2 NA/λ with the pupil's numerical aperture NA, (wavelength,)."""
         radius, distance = self.pupil.radius, number(self.sensor_distance)
         index = np.array([self.pupil.index_behind(float(wavelength)) for wavelength in self.wavelengths])
         found: np.ndarray = 2 * radius / math.hypot(radius, distance) * index / self.wavelengths
@@ -176,7 +176,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def mean(self, shares: np.ndarray) -> PSFResult:
         """Return the PSF of light of all wavelengths at once, (1, y, x), with derivatives; its wavelength is the mean.
 
-        shares: fraction of each wavelength in the light, (wavelength,). Fractions sum to 1.
+        shares: fraction of each wavelength in the light, (wavelength,). They sum to 1. A mean is returned unchanged.
 
         Raises:
             ValueError: shares are not real numbers, or have the wrong shape or sum.
@@ -238,7 +238,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def of_all_light(self) -> PSFResult:
-        """The PSF over the same window, from samples of the pupil that resolve all light.
+        """The PSF over the same window, from samples of the pupil that resolve all light if it can be recomputed.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -246,7 +246,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return self.recompute_on(self.window, "a sum") if self.for_window and self.can_recompute else self
 
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
-        """Return a PSF for sums, whose samples are at most `coarsest` [m] apart.
+        """Return a PSF for sums, whose samples are at most `coarsest` [m] apart, or are means over cells.
 
         It is `of_all_light` if samples are fine enough or means over cells. Otherwise, each sample is divided.
 

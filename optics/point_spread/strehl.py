@@ -36,16 +36,18 @@ DIGITS = 10.0  # choice: digits of the maximum without aberration
 
 
 def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
-    """Return the maximum of the PSF relative to that of the same aperture without aberration, (wavelength,).
+    """Return the maximum of the PSF relative to that of the same aperture and mask without aberration, (wavelength,).
 
     The result for a `WhitePSF` is (type,). The wave without aberration is spherical and converges on the point where
     the axis hits the sensor. Its field at this point is, with L = √(z² + r²),
 
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
-    the first Rayleigh-Sommerfeld integral of exp(-ikL(r)). Its modulus for a circle is |1 - z/L - ikz ln(L/z)|. The
-    maximum is searched near the brightest sample. If the samples are too coarse, finer samples are computed there. The
-    maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the maxima without aberration.
+    the first Rayleigh-Sommerfeld integral of exp(-ikL(r)) over the points ξ of the pupil at the distance r from the
+    axis, with the wave number k and the sensor's distance z. For a circle without a mask, its modulus is |1 - z/L - ikz
+    ln(L/z)|, with L at the rim. The maximum is searched near the brightest sample. If the samples are too coarse, finer
+    samples are computed there. The maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the
+    maxima without aberration.
 
     with_error: True to return (value, predicted error), each (wavelength,).
 
@@ -79,7 +81,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
 
 
 def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
-    """Return the maximum of the PSF of the same aperture without aberration, (wavelength,), flat."""
+    """Return the maximum of the PSF of the same aperture and mask without aberration, (wavelength,), flat."""
     import drjit as dr
 
     types = precision("float64")

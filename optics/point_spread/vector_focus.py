@@ -52,8 +52,8 @@ def vector_focus(
         the x and y of these definitions are rotated with the light's direction.
     source_angle: direction (x, y) [rad] of the light, as in `optics.psf`. The window lies around the image.
     apodization: "flat" for uniform light over a flat pupil, or "aplanatic" for light along the axis of a corrected
-        objective. With the latter, the ray from ξ arrives at the focus with the sine ξ/z, and the light is a sum of
-        plane waves (Richards and Wolf 1959).
+        objective. With the latter, the ray from the point ξ of the pupil arrives at the focus, at the distance z, with
+        the sine ξ/z, and the light is a sum of plane waves (Richards and Wolf 1959).
     dx, shape: pitch [m] and number of samples (y, x) of the window.
     tolerance: relative L2 error of the intensity over the window.
 

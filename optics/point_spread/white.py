@@ -85,9 +85,11 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         return found
 
     def mtf(self, tolerance: float = 0.02) -> MTF:
-        """Return |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx). Shifts between colours add to the blur.
+        """Return the contrast |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx). Shifts between colours add to the blur.
 
-        See `optics.mtf`.
+        w are the `weights` of the optical transfer functions of all wavelengths λ. See `optics.mtf`.
+
+        tolerance: largest error of any contrast.
 
         Raises:
             ValueError: see `optics.mtf`.
@@ -129,7 +131,12 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         centre: tuple[float, float] | None = None,
         with_error: bool = False,
     ) -> np.ndarray | Array:
-        """Return Σ_λ w(λ) times the encircled energy of each wavelength, (type, radius). See `optics.encircled_energy`.
+        """Return the fraction of the white light within circles, (type, radius). See `optics.encircled_energy`.
+
+        It is the sum of the encircled energies of all wavelengths, times their `weights`.
+
+        radii, centre: radii [m] of the circles, and their centre (x, y) [m]; None for sample n//2.
+        with_error: True to return (value, predicted error).
 
         Raises:
             ValueError: see `optics.encircled_energy`.
@@ -157,7 +164,7 @@ def white_psf(
 ) -> WhitePSF:
     """Return the PSF in white light for each type of receptor.
 
-    Receptors count photons, so w(λ) ∝ light(λ) λ sensitivity(λ).
+    Receptors count photons, so the weight of a wavelength λ is proportional to light(λ) λ sensitivity(λ).
 
     light: name of an illuminant, a Spectrum, or spectral power as a function of wavelengths [m].
     receptors: receptor types, see `optics.receptors_of`. Results are in the order of the types.

@@ -102,8 +102,9 @@ class Alignment:
     def nodes(self, radius: float, sine: float, wavelength: float, allowed: float) -> tuple[np.ndarray, float]:
         """Return the depths [m] between which fields are interpolated, or just 0, and the error of the intensity.
 
-        Along a ray, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2. Interpolation between n
-        Chebyshev nodes has an error of at most φⁿ / (2ⁿ⁻¹ n!).
+        Along a ray at the angle θ to the axis, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2,
+        with the largest depth ζ and the wave number k. Interpolation between n Chebyshev nodes has an error of at most
+        φⁿ / (2ⁿ⁻¹ n!).
 
         radius: largest distance [m] from the centre.
         sine: largest sin θ of the light.
@@ -212,7 +213,7 @@ def sags(sines: np.ndarray) -> np.ndarray:
 
 
 def slowness(sine: float) -> float:
-    """Return 1 - c = (1 - cos θ)/2 from sin θ. c belongs to the carrier exp(ikcζ), see the module."""
+    """Return 1 - c = (1 - cos θ)/2 from sin θ, where exp(ikcζ) is the carrier of light at the depth ζ."""
     return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 

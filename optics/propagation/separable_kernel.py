@@ -47,7 +47,9 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Slow part A exp(ike) of a kernel as a sum of products of polynomials.
+    """Slow part A exp(ike) of a kernel as a sum of products of polynomials of the offsets ρx and ρy between points.
+
+    A is the amplitude of the kernel, k the wave number, and e the part of the distance that couples ρx and ρy.
 
     along_x, along_y: Chebyshev coefficients (degree, term) over the ranges of ρx and ρy [m].
     error: largest error relative to the slow part.
@@ -208,7 +210,7 @@ def _longer(passage: Passage, along: np.ndarray, middle: float, other: float) ->
 
 
 def _phasor(passage: Passage, path: np.ndarray | float) -> np.ndarray:
-    """Return exp(ik path), for backward propagation its conjugate."""
+    """Return exp(ik path), for backward propagation its conjugate. `path` is a length [m], and k = 2π/wavelength."""
     waves = np.asarray(path) / passage.wavelength
     angle = 2 * np.pi * (waves - np.round(waves))
     found: np.ndarray = np.cos(angle) + 1j * math.copysign(1, passage.z) * np.sin(angle)
@@ -216,7 +218,10 @@ def _phasor(passage: Passage, path: np.ndarray | float) -> np.ndarray:
 
 
 def _amplitude(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
-    """Return the amplitude A of the kernel for points that are (x, y, z) apart. Paraxially, it is 1/(iλz)."""
+    """Return the amplitude of the kernel, without exp(ik distance), for points that are (x, y, z) apart [m].
+
+    Paraxially, it is 1/(iλz), where λ is the wavelength.
+    """
     k, z = 2 * np.pi / passage.wavelength, abs(passage.z)
     if passage.paraxial:
         return np.asarray(-1j * k / (2 * np.pi * passage.z))

@@ -44,7 +44,10 @@ class PropagatedPlane:
 
 @dataclass(frozen=True)
 class ScaledPlane:
-    """A plane u (y, x), divided by `brightest` so that float32 can represent its power Σ|u|²."""
+    """A plane u (y, x), divided by `brightest` so that float32 can represent its power Σ|u|².
+
+    brightest: modulus of the brightest sample, or 1 if the power needs no division.
+    """
 
     u: np.ndarray
     power: float
@@ -168,7 +171,7 @@ def _sines(how: TransformSampling) -> np.ndarray:
 
 
 def evanescent_share(plane: np.ndarray, period: int, dx: float, passage: Passage) -> float:
-    """Return the evanescent fraction of a plane's power."""
+    """Return the evanescent fraction of a plane's power; 0 in Fresnel's approximation."""
     total = _power(plane)
     highest = math.sqrt(0.5) / dx * passage.wavelength  # sine, at the corner of the spectrum
     if total == 0 or passage.paraxial or highest * (1 + 2 / period) < 1:

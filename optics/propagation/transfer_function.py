@@ -97,6 +97,8 @@ def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxia
     """Return the band of the light whose sideways displacement over the distance z is at most `corner` [m].
 
     It is chosen for the shortest period of the transform. The result is `EVERYTHING` if no light may be faded.
+
+    ripple: fraction of the light that remains beyond the fade.
     """
     return _shortest(corner, wavelength, z, ripple, paraxial, square=False)
 
@@ -106,7 +108,10 @@ def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxia
 
     It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. The
     displacement along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression. The blur is
-    therefore larger than that of a fade in fx alone, by the factor of the expression's gradient.
+    therefore larger than that of a fade in fx alone, by the factor of the expression's gradient. The result is
+    `EVERYTHING` if no light may be faded.
+
+    ripple: fraction of the light that remains beyond the fade.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
@@ -115,6 +120,8 @@ def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: 
     """Return the band with the given limits, even if more or less light could reach the window.
 
     The result is `EVERYTHING` if its outermost light is too near grazing incidence.
+
+    ripple: fraction of the light that remains beyond the fade.
     """
     if (kept + fade) * wavelength >= PERIOD_MAX_SINE:
         return EVERYTHING

@@ -175,8 +175,8 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 def most_spare(passage: Passage, source: Grid) -> float:
     """Return the largest useful padding [m] for the blur of a truncated spectrum.
 
-    This is an upper bound. It assumes that the light with the largest displacement, at the spectrum's corner √2 f_N,
-    moves along an axis instead of along the diagonal.
+    This is an upper bound. It assumes that the light with the largest displacement, at the spectrum's corner (√2 times
+    the Nyquist frequency), moves along an axis instead of along the diagonal.
     """
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
@@ -185,7 +185,7 @@ def most_spare(passage: Passage, source: Grid) -> float:
 
 
 def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> float:
-    """Return the largest displacement [m] along an axis of light with frequencies up to f_N along each axis.
+    """Return the largest displacement [m] along an axis, for light up to the frequency f_N = `nyquist` along each axis.
 
     Light moves in the direction of (fx, fy), so the displacement along x is z tan θ fx/|f|. It is largest for fx = f_N
     and the largest tan θ. The latter belongs to the corner |f| = √2 f_N, or to PERIOD_MAX_SINE if this is smaller. In

@@ -99,7 +99,7 @@ class SpectralBands(ReadOnlyArrays):
         return _nonnegative(self.weights, catches, means) if nonnegative and found.min() < 0 else found
 
     def white_light(self, kernels: np.ndarray) -> np.ndarray:
-        """Return kernels (channel, k, k) for a colourless scene in daylight, given kernels (band, k, k)."""
+        """Return kernels (channel, ky, kx) for a colourless scene in daylight, given kernels (band, ky, kx)."""
         return np.tensordot(self.weights * daylight(self.wavelengths), kernels, axes=1)
 
 

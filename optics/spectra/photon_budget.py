@@ -66,10 +66,13 @@ class PhotonBudget:
 
             N_c = η Δt G ∫ E_λ/π · λ/(hc) · S_c(λ) dλ
 
+        η is the quantum efficiency, Δt the integration time, E_λ the spectral irradiance, S_c the sensitivity of
+        channel c, h Planck's constant, and c in hc the speed of light.
+
         etendue: G [m² sr], the pupil's area times the solid angle from which a receptor receives light: Land's
             sensitivity (`optical_sensitivity`; Warrant & Nilsson 1998, Vision Research 38:195, eq. 1), or (π/4) D²
-            (d/f)² for square receptors of side d. The spectrum of daylight replaces the single wavelength of Land's
-            formula.
+            (d/f)² for square receptors of side d behind a pupil of diameter D, at the focal length f. The spectrum of
+            daylight replaces the single wavelength of Land's formula.
 
         Raises:
             ValueError: an argument is outside its valid range, which the message states.

@@ -74,5 +74,8 @@ class ReceptorDynamics:
 
     @property
     def integration_ms(self) -> float:
-        """Duration of a rectangular window with the same shot noise, 1 / ∫h² dt: 2 τ or 4 τ [ms]."""
+        """Duration [ms] of a rectangular window with the same shot noise as the filter h(t), 1 / ∫h² dt.
+
+        It is 2 time constants for a filter of order 1, and 4 for order 2.
+        """
         return self.time_constant_ms * (2 if self.order == 1 else 4)

@@ -103,7 +103,7 @@ def _spectrum(nm: np.ndarray, values: np.ndarray) -> Spectrum:
 def _table(name: str) -> tuple[tuple[str, ...], np.ndarray]:
     """Return the names of all columns of a CSV file but the first, and all values (column, wavelength).
 
-    The first column is wavelengths [nm].
+    The first column contains wavelengths [nm].
     """
     with resources.files("optics.spectra").joinpath("data", name).open() as file:
         names = tuple(file.readline().strip().split(","))

@@ -104,7 +104,8 @@ def make_vec_env(
     auxiliary: any of "depth", "ids" and "flow": quantities that an observation contains for each receptor in addition
         to its signal, see docs/tasks.md
     render_mode: content of the images that the environment renders for human viewers. "rgb_array": the agent from
-        behind, with the fields of view of its eyes; "eyes": the signals of all eyes, side by side; None: no images
+        behind, or the model of a user task, with the fields of view of the eyes; "eyes": the signals of all eyes, side
+        by side; None: no images
 
     Physics uses the same number of threads as Dr.Jit, but at most one for each world. drjit.set_thread_count limits
     both. A FidelityWarning states that the fidelity is less accurate than allowed. A MirrorWarning lists features of

@@ -23,7 +23,7 @@ class Auxiliary:
     """Auxiliary observations of one kind of eyes in all worlds, at the centre of each receptor.
 
     renderer: renderer of depth and ids for these eyes.
-    names: the requested quantities, a subset of AUXILIARY.
+    names: the requested quantities, of "depth", "ids" and "flow".
     prefix: prefix of their names in an observation.
     spaces: spaces of the entries in one world's observation, by name:
         depth: distance of the visible point along the eye's axis [m], (eye, height, width) float32; 0 if nothing is
@@ -65,7 +65,9 @@ class Auxiliary:
         self._before = poses
 
     def _flow(self, now: Poses, depth: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Return the optic flow of the points that are visible now, (world, eye, 2, height, width); 0 without a hit.
+        """Return the optic flow of the points that are visible now, (world, eye, 2, height, width).
+
+        It is 0 without a hit, and for points that were not in front of the eye.
 
         Points are followed from their present positions back to the previous poses. The flow is the negative of this
         motion.

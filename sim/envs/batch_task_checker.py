@@ -60,7 +60,7 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 def _actions(simulation: Simulation, steps: int) -> list[np.ndarray]:
     """Return random actions (world, value) for each step, which are the same in any number of worlds.
 
-    All worlds take the same actions.
+    All worlds take the same actions, which have a fixed seed.
     """
     size = sum(agent.n_actions for agent in simulation.agents)
     random = np.random.default_rng(SEED)

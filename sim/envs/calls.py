@@ -91,7 +91,7 @@ def seed_of(name: str, seed: Any) -> int | None:
 
 
 def actions_of(name: str, actions: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Return actions as a float32 array. Numbers beyond the range of float32 are limited to it.
+    """Return actions as a float32 array. Finite numbers beyond the range of float32 are limited to it.
 
     name: the actions' name in messages, such as "actions"
     shape: required shape of the actions

@@ -23,7 +23,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its `alone`
     eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, course, layouts, wall_height, least_return,
-        episode_steps, spectra, medium, vary, auxiliary, render_mode: see `sim.make_vec_env`
+        episode_steps, spectra, medium, vary, auxiliary, render_mode: see `sim.make_vec_env` and `sim.build_world`
 
     Raises:
         ValueError: an argument is invalid, or `seed` or `n_envs` was given.
@@ -109,7 +109,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
 
 def make_env(task: str | Task | BatchTask, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
-    """Return a single world as a Gymnasium environment; see `EyesEnv` for the arguments and errors."""
+    """Return a single world as a Gymnasium environment; see `EyesEnv` (errors) and `make_vec_env` (arguments)."""
     return EyesEnv(task, eyes, **options)
 
 

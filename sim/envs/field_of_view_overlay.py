@@ -188,7 +188,7 @@ def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field
 
 
 def _fan(eyes: Eyes) -> np.ndarray:
-    """Return the azimuths [rad] of the fan's rays, relative to the eye's axis, (FAN,)."""
+    """Return the azimuths [rad] of the fan's rays, relative to the eye's axis, (64,)."""
     half = np.radians(eyes.fov_deg) / 2
     return np.linspace(-half, half, FAN)
 
@@ -196,7 +196,7 @@ def _fan(eyes: Eyes) -> np.ndarray:
 def _receptor_rays(eyes: Eyes) -> np.ndarray:
     """Return the azimuths [rad] of receptor columns, (column,), see `Eyes.column_azimuths`.
 
-    If there are more than MOST_RAYS columns, only every second, third, ... column is included.
+    If there are more than 15 columns, only every second, third, ... column is included.
     """
     columns = eyes.resolution[1]
     return eyes.column_azimuths()[:: -(-columns // MOST_RAYS)]
@@ -221,7 +221,7 @@ def _dot(eye: np.ndarray, view: Viewpoint, size: tuple[int, int], radius: float)
 def _reach(azimuths: np.ndarray, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """Return the distance to the first surface along these azimuths [m], ignoring the agent's own body.
 
-    Without a hit, it is FARTHEST.
+    Without a hit, it is 30 m (FARTHEST).
 
     azimuths: directions in the world's frame [rad], (n,)
     eye: x and y of the pupil [m], (2,)

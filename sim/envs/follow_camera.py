@@ -32,7 +32,7 @@ def check_render_mode(render_mode: str | None) -> None:
     """Refuse an unknown render mode.
 
     Raises:
-        ValueError: the mode is neither one of RENDER_MODES nor None.
+        ValueError: the mode is neither "rgb_array", "eyes" nor None.
     """
     if render_mode not in (None, *RENDER_MODES):
         modes = ", ".join(map(repr, RENDER_MODES))

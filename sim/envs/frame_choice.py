@@ -41,7 +41,7 @@ def with_frames(
 
     The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify the number.
     Otherwise it is the smallest number for which the errors of all signals are acceptable. If no eyes have receptors
-    with dynamics, the fidelities are returned unchanged.
+    with dynamics, or the fidelities of all such eyes specify the number, the fidelities are returned unchanged.
 
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
     scenes: see `renderers_for`
@@ -129,7 +129,10 @@ def _chosen(
 
 
 def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.ndarray]:
-    """Return noise-free signals during random actions, (action, frame, world, ...) for each renderer."""
+    """Return noise-free signals during random actions (of a fixed seed), for each renderer.
+
+    They are (action, frame, world, ...). The actions stop when an episode ends.
+    """
     random = np.random.default_rng(0)
     worlds.reset()
     found: list[list[list[np.ndarray]]] = [[] for _ in renderers]

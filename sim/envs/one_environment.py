@@ -34,7 +34,7 @@ class OneEnvironment(VecEnv):
         return self._seeds
 
     def render(self, mode: str | None = None) -> np.ndarray | None:
-        """Return the images of all worlds, tiled.
+        """Return the images of all worlds, tiled; None without a render mode.
 
         Stable-baselines3 forwards unsupported modes to the individual environments. Here all worlds share this
         environment, so it handles the mode "eyes" itself.

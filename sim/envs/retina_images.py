@@ -55,7 +55,10 @@ def _palette(eye: Eye) -> np.ndarray:
 
 
 def hues_of(receptors: Receptors) -> np.ndarray:
-    """Return the colour of each type (type, 3), from red through green to blue by decreasing peak wavelength."""
+    """Return the colour of each type (type, 3), from red through green to blue by decreasing peak wavelength.
+
+    A single type is white.
+    """
     types = receptors.types
     if len(types) == 1:
         return np.ones((1, 3))

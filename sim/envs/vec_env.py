@@ -125,10 +125,10 @@ class EyesVecEnv(OneEnvironment):
         self.animals.seed(tuple(drawn))
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Store the actions that `step_wait` takes. An action that is not finite ends the episode of its world.
+        """Store the actions, (num_envs, *action_space.shape), for `step_wait`; one that is not finite ends its episode.
 
         Raises:
-            ValueError: the actions are not real numbers, are masked, or have another shape.
+            ValueError: the actions are not real numbers, are masked, or do not have this shape.
             RuntimeError: there has been no reset yet, `close` has been called, or another `step_async` is pending.
         """
         self._calls.require_begun()

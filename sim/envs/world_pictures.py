@@ -113,7 +113,10 @@ def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
 
 
 def _drawn(frame: np.ndarray, eye: WorldEye) -> np.ndarray:
-    """Return an image (y, x, 3) uint8 of one world's signals: hexagons for a compound eye, otherwise squares."""
+    """Return an sRGB image (y, x, 3) uint8 of one world's signals.
+
+    For a compound eye, it is a map of the sphere around each mount; otherwise, it shows the retinas side by side.
+    """
     if isinstance(eye, CompoundEye):
         return hexagon_map(frame if eye.rows is None else eye.as_frames(frame), eye)
     return side_by_side(frame[:, : eye.channels], eye)

@@ -25,7 +25,7 @@ def preview_of_spectra(radiance: np.ndarray | None, reflectance: np.ndarray | No
 def preview_of_receptors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
     """Return an image (y, x, 3) whose red, green and blue show channels in order of decreasing wavelength.
 
-    A single channel is shown as grey.
+    A single channel is shown as grey. Of two channels, the second is shown as green and blue.
 
     receptors: signals, (channel, y, x)
     peaks_nm: wavelength of each channel's maximum [nm]; None: the channels are used in the given order

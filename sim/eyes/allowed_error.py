@@ -18,7 +18,7 @@ def allowed_error(eye: WorldEye, tolerance: float | None) -> float:
     """Return the allowed root mean square error of a signal, in the unit of signals.
 
     tolerance: the allowed error. If it is None, the allowed error is half of the eye's `noise_sigma` (shot noise is
-        not included), but at least LEAST_TOLERANCE times `throughput`, the eye's signal of a white surface.
+        not included), but at least 0.005 times `throughput`, the eye's signal of a white surface.
 
     Raises:
         ValueError: the tolerance is not positive and finite.

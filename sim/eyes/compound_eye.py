@@ -208,7 +208,7 @@ class CompoundEye:
 
     @property
     def receptor_photons(self) -> np.ndarray | None:
-        """`photons` in the shape of signals, (channel, row, column)."""
+        """`photons` in the shape of signals, (channel, row, column); None without a photon budget."""
         return None if self.photons is None else self.photons.reshape(-1, *self.resolution)
 
     def as_frames(self, signals: np.ndarray) -> np.ndarray:

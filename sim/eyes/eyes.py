@@ -51,7 +51,7 @@ class Eyes:
     photon_budget: an optics.PhotonBudget, which defines the amount of light and the integration time of the receptors.
         The resulting shot noise is added to the noise of `noise_sigma`. None: unlimited light, without shot noise.
     waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; the eyes then need
-        a pupil (`optics`). None: each receptor receives all light that falls on its square.
+        a pupil (`optics`). None: each receptor receives all light that falls on its area.
     pupil_turned: True if the pupils are rotated by 180° about their axes
     vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170]. None: receptors are square
     dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: no memory

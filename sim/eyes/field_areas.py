@@ -34,7 +34,7 @@ class FieldAreas:
 
     @classmethod
     def from_fields(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
-        """Divide each receptor's square into rows and columns, and add a rim of rectangles around the receptors.
+        """Divide each receptor's area into rows and columns, and add a rim of rectangles around the receptors.
 
         At most the fraction `beyond` of the receptors' light comes from outside the rim on each side. With half a row
         per receptor, each row covers two receptors, and the outermost rows may extend beyond the outermost receptors.

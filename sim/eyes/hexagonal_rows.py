@@ -18,9 +18,9 @@ def hexagonal_rows(rows: int, columns: int, fov_deg: float, acute_zone: float = 
 
     The vectors are (ahead, left, up). The first row is at the top, and each row runs from left to right. The middle of
     the lattice is ahead. Without an acute zone, neighbours in a row are fov_deg / columns apart in azimuth, and every
-    other row is shifted by half of this angle. Elevations follow Mercator's projection, which is conformal: the
-    neighbours of an ommatidium form a regular hexagon everywhere, whose size decreases with the cosine of the
-    elevation.
+    other row is shifted by half of this angle. Elevations follow Mercator's projection, which is conformal: without an
+    acute zone, the neighbours of an ommatidium form a regular hexagon everywhere, whose size decreases with the cosine
+    of the elevation.
 
     rows, columns: numbers of ommatidia, 1 to 1000
     fov_deg: horizontal field of view [degrees], above 0 and at most 360

@@ -27,9 +27,10 @@ class OmmatidialSampling:
     """Samples of a compound eye.
 
     An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
-    weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. Equal
-    ommatidia share PATTERNS arrangements of rays. One of them is chosen at random for each ommatidium, so that the
-    errors of neighbours are nearly independent.
+    weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. With 8
+    rays or more, weights are corrected so that two test scenes are exact in every band. Equal ommatidia share 16
+    arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random choice, so that the errors of
+    neighbours are nearly independent.
 
     depth: a single layer, because facets have a large depth of field
     """
@@ -121,8 +122,8 @@ def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray,
     narrow.
 
     weights: weights before the correction, (ray, band)
-    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of the table, (place, scene)
-    powers: acceptance function of each band at the places of the table, (band, place)
+    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of `powers`, (place, scene)
+    powers: tabulated acceptance function of each band, (band, place)
     """
     found = weights.copy()
     for band, power in enumerate(powers):

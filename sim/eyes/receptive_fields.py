@@ -1,6 +1,7 @@
-"""Receptive fields of an eye behind a pupil, and random directions drawn from the mixture of all fields.
+"""Receptive fields of an eye behind a pupil, and low-discrepancy directions drawn from the mixture of all fields.
 
-Fields are tabulated on square cells of the visual field's tangent plane, in the coordinates of `sim.eyes.sensor`.
+Fields are tabulated on cells of the visual field's tangent plane, in the coordinates of `sim.eyes.sensor`. The same
+number of cells divides the width and the height of a receptor.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class NoRaysError(ValueError):
 
 @dataclass(frozen=True)
 class Draw:
-    """Random directions, drawn from the mixture of receptive fields.
+    """Low-discrepancy directions, drawn from the mixture of receptive fields.
 
     points: points on the tangent plane [receptor widths and heights], x right, y down, (ray, 2), in order of y
     rows, columns: indices of the mixture's cells that contain the points, (ray,)
@@ -49,7 +50,7 @@ class ReceptiveFields:
     """Tabulated receptive fields of an eye.
 
     field: power per cell of one receptor's field, (plane, y, x), with one plane for each band of each depth layer. A
-        plane is the PSF, rotated by 180° and convolved with the receptor's square. If receptors are waveguides, a plane
+        plane is the PSF, rotated by 180° and convolved with the receptor's area. If receptors are waveguides, a plane
         is a waveguide's acceptance of light from each cell.
     density: probability per cell of the mixture, which is the mean of the fields of all receptors and planes, (Y, X)
     resolution: receptors (height, width)
@@ -91,7 +92,7 @@ class ReceptiveFields:
         """Height and width of the field in the plane in which it is narrowest [receptor heights and widths].
 
         They are the equivalent widths (sum p)² / sum p² of the field's vertical and horizontal profiles p. A uniform
-        field that covers a receptor's square has the width 1.
+        field that covers a receptor's area has the width 1.
         """
         profiles = (self.field.sum(axis=axis) for axis in (2, 1))
         height, width = (((p.sum(axis=1) ** 2) / (p**2).sum(axis=1)).min() / self.cells for p in profiles)

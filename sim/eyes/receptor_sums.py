@@ -94,8 +94,8 @@ class RowProduct:
 def _views_at_once(weights: int) -> int:
     """Return the largest number of views in a product with this number of weights that one thread computes.
 
-    The result is BLOCK if one thread cannot compute even BLOCK / 8 views. Such products are large enough for several
-    threads.
+    The result is one of 32, 16, 8 and 4. It is 32 if one thread cannot compute even 4 views, because such products are
+    large enough for several threads.
     """
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights <= ONE_THREAD), BLOCK)
 
@@ -132,7 +132,8 @@ def of_components(
 
     weights: sparse matrices (receptor, ray), one for each band
     resolution: rows and columns of receptors
-    mixing, basis: see `ReceptorSums`
+    mixing: weight of each band in each channel, (channel, band)
+    basis: contribution of each component of light to each band, (component, band)
     """
     products = [
         RowProduct.from_weights([_mixed(weights, channel * component) for channel in mixing], resolution)
@@ -154,7 +155,8 @@ def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarr
     This is cheaper than `of_components` if there are fewer bands than pairs of a component and a channel.
 
     products: sums over rays, one for each band
-    mixing, basis: see `ReceptorSums`
+    mixing: weight of each band in each channel, (channel, band)
+    basis: contribution of each component of light to each band, (component, band)
     """
     mixing, basis = mixing.astype(np.float32), basis.astype(np.float32)
     every = np.array_equal(basis, np.eye(len(basis)))
@@ -183,8 +185,8 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
 
-    Rays are omitted until another ray would reduce a receptor's sum of weights by more than the fraction `share`. The
-    remaining weights are then scaled so that this sum is unchanged.
+    At each end of a row, rays are omitted until another one would reduce the sum of weights of some receptor by more
+    than the fraction `share` / 2 in some band. The remaining weights are then scaled so that the sums are unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]

@@ -56,9 +56,9 @@ class Trial:
 class BoxSampling:
     """Samples of an eye with a perfect lens.
 
-    Every receptor's square is sampled at the same low-discrepancy points, whose requested number is rounded to a whole
+    Every receptor's area is sampled at the same low-discrepancy points, whose requested number is rounded to a whole
     number. The points of each receptor are shifted by its own fixed random offset (with wrap-around at the edges of the
-    square), so that the errors of neighbouring receptors are independent.
+    area), so that the errors of neighbouring receptors are independent.
     """
 
     eye: optics.Eye

@@ -35,7 +35,7 @@ class Facets(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class BoxSensor(ReadOnlyArrays):
-    """Sensor of an eye with a perfect lens: a receptor's signal is the mean of the light over the receptor's square.
+    """Sensor of an eye with a perfect lens: a receptor's signal is the mean of the light over the receptor's area.
 
     directions: unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32; ray = receptor *
         rays_per_receptor + sample
@@ -64,7 +64,8 @@ class BoxSensor(ReadOnlyArrays):
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Return the function that maps sums of spectral components over each receptor's rays to signals.
 
-        mixing, basis: see `sim.eyes.receptor_sums`
+        mixing: weight of each band in each channel, (channel, band)
+        basis: contribution of each component to each band, (component, band)
         """
         return of_receptors(mixing @ basis.T / self.rays_per_receptor)
 
@@ -116,7 +117,8 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
         """Return the function that maps spectral components along rays (layer * component, view, ray) to signals.
 
-        mixing, basis: see `sim.eyes.receptor_sums`
+        mixing: weight of each band in each channel, (channel, band)
+        basis: contribution of each component to each band, (component, band)
         """
         count, k = self.depth.count, len(basis)
         bands = len(self.weights) // count
@@ -179,7 +181,8 @@ class OmmatidialSensor(ReadOnlyArrays):
 
         Components must be bands.
 
-        mixing, basis: see `sim.eyes.receptor_sums`
+        mixing: weight of each band in each channel, (channel, band)
+        basis: contribution of each component to each band, (component, band), the identity matrix
         """
         signals, white = of_receptors(mixing @ basis.T), (mixing @ self.white.T).astype(np.float32)
         return lambda light: signals(light) / white

@@ -21,11 +21,12 @@ FINEST_DEG = 0.2302  # chosen: smallest angle between neighbours of a whole head
 def unit_directions(name: str, given: Any) -> np.ndarray:
     """Return viewing directions as unit vectors (n, 3).
 
+    name: name of the argument, for error messages
     given: unit vectors (ahead, left, up), (n, 3), or angles [degrees] (azimuth to the left, elevation upwards), (n, 2)
 
     Raises:
-        ValueError: the shape is wrong, there are no directions or more than MOST_OMMATIDIA, or a value is not finite.
-            Elevations must be within ±90 degrees, and the length of a vector must be 1 to within OFF_UNIT.
+        ValueError: the shape is wrong, there are no directions or more than 10⁶, or a value is not finite.
+            Elevations must be within ±90 degrees, and the length of a vector must be 1 to within 0.001.
     """
     if is_sized(given) and len(given) > MOST_OMMATIDIA:
         raise ValueError(f"{name}: {len(given)} ommatidia: must be at most {MOST_OMMATIDIA}")

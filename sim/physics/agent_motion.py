@@ -65,7 +65,7 @@ class AgentPhysics:
     """Batched physics of the agents in one world's model.
 
     world: the world, whose model all agents share
-    threads: number of threads for MuJoCo's batched step, see `sim.physics.mujoco_batch`
+    threads: number of threads for MuJoCo's batched step of 128 or more worlds
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
         obstacles are simulated in models of these obstacles alone (`local_contacts`). The attribute `free_motion` or
         `local_contacts` is None if the model does not support the method. If False, MuJoCo simulates all agents in the
@@ -92,7 +92,7 @@ class AgentPhysics:
         self.local_contacts = local_contacts_of(world, model, self.free_motion, threads)
 
     def step(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """Move all agents by one action: SUBSTEPS substeps.
+        """Move all agents by one action of 10 substeps.
 
         velocity: commanded velocity, which is constant during the action [m/s], (n, 2)
         """
@@ -116,7 +116,7 @@ class AgentPhysics:
         """Simulate agents that may touch something, each in a model of the geoms within its reach.
 
         An agent is simulated in the whole world instead if too many geoms are within reach, if a contact deflects it
-        towards other geoms, or if the simulation breaks down.
+        towards other geoms, if the simulation breaks down, or if `local_contacts` is None.
 
         in_reach: obstacles within reach of each agent, (n, obstacle) bool
         """
@@ -224,7 +224,7 @@ class _Columns:
 
 
 def _slow(velocity: np.ndarray) -> np.ndarray:
-    """Return a mask of the components of velocities [m/s] below UNSTABLE_SPEED; False for NaN."""
+    """Return a mask of the components of velocities [m/s] below 100 m/s (UNSTABLE_SPEED); False for NaN."""
     slow: np.ndarray = np.abs(velocity) < UNSTABLE_SPEED
     return slow
 
@@ -234,7 +234,7 @@ def _without_detours(model: mujoco.MjModel) -> mujoco.MjModel:
 
     These steps save time only if there are many contacts or, for the midphase, many geoms. Without them, simulating an
     agent at a wall takes a tenth to a fifth less time, and the results are bit-identical. The midphase remains enabled
-    in models with more than FEW_GEOMS geoms.
+    in models with more than 200 geoms.
     """
     lean = copy.copy(model)
     lean.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND

@@ -68,7 +68,9 @@ class FreeMotion:
         return (*(self.lower - self.reach).T.copy(), *(self.upper + self.reach).T.copy())
 
     def obstacles_in_reach(self, position: np.ndarray, path: np.ndarray) -> np.ndarray:
-        """Return the mask of the obstacles within reach of agents during their motion, (n, obstacle) bool.
+        """Return the mask of the obstacles that may be within reach of agents during their motion, (n, obstacle) bool.
+
+        Bounding boxes of the path and of the obstacles are compared.
 
         position: positions at the beginning (n, 2) [m]
         path: positions after each substep, relative to `position` (n, substep, 2) [m]

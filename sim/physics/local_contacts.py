@@ -31,7 +31,7 @@ class LocalContacts:
     whole: the world's complete model
     alone: the model of the world's agent without the world (`sim.worlds.agent_model`)
     free_motion: obstacles of the agent, and the distance at which it may touch them
-    threads: number of threads, see `sim.physics.mujoco_batch`
+    threads: number of threads for MuJoCo's batched step of 128 or more worlds
     """
 
     def __init__(self, whole: mujoco.MjModel, alone: mujoco.MjModel, free_motion: FreeMotion, threads: int) -> None:

@@ -22,7 +22,7 @@ class BatchedStep:
     """Open-loop steps of many worlds whose models differ only in values, not in the sizes of arrays.
 
     like: a model with the same sizes of arrays as all models that will be stepped
-    threads: number of threads for batches of at least POOLED worlds; smaller batches are stepped on the calling thread
+    threads: number of threads for batches of at least 128 worlds; smaller batches are stepped on the calling thread
     """
 
     def __init__(self, like: mujoco.MjModel, threads: int) -> None:

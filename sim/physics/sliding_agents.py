@@ -117,7 +117,7 @@ class SlidingAgents:
     def move_objects(self, objects: np.ndarray, courses: np.ndarray) -> None:
         """Set the positions of the objects after the next step [m], (n, k, 3), and their headings [rad], (n, k).
 
-        The first `step` needs a previous call. Later steps without another call leave the objects at these positions.
+        Call this method before the first `step`. Later steps without another call leave the objects at these positions.
         """
         self._moved = objects, courses
 

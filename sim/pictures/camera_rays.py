@@ -108,7 +108,7 @@ class CameraRays:
     def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
         """Return the light along rays of an image of size (height, width).
 
-        codes: whole numbers that specify the rays, see the module's docstring, (ray,)
+        codes: a whole number for each ray: 8 times the index of its pixel, plus the index of its sample, (ray,)
         """
         traced = self._inside if self.mirror.surrounds(view.position) else self._outside
         suns = {k: self.mirror.towards(name, view) for k, name in self._suns.items()}

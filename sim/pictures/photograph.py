@@ -139,7 +139,7 @@ def _checked(photograph: Any) -> np.ndarray:
 
 
 def _checked_depth(depth: Any, shape: tuple[int, ...], animal: str) -> np.ndarray:
-    """Return the distances [m] of all pixels, (y, x), from the argument `depth` of `see_photograph`.
+    """Return the distances [m] of all pixels, (y, x), from the argument `depth` of `see_photograph`; None: infinite.
 
     Raises:
         ValueError: the eye is a compound eye and `depth` is not None, or `depth` has another shape, or a distance is

@@ -138,7 +138,7 @@ def _displayed(linear: np.ndarray) -> np.ndarray:
 
 
 def _on_edges(picture: np.ndarray) -> np.ndarray:
-    """Return a mask (y, x) of the pixels that differ by more than EDGE from a horizontal or vertical neighbour."""
+    """Return a mask (y, x) of the pixels that differ by more than 8 from a horizontal or vertical neighbour."""
     across, along = _step(picture[:, 1:], picture[:, :-1]), _step(picture[1:], picture[:-1])
     found = np.zeros(picture.shape[:2], bool)
     found[:, 1:] |= across
@@ -149,6 +149,6 @@ def _on_edges(picture: np.ndarray) -> np.ndarray:
 
 
 def _step(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a mask (y, x) of the pixels in which two images (y, x, 3) uint8 differ by more than EDGE."""
+    """Return a mask (y, x) of the pixels in which two images (y, x, 3) uint8 differ by more than 8."""
     seen = np.maximum(a, b) - np.minimum(a, b) > EDGE
     return np.asarray(seen[..., 0] | seen[..., 1] | seen[..., 2])

@@ -52,7 +52,7 @@ class EdgeRays:
     def launch(self, launch: Launch) -> Callable[[], np.ndarray]:
         """Start rendering, and return a function that waits for the sums, flat (component, world, eye, receptor).
 
-        All sums are scaled to FIRST rays per receptor. The worlds must not change before the sums are read.
+        All sums are scaled to 4 rays per receptor. The worlds must not change before the sums are read.
 
         launch: function that starts a frozen kernel
         """

@@ -167,7 +167,7 @@ class EyeRenderer:
     def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
         """Start rendering only some of the worlds; the signals are (len(worlds), eye, channel, height, width).
 
-        `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to FEW worlds
+        `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to 8 worlds
         are rendered in separate buffers, so that a frame of all worlds may be pending at the same time. The errors are
         those of `signals`, and an IndexError, which `wait` may raise, for an unknown world.
         """
@@ -179,7 +179,7 @@ class EyeRenderer:
 
     @cached_property
     def _few(self) -> Self:
-        """Renderer of FEW worlds with the same eyes, for `launch_some`."""
+        """Renderer of 8 worlds with the same eyes, for `launch_some`."""
         return self.resized(FEW)
 
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
@@ -221,7 +221,7 @@ class EyeRenderer:
         return self.labels.flow(poses, later)
 
     def brightest_in(self, light: np.ndarray) -> float:
-        """Return `brightest` with all lights multiplied by these factors, (band,)."""
+        """Return the largest signal of a white surface if lights are multiplied by these factors, (band,)."""
         return float((self.eye.throughput * self.eye.spectral_bands.weights @ (self._white * light)).max())
 
     @property

@@ -95,7 +95,7 @@ class Stages(Protocol):
     shares: Shares | None
 
     def bands(self) -> Level:
-        """Return the eye's own bands, and their error."""
+        """Return the level for the eye's own bands, with their predicted error if it is known."""
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
         """Return the depth layers for which the eye has a PSF, and the chosen level (None if there was no choice)."""

@@ -31,7 +31,7 @@ def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = 
     """Return the smallest number of bands with an allowed error for surfaces of any colour, and its `Level`.
 
     If no number is accurate enough for the surfaces, return the eye's own number. If some numbers are, but none of
-    them is accurate enough for the medium, return FINEST.
+    them is accurate enough for the medium, return 64.
 
     allowed: allowed error of a signal
     medium: if it is given, the error for white and black in it must also be allowed
@@ -54,7 +54,7 @@ def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = 
 
 
 def own_bands(world: World, eye: optics.Eye) -> Level:
-    """Return the eye's own bands, with their error for measured reflectances and for black and white in the medium.
+    """Return the level for the eye's own bands, with the error for measured reflectances and for white in the medium.
 
     For RGB colours in clear air, the error is unknown.
     """
@@ -74,8 +74,9 @@ def own_bands(world: World, eye: optics.Eye) -> Level:
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
     """Return the smallest number of depth layers with an allowed error, and its `Level`.
 
-    It is a single PSF for infinity if the bound below is allowed. Otherwise, the errors of several numbers of layers
-    are computed in random views. If the PSF cannot be computed for them, the result is one PSF for the mean depth.
+    It is a single PSF for infinity for a perfect lens, or if the bound below is allowed. Otherwise, the errors of
+    several numbers of layers are computed in random views. If none is accurate enough, the result is the largest
+    number. If the PSF cannot be computed for them, it is one PSF for the mean depth.
 
     Consider light that passes the pupil at the position p. On the retina, light from a point at the distance z is
     displaced by (Δx, Δy) = f p/z relative to light from infinity, with the focal length f. The means of |Δx| and |Δy|
@@ -104,7 +105,7 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
 
 
 def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
-    """Return direct light if a second reflection adds little, otherwise light after one and two reflections.
+    """Return the level "direct" if a second reflection adds little, otherwise "bounce", with two reflections.
 
     In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
     further reflection to the one before is assumed to be the ratio of the second reflection to direct light. If the

@@ -199,7 +199,7 @@ class FidelityTrials:
         depth: layers among which light is divided
         light: level of light
         views: views of the signals; None: the views of the trials
-        most: largest number of rays in all views together, unless fewer than VIEWS[0] views would remain
+        most: largest number of rays in all views together, unless fewer than 12 views would remain
         """
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))

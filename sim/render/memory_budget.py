@@ -100,7 +100,10 @@ def _of_machine() -> float:
 
 
 def _of_container(root: Path) -> float:
-    """Return the free bytes below the limits of control groups; at least 1, because a group may exceed its limit."""
+    """Return the free bytes below the limits of control groups; infinite without limits.
+
+    The result is at least 1, because a group may exceed its limit.
+    """
     free = math.inf
     for limit, used, statistics, prefix in _GROUPS:
         try:

@@ -176,8 +176,8 @@ def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Le
 def _with(rays: float, eye: WorldEye, allowed: float, light: str) -> Fidelity:
     """Return the fidelity with this number of rays.
 
-    In direct light through a perfect lens it uses adaptive edge sampling if that saves rays, except for the
-    reference.
+    In direct light through a perfect lens it uses adaptive edge sampling if that saves rays, except for the fidelity
+    with which the others are compared.
     """
     at_edges = light == lighting.DIRECT and _is_perfect(eye) and rays < PERFECT_TRUTH
     at_edges = at_edges and edges_pay(eye.resolution, rays)

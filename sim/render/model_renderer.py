@@ -36,7 +36,8 @@ class ModelRenderer(EyeRenderer):
         own bands, 4 by default. light="bounce" adds light after a second reflection, and the light of the sky and of
         glowing geoms. samples="edges" traces all rays only where the first four differ; it needs a perfect lens and
         direct light. samples="areas" uses closed forms instead of rays, if the model has them
-    groups, spectra: see `sim.mirror`
+    groups: visible geom groups
+    spectra: reflectances of materials and emission of lights by name, instead of their colours, see `sim.mirror`
     varied: names of geoms whose size or colour may differ between worlds. The poses that are rendered then contain the
         size and colour of each geom in each world. A mapping such as {"floor": ("sand", "grass")} also lists materials
         that a geom may have; the colour of such a geom depends only on its material

@@ -28,9 +28,10 @@ def receptor_centres(eye: optics.Eye) -> np.ndarray:
 def flow_between(
     eye: optics.Eye, depth: np.ndarray, ids: np.ndarray, moments: tuple[Poses, Poses], frames: tuple[Frames, Frames]
 ) -> np.ndarray:
-    """Return the flow to the right and down [receptors], (world, eye, 2, height, width) float32.
+    """Return how far the point that each receptor sees moves in the image, (world, eye, 2, height, width) float32.
 
-    It is NaN without a hit, or if the point is not in front of the eye at the second moment.
+    The motion is to the right and down [receptors], from the first to the second moment. It is NaN if there is no such
+    point, or if the point is not in front of the eye at the second moment.
 
     depth, ids: depth and geom that each receptor's centre sees at the first moment, (world, eye, height, width)
     moments: poses at both moments

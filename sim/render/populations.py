@@ -63,7 +63,7 @@ def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int
 
 
 def _drawn(weights: np.ndarray) -> np.ndarray:
-    """Draw up to RECEPTORS receptors with probabilities proportional to their weights.
+    """Draw up to 24 receptors, with a fixed seed and with probabilities proportional to their weights.
 
     The result contains their indices in increasing order.
     """

@@ -40,9 +40,10 @@ class PreparedScene:
     model: the MuJoCo model
     eye: optics and retina, with its own bands
     mounts: places of the eyes on the model
-    spectra, groups: see `sim.mirror`
-    varied: see `sim.ModelRenderer`
-    tracer: method of tracing rays, see `sim.BatchedRenderer`
+    spectra: measured spectra of materials and lights, by name
+    groups: visible geom groups
+    varied: names of geoms whose size, colour or material may differ between worlds, see `sim.ModelRenderer`
+    tracer: "mitsuba", "closed_form" or "auto", see `sim.BatchedRenderer`
     stand: the body that carries the eyes, if all eyes stand upright on one body; None: derived from the mounts
     medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the facets of a compound
         eye keep the index in front of them. None: clear air
@@ -143,7 +144,10 @@ class PreparedScene:
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals."""
+        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals.
+
+        It is False for a perfect lens, whose receptors share no areas.
+        """
         return isinstance(sampling, FieldSampling) and sampling.may_share(per_receptor, in_rows=self._in_rows)
 
     @property

@@ -66,7 +66,7 @@ class RandomViews:
 def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
     """Return views in random directions from places near the start cells of agents and objects.
 
-    Objects are on cells in which objects may start.
+    Objects are on cells in which objects may start. The views are the same at every call, because the seed is fixed.
     """
     rng = np.random.default_rng(0)
     cells, objects = _cells(world), _objects(world, n, rng)
@@ -77,7 +77,10 @@ def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Return views of agents with an object at a distance in NEAR, within the field of view of one eye."""
+    """Return views of agents with an object at 0.8 to 8 m (NEAR), within the field of view of one eye.
+
+    Places and directions are random, with a fixed seed.
+    """
     rng = np.random.default_rng(1)
     objects, cells = _objects(world, n, rng), _cells(world)
     position, heading, eye = np.empty((n, 2)), np.empty(n), rng.integers(eyes.n_eyes, size=n)
@@ -132,7 +135,7 @@ def _stray(rng: np.random.Generator) -> np.ndarray:
 
 
 def _clear_of(objects: np.ndarray, draw: Callable[[], np.ndarray], clearance: float = CLEARANCE) -> np.ndarray:
-    """Return the first of TRIES random places (2,) that is clear of objects, or the last one if none is.
+    """Return the first of 100 random places (2,) that is clear of objects, or the last one if none is.
 
     objects: centres of the objects [m], (k, 2)
     draw: function that returns a random place [m], (2,)

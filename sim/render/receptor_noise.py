@@ -161,6 +161,7 @@ class NoiseModel:
     def __call__(self, signals: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Return noisy signals (n, ...) from standard normal numbers z of the same shape, which may be overwritten.
 
+        For each signal s, V is the variance of its noise, and N the number of photons for a signal of 1.
         Shot noise agrees with the Poisson distribution up to the third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish &
         Fisher 1938). The third moment matters below a hundred photons.
         """

@@ -25,7 +25,7 @@ class ReceptorsInTime:
     state: attribute, the state of all filters, (world, filter, *shape) float32
 
     Raises:
-        ValueError: the latency is longer than MOST_DELAYED frames.
+        ValueError: the latency is longer than 1000 frames.
     """
 
     def __init__(self, dynamics: ReceptorDynamics, n: int, shape: tuple[int, ...], seconds: float) -> None:

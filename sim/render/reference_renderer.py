@@ -154,7 +154,7 @@ def _pixels_per_cell(receptor: tuple[float, float]) -> tuple[int, int]:
     """Return the rows and columns of square pixels in a cell, which has the shape of a receptor.
 
     Raises:
-        ValueError: the ratio of the sides is not a ratio of whole numbers up to `MOST_PIXELS`.
+        ValueError: the ratio of the sides is not a ratio of whole numbers up to 16.
     """
     height, width = receptor
     ratio = Fraction(height / width).limit_denominator(MOST_PIXELS)

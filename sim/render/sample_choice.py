@@ -85,6 +85,8 @@ def _areas(
 ) -> Samples | None:
     """Return the fewest areas whose error is allowed, or None if area sampling is not possible in the world.
 
+    If no number is accurate enough, return the fewest areas whose error is close to the smallest error.
+
     shared: numbers of areas per receptor below one, in decreasing order, which are tried if one area is enough
     """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):

@@ -57,10 +57,10 @@ def measured(model: mujoco.MjModel, spectra: Spectra) -> list[Spectrum]:
 
 
 def band_error(reflectances: Iterable[Spectrum], receptors: Any, bands: int) -> float:
-    """Return the error of these reflectances in daylight with this number of bands, compared with 64 bands.
+    """Return the error of signals of these reflectances in daylight with this number of bands, compared with 64 bands.
 
-    It is the largest difference over reflectances and receptor types, relative to white; 0 without reflectances. It
-    does not include blur that differs from band to band.
+    It is the largest difference over reflectances and receptor types, as a fraction of the signal of white. It is 0
+    without reflectances, and does not include blur that differs from band to band.
 
     Raises:
         ValueError: `optics.receptors_of` does not accept the receptors, or `bands` is not a whole number from 1 to 64.

@@ -18,8 +18,8 @@ PlacedPart = tuple[str, Part, np.ndarray, MitsubaObject]  # name, part, pose (4,
 def merged(parts: Iterable[PlacedPart], prefix: str) -> Description:
     """Return Mitsuba shapes (of the active variant) by name.
 
-    Triangles of one material are merged into a shape with the name "<prefix>_<n>". Shapes that are not meshes keep
-    their names.
+    Triangles of one material are merged into a shape with the name "<prefix>_<n>". Meshes with and without normals or
+    texture coordinates are merged separately. Shapes that are not meshes keep their names.
     """
     description: Description = {}
     meshes: dict[tuple[int, bool, bool], tuple[MitsubaObject, list[Triangles]]] = {}

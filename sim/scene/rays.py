@@ -154,7 +154,7 @@ class Camera:
     def _sum_of_samples(
         self, method: MitsubaObject, spectrum: list[float], sampler: MitsubaObject, seed: int
     ) -> np.ndarray:
-        """Return the sum of the sampler's samples per pixel, (LANES, pixels)."""
+        """Return the sum of the sampler's samples per pixel, (4 lanes, pixels)."""
         width, height = self.size
         n = sampler.sample_count()
         if _is_scalar():

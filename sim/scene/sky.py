@@ -46,9 +46,9 @@ def description(model: mujoco.MjModel, white: float) -> Description | None:
 
 
 def _panorama(image: np.ndarray) -> np.ndarray:
-    """Return the latitude-longitude image (h, 2h, 3) of a padded cube image.
+    """Return the latitude-longitude image (rows, 2 rows, 3) of a padded cube image.
 
-    Columns start at u = 0, at -z of Mitsuba's frame, and continue over +x, with centres at half texels. Rows run from
+    Columns start at -z of Mitsuba's frame, and continue over +x, with centres at half texels. Rows run from
     +y to -y, with the first and last row on the poles.
     """
     pitch = image.shape[1]

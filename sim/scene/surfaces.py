@@ -33,7 +33,7 @@ def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
 def set_rgba(color: Sequence[float]) -> np.ndarray:
     """Return a colour (4,) for a geom.
 
-    The grey UNSET_RGBA, which MuJoCo interprets as unset, is replaced by the nearest grey.
+    The grey (0.5, 0.5, 0.5, 1), which MuJoCo interprets as unset, is replaced by the nearest grey.
     """
     found = np.array(color, np.float32)
     if np.array_equal(found, UNSET_RGBA):

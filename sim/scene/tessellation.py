@@ -127,7 +127,9 @@ def strip(half_sides: np.ndarray) -> Triangles:
 
 
 def ellipsoid(semi_axes: np.ndarray) -> Triangles:
-    """Return an ellipsoid: u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere before scaling.
+    """Return an ellipsoid.
+
+    Its texture coordinates are u = azimuth / 2π and v = polar angle / π from +z, of the unit sphere before scaling.
 
     semi_axes: lengths of the semi-axes along x, y, z [m], (3,)
     """
@@ -135,7 +137,9 @@ def ellipsoid(semi_axes: np.ndarray) -> Triangles:
 
 
 def cylinder(radius: float, half_length: float) -> Triangles:
-    """Return a cylinder. Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2).
+    """Return a cylinder.
+
+    Texture coordinates are u = azimuth / 2π and v = (1 - z/h)/2 on the side, ((x/r + 1)/2, (y/r + 1)/2) on the ends.
 
     radius, half_length: radius r [m], and half of the length along z, h [m]
     """
@@ -237,7 +241,7 @@ def _arc(start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
 def _revolved(radius: np.ndarray, height: np.ndarray, scale: np.ndarray, v: np.ndarray) -> Triangles:
     """Return the surface of revolution of the profile (radius, height), from top to bottom, scaled afterwards.
 
-    The vertices of the seam are doubled, since u is 0 on one side of it and 1 on the other.
+    The vertices of the seam are doubled, since the texture coordinate u is 0 on one side of it and 1 on the other.
 
     radius, height: profile of the unit shape, (n,)
     scale: factors along x, y, z [m], (3,)

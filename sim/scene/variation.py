@@ -102,7 +102,7 @@ class Variation:
     def of_things(self, what: str) -> dict[str, str]:
         """Return the names of the ranges of one quantity, by the names of the objects.
 
-        what: the quantity, one of OF_THINGS
+        what: "size", "color", "material" or "start"
         """
         return {name.rpartition(".")[0]: name for name in self.ranges if kind_of(name) == what}
 
@@ -158,7 +158,7 @@ _FORM = {
 
 
 def kind_of(name: str) -> str:
-    """Return the quantity of a range: LIGHT, TEMPERATURE, or one of OF_THINGS.
+    """Return the quantity of a range: "light", "color_temperature", "size", "color", "material" or "start".
 
     Raises:
         ValueError: the quantity is unknown.
@@ -183,8 +183,8 @@ def _check_names(name: str, given: Any) -> None:
 def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
     """Return the transmission (band,) of a filter that changes the colour temperature of daylight to `kelvins` [K].
 
-    It is the Planck spectrum at `kelvins`, divided by the Planck spectrum at the temperature `DAYLIGHT`. The ratio is
-    scaled to preserve the illuminance.
+    It is the Planck spectrum at `kelvins`, divided by the Planck spectrum at 6504 K, the temperature of D65. The ratio
+    is scaled to preserve the illuminance.
 
     wavelengths: centres of the bands [m], (band,)
     """
@@ -195,7 +195,7 @@ def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
-    """Return the ratio of the Planck spectra at the temperatures `kelvins` and DAYLIGHT [K], at wavelengths [m]."""
+    """Return the ratio of the Planck spectra at the temperatures `kelvins` and 6504 K (D65), at wavelengths [m]."""
     x = h * c / (k * np.asarray(wavelengths))
     found: np.ndarray = np.expm1(x / DAYLIGHT) / np.expm1(x / kelvins)
     return found

@@ -90,7 +90,7 @@ def named_in_errors(animal: str) -> Iterator[None]:
 
 
 def auxiliary_of(names: Iterable[str], where: str) -> tuple[str, ...]:
-    """Return the requested names of auxiliary entries, in the order of AUXILIARY.
+    """Return the requested names of auxiliary entries, in the order "depth", "ids", "flow".
 
     where: beginning of the error message
 

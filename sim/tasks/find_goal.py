@@ -22,9 +22,9 @@ class FindGoal(AgentTask):
     """Task in which the agent reaches the goal and avoids the adversaries.
 
     Progress is the decrease of the distance to the nearest goal. The agent reaches an object if the distance between
-    their centres is below `REACH` (`sim.worlds.layout`) at the end of any substep. In training, the first object that
-    is reached ends the episode, and only this object counts. In evaluation, a reached object respawns and the episode
-    continues. In tracking, the objects move.
+    their centres is below 1 m at the end of any substep. In training, the first object that is reached ends the
+    episode, and only this object counts. In evaluation, a reached object respawns and the episode continues. In
+    tracking, the objects move.
     """
 
     @cached_property

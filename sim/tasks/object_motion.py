@@ -20,8 +20,8 @@ TURN = 0.4  # [rad] standard deviation of the change of heading per action
 def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the positions (n, k, 3) [m] and headings (n, k) [rad] of the objects one action later.
 
-    Every object moves at SPEED, and its heading drifts randomly. A step must not lead out of `bounds` (x_min, y_min,
-    x_max, y_max), nor to a point closer than SEPARATION to the present or next position of another object. If a step
+    Every object moves at 0.5 m/s, and its heading drifts randomly. A step must not lead out of `bounds` (x_min, y_min,
+    x_max, y_max), nor to a point closer than 2 m to the present or next position of another object. If a step
     would break these rules, the object stays at its position and turns to a random heading.
 
     chance: random numbers for drift and turns

@@ -22,8 +22,8 @@ class SpawnPoints:
         """Return an agent's position (2,) and the objects' positions (n_objects, 2) [m].
 
         Raises:
-            ValueError: TRIES attempts found no positions that keep the distances SEPARATION (between objects) and
-                CLEARANCE (from the agent).
+            ValueError: 100 attempts found no positions that keep the distances of 2 m between objects and
+                1.5 m from the agent.
         """
         for _ in range(TRIES):
             agent, chosen = rng.integers(len(self._agents)), []

@@ -133,7 +133,7 @@ class MotionNoise:
     def get_state(self) -> dict[str, np.ndarray]:
         """Return the states of the generators, and the remaining numbers that were drawn in advance.
 
-        The array of numbers has the shape (world, action, 2, moving object), with AHEAD actions. The remaining numbers
+        The array of numbers has the shape (world, action, 2, moving object), with 64 actions. The remaining numbers
         are at the end of the axis of actions. All entries before them are NaN.
         """
         left, _, n, movers = self._drawn.shape

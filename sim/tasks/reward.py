@@ -50,7 +50,7 @@ class RewardWeights:
 
     @cached_property
     def column(self) -> np.ndarray:
-        """Weights in the order of TERMS, (term, 1)."""
+        """Weights of progress, goal, adversary and contact, in this order, (term, 1)."""
         return np.array([[getattr(self, name)] for name in TERMS])
 
 
@@ -60,7 +60,7 @@ MODES = {"training": TRAINING, "evaluation": EVALUATION, "test": EVALUATION}
 
 
 def check_mode(mode: str) -> None:
-    """Check that a mode is one of MODES.
+    """Check that a mode is "training", "evaluation" or "test".
 
     Raises:
         ValueError: the mode is unknown.
@@ -71,7 +71,7 @@ def check_mode(mode: str) -> None:
 def reward_terms(
     weights: RewardWeights, progress: np.ndarray, goal: np.ndarray, adversary: np.ndarray, contact: np.ndarray
 ) -> np.ndarray:
-    """Return the terms of the reward in the order of TERMS, (term, n), from the progress [m] and the events.
+    """Return the terms of the reward, (term, n), from the progress [m] and the events, in the order of the arguments.
 
     progress, goal, adversary, contact: amounts by which the weights are multiplied, (n,)
     """

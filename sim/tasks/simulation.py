@@ -193,7 +193,7 @@ class Simulation:
         return {"varied": varied} if varied else {}
 
     def light(self, wavelengths: np.ndarray) -> np.ndarray | None:
-        """Return the current factors by which lights are multiplied, (n, band); None if no quantities vary."""
+        """Return the current factors by which lights are multiplied, (n, band); None if the light does not vary."""
         return None if self.variation is None else self.variation.light(self.varied, wavelengths)
 
     def get_state(self) -> dict[str, np.ndarray]:

@@ -82,7 +82,7 @@ class ClosedForm:
 
     scene, wavelengths: the scene, and the centres of the eye's bands [m]
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: level of light, one of `lighting.LEVELS`
+    light: level of light: "direct", "bounce" or "all"
     basis: (component, band): contribution of each component to each band
     world, walls, footprints, lights, components: the parts of the scene
     medium: water or air between surfaces and eyes; None: clear air
@@ -200,7 +200,10 @@ class ClosedForm:
     def _irradiance(
         self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos θ over unobstructed lights."""
+        """Return the irradiance per component: the sum of level · cos(angle of incidence) over unobstructed lights.
+
+        radii: radii of the bodies that cast shadows [m]; None: those of the scene
+        """
         levels = self.components.levels
         start = lighting.clear_of(hit.point, hit.normal, CLEARANCE)
         radii = list(map(float, self._bodies.radii)) if radii is None else radii
@@ -251,7 +254,10 @@ class ClosedForm:
 
 
 def _check_tops(scene: UprightScene) -> None:
-    """Refuse scenes in which a ray from a wall or body could hit the top of a wall, which the closed form lacks."""
+    """Refuse scenes whose reflected light has no closed form.
+
+    A ray from a wall or body could hit a wall's top, a body may change its height, or the eyes' body has a texture.
+    """
     for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
         if not settled:
             raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")
@@ -266,7 +272,7 @@ def _check_tops(scene: UprightScene) -> None:
 
 
 def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
-    """Return a row of ROW numbers for each face, from which the texel at a point is computed.
+    """Return a row of 12 numbers for each face, from which the texel at a point is computed.
 
     A row contains two affine functions, from which the texel's column and row at a point (x, y, z, 1) follow. The
     texture's place in the atlas and a 0 come after them.

@@ -37,7 +37,7 @@ class DirectionalLight:
 
 
 def spectra(wavelengths: np.ndarray) -> list[Array]:
-    """Return the bands' wavelengths [m] as a list of Mitsuba spectra [nm], each with LANES wavelengths.
+    """Return the bands' wavelengths [m] as a list of Mitsuba spectra [nm], each with 4 wavelengths.
 
     Copies of the last wavelength fill the rest of the last spectrum.
     """

@@ -100,7 +100,7 @@ class Lights:
         return len(self.found)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return positions and directions of lights, (world, light, 4 ROWS) float32; rows of headlights are unused."""
+        """Return positions and directions of lights, (world, light, 8) float32; those of headlights are unused."""
         rows = np.zeros((poses.n, len(self), ROWS, 4), np.float32)
         for k, light in enumerate(self.found):
             if light.light >= 0:
@@ -114,6 +114,7 @@ class Lights:
 
         The level times this factor is the irradiance of a surface at the point that faces the light.
 
+        k, there: index of the light, and the lights' rows in the lane's world
         axis: axis of the observing eye
         """
         light = self.found[k]

@@ -43,7 +43,7 @@ class ModelScene:
 
     model: the MuJoCo model
     eye: determines the spectral bands
-    groups, spectra: see `sim.mirror`
+    groups: visible geom groups
     medium: water or air; the attribute is the medium in the eye's bands; None: clear air
     variant: Mitsuba's variant
     geoms: ids of all visible geoms

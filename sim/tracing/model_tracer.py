@@ -41,7 +41,7 @@ class Scenes:
 class Tables:
     """Arrays that are the same in all worlds.
 
-    bsdfs, ends, painted: BSDFs of all movers; `ends` of `Movers`; `painted` of `Paint`
+    bsdfs, ends, painted: of all movers, the BSDFs, the index of the first one of each kind, and the indices in `Paint`
     sky, glows: the sky's emitter, and the BSDFs of glowing geoms; None if there are none
     glowing: for each mover, its index in `glows`
     """
@@ -103,7 +103,7 @@ class _SurfaceHit:
     """First hits of rays.
 
     si: interaction for the BSDF
-    colors, glow: factors of reflectance and emission, one spectrum for every LANES bands
+    colors, glow: factors of reflectance and emission, one spectrum for every 4 bands
     which: index of the mover, or the number of movers if the ray hits none of them
     seen, active: True for rays that hit a surface, and for rays that are traced
     point, normal, t, direction: hit point, normal towards the ray's origin, distance [m], and direction of the ray
@@ -241,7 +241,7 @@ class ModelTracer:
         return dr.select(hit.which < movers, hit.which, movers + dr.select(si.is_valid(), shape, 0))
 
     def _irradiance(self, hit: _SurfaceHit, axis: Array, there: Surroundings) -> list[Array]:
-        """Return the irradiance of surfaces due to lamps, as spectra of LANES bands each."""
+        """Return the irradiance of surfaces due to lamps, as spectra of 4 bands each."""
         start = lighting.clear_of(hit.point, hit.normal)
         total = [mi.Spectrum(0) for _ in self._bands]
         for k, light in enumerate(self._scene.lights.found):
@@ -270,7 +270,7 @@ class ModelTracer:
         return found
 
     def _emitted(self, hit: _SurfaceHit, there: Surroundings) -> list[Array]:
-        """Return the radiance of the sky for rays without a hit, and of glowing geoms, as spectra of LANES bands."""
+        """Return the radiance of the sky for rays without a hit, and of glowing geoms, as spectra of 4 bands."""
         found = [mi.Spectrum(0) for _ in self._bands]
         if self._scene.has_sky:
             nothing = hit.active & ~hit.seen

@@ -52,7 +52,7 @@ class _Frame:
     """A mover's frame.
 
     axes, origin: axes (three Vector3f) and origin (Vector3f) of the frame in the world
-    size, reach: half sizes of the mover, and largest distance of its surface from the origin
+    size, reach: half sizes (of a mesh: centre of its cell in the atlas), and largest distance of surface and origin
     """
 
     axes: tuple[Array, Array, Array]
@@ -71,7 +71,7 @@ class _Frame:
 
 @dataclass(frozen=True)
 class MoverRows(WorldRows):
-    """Rows of one world: a sphere around all movers, then ROWS rows for each mover (`ends`: see `Movers`)."""
+    """Rows of one world: a sphere around all movers, then 4 rows for each (`ends`: first mover of each kind)."""
 
     ends: Array
 
@@ -294,7 +294,7 @@ def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
 
 
 def _loop(kind: int, there: MoverRows, step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:
-    """Run a step for each mover of a kind."""
+    """Run a step for each mover of a kind; return the index after the last mover, and the last state."""
     start, end = (dr.gather(mi.UInt32, there.ends, kind + i) for i in (0, 1))
     found: tuple[Array, ...] = dr.while_loop((start, *state), lambda k, *_: k < end, step, label="movers")
     return found

@@ -39,7 +39,7 @@ class Primitive:
 
 
 def _into_ball(o: Array, d: Array) -> Array:
-    """Return the distance at which a ray enters the unit ball; infinite for a miss."""
+    """Return the distance at which a ray from o along d enters the unit ball; infinite for a miss."""
     square = dr.squared_norm(d)
     nearest = -dr.dot(o, d) / square
     p = dr.fma(d, nearest, o)
@@ -57,7 +57,7 @@ def _ellipsoid_normal(p: Array, size: Array) -> Array:
 
 
 def _into_side(o: Array, d: Array, radius: Array) -> Array:
-    """Return the distance at which a ray enters the infinite cylinder around z; infinite for a miss or along z."""
+    """Return the distance at which a ray from o along d enters an endless cylinder around z; infinite without entry."""
     square = dr.maximum(d.x * d.x + d.y * d.y, TINY)
     nearest = -(o.x * d.x + o.y * d.y) / square
     x, y = dr.fma(d.x, nearest, o.x), dr.fma(d.y, nearest, o.y)
@@ -118,7 +118,7 @@ def _box_normal(p: Array, size: Array) -> Array:
 
 
 def _plane_hit(o: Array, d: Array, size: Array) -> Array:
-    """Return the distance to a plane, whose two sides are both visible; infinite for a miss."""
+    """Return the distance from o along d to a plane, both sides of which are visible; infinite for a miss."""
     t = -o.z / dr.select(dr.abs(d.z) < PARALLEL, PARALLEL, d.z)
     x, y = dr.fma(d.x, t, o.x), dr.fma(d.y, t, o.y)
     on_plane = (t > 0) & (dr.abs(d.z) >= PARALLEL) & (dr.abs(x) <= size.x) & (dr.abs(y) <= size.y)

@@ -25,8 +25,8 @@ class Atlas:
 
     texels: reflectance, (texel, band), of all textures in sequence, row by row
     places: for each texture, the index of its first texel, and its numbers of columns and rows, (texture, 3)
-    to_texels: for each texture, the map (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres are at
-        whole numbers
+    to_texels: for each texture, the map from texture coordinates to texels, (column, row) = to_texels @ (u, v, 1),
+        (texture, 2, 3); texel centres are at whole numbers
     """
 
     texels: np.ndarray

@@ -143,6 +143,6 @@ def _to_local(spheres: Spheres, k: int) -> Array:
 
 
 def _quadratic(ray: Array, centre: Array, radius: float) -> tuple[Array, Array]:
-    """Return half the linear and the constant coefficient of |o + t d - centre|² = radius² as an equation for t."""
+    """Return half the linear and the constant coefficient of |ray(t) - centre|² = radius² as an equation for t."""
     from_centre = ray.o - centre
     return dr.dot(from_centre, ray.d), dr.squared_norm(from_centre) - radius * radius

@@ -36,9 +36,9 @@ class Buffers(Protocol):
 class Tracer(Protocol):
     """A method of tracing rays.
 
-    name: one of TRACERS
+    name: "closed_form" or "mitsuba"
     why: reason for its choice
-    light: level of light, one of `lighting.LEVELS`
+    light: level of light: "direct", "bounce" or "all"
     basis: (component, band): radiance_b = sum_k basis[k, b] component_k
     """
 
@@ -72,7 +72,7 @@ class Tracers:
     """The tracers of a scene, one for each level of light (`lighting.LEVELS`).
 
     scene, places: the scene, and the positions of the eyes in it
-    name: one of TRACERS; "auto": the closed form if the scene has one, otherwise Mitsuba
+    name: "closed_form", "mitsuba", or "auto": the closed form if the scene has one, otherwise Mitsuba
     stand: the body that the eyes are fixed to; None: derived from their mounts
 
     Raises:

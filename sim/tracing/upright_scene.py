@@ -150,7 +150,10 @@ def _refuse_what_eyes_would_see(
 ) -> None:
     """Refuse eyes that would see their own body.
 
-    The body must be a sphere, and its eyes must lie on its surface and look straight away from its centre.
+    A body without visible geoms passes. Otherwise, it must be one sphere on the body's vertical axis. The eyes must lie
+    on or outside its surface, and look straight away from its centre.
+
+    own: ids of the body's visible geoms
 
     Raises:
         NoClosedForm: these conditions are not met.

@@ -24,8 +24,8 @@ NEVER_ZERO = 1e-9  # replaces smaller components of directions; this shifts no h
 class CellTables:
     """Tables of a grid's cells, row by row.
 
-    wall: index of the wall that fills the cell
-    top: height of this wall's top [m]
+    wall: index of the wall that fills the cell; 0 for an empty cell
+    top: height of this wall's top [m]; -inf for an empty cell
     stop: height [m] below which a ray stops in the cell
     """
 
@@ -244,7 +244,7 @@ def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
     The result is the side of a cell [m], the lower corner (2,), and the numbers of rows and columns.
 
     Raises:
-        NoClosedForm: there is no such grid, or it has more than CELLS cells.
+        NoClosedForm: there is no such grid, or it has more than 10⁶ cells.
     """
     faces = [np.unique(np.round(np.concatenate([walls.lower[:, a], walls.upper[:, a]]), 6)) for a in range(2)]
     origin = np.array([f[0] for f in faces])
@@ -259,7 +259,7 @@ def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
 
 
 def _common(a: float, b: float) -> float:
-    """Return the greatest common divisor of two lengths, with tolerance ALIGNED."""
+    """Return the greatest common divisor of two lengths, with a tolerance of 10⁻⁶ m."""
     while b > ALIGNED:
         a, b = b, a % b
         if a - b < ALIGNED:

@@ -33,8 +33,8 @@ class Walls:
     top: height of each wall's top [m], (n,)
     floor: height of the floor [m]
     floor_lower, floor_upper: corners of the floor [m], (2,)
-    uv: texture coordinates of faces, (SIDES n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
-    geoms: geom id of each face, (SIDES n + 1,)
+    uv: texture coordinates of faces, (4 n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
+    geoms: geom id of each face, (4 n + 1,)
     """
 
     lower: np.ndarray

@@ -18,8 +18,8 @@ ROOM = 4  # number of walls that may be near an agent: two that form a corner, a
 class AgentModel:
     """Model of an agent without the walls and objects of its world.
 
-    model: the agent without objects, walls, lights, cameras or textures, and ROOM boxes that do not collide; they are
-        placeholders for walls
+    model: the agent without objects, walls, lights, cameras or textures, and 4 boxes (ROOM) that do not collide; they
+        are placeholders for walls
     whole: hash of the complete model of the world, from which the agent was extracted
     """
 

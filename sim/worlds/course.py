@@ -40,7 +40,7 @@ class Course:
     Raises:
         ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
             "S"; a start lies in the goal or has no suitable path to it; or an argument has a wrong type or range. On a
-            suitable path, the distance from the start never decreases by more than MOST_FALL, 1.5 m.
+            suitable path, the distance from the start never decreases by more than 1.5 m.
     """
 
     drawing: str

@@ -74,6 +74,7 @@ def add_textured(
 ) -> None:
     """Add a matte material with a 2-D texture that is multiplied by a display-referred colour.
 
+    name, texture: name of the new material, and of a texture of `spec`
     repeat: number of repeats of the texture along each axis, over the whole geom or, if `uniform` is True, over 2 m
     """
     material = spec.add_material(

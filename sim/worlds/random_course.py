@@ -32,7 +32,7 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3
     width: width of a path along x or y [cells]: 1 or 3
 
     Raises:
-        ValueError: MOST_TRIES attempts give no course of this shape.
+        ValueError: 1000 attempts give no course of this shape.
     """
     for _ in range(MOST_TRIES):
         row = int(rng.integers(2, shape[0] - 2))
@@ -47,7 +47,7 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3
 def _center_line(row: int, shape: tuple[int, int], rng: np.random.Generator) -> list[Cell]:
     """Return the cells of a centre line from the west end of a row to the column before the east border.
 
-    From every cell of the line on, the distance from this cell never decreases by more than MOST_FALL along the line.
+    From every cell of the line on, the distance from this cell never decreases by more than 1.5 m along the line.
     """
     line, last = [(row, 1), (row, 2), (row, 3)], _EAST
     while line[-1][1] < shape[1] - 2:
@@ -68,7 +68,7 @@ def _straight(cell: Cell, step: Cell, length: int, shape: tuple[int, int]) -> li
 
 
 def _hardly_falls(line: list[Cell]) -> bool:
-    """Return whether, from each cell on, the distance from it never decreases by more than MOST_FALL along the line."""
+    """Return whether, from each cell on, the distance from it never decreases by more than 1.5 m along the line."""
     cells = np.array(line, float) * CELL
     apart = np.linalg.norm(cells[:, None] - cells[None], axis=-1)
     later = np.triu(apart)  # row: start, column: cell on the way

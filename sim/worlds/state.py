@@ -47,12 +47,12 @@ class WorldState(ReadOnlyArrays):
 
     @property
     def all_finite(self) -> bool:
-        """True if every number in every world is finite."""
+        """True if all positions, headings and velocities, of agents and objects in all worlds, are finite."""
         return all(map(all_finite, (self.heading, self.position, self.velocity, self.objects, self.object_heading)))
 
     @property
     def finite(self) -> np.ndarray:
-        """True for worlds in which all numbers are finite, (n,) bool."""
+        """True for worlds in which all positions, headings and velocities are finite, (n,) bool."""
         total = self.heading + self.position.sum(axis=1) + self.velocity.sum(axis=1)
         total += self.objects.sum(axis=(1, 2)) + self.object_heading.sum(axis=1)
         finite: np.ndarray = np.isfinite(total)
@@ -87,7 +87,7 @@ def wrap_angle(angle: np.ndarray) -> np.ndarray:
 
 
 def pose(data: mujoco.MjData, world: World, state: WorldState, index: int = 0) -> None:
-    """Set MuJoCo's data to the state of one world.
+    """Set the agent's position and heading and the objects' positions in MuJoCo's data to those of one world.
 
     index: index of this world in `state`
     """

@@ -254,7 +254,10 @@ def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> Non
 
 
 def _add_velocity_servo(spec: mujoco.MjSpec, joint: str) -> None:
-    """Add a servo with first-order lag, dv/dt = (SPEED_GAIN ctrl - v) / TIME_CONSTANT, for a body of 1 kg."""
+    """Add a servo that moves a body of 1 kg with a first-order lag.
+
+    Its speed v follows the command: dv/dt = (0.99 command - v) / 0.35 s.
+    """
     spec.add_actuator(
         name=joint,
         target=joint,

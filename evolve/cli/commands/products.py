@@ -59,7 +59,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
     replay: True to also write a page that plays the episode
 
     Raises:
-        RunError: the policy of the best animal is missing or damaged.
+        RunError: no candidate has succeeded, or the policy of the best one is missing or damaged.
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
         RuntimeError: a method of the user task fails at the start of the episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -85,7 +85,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
 
 def replay(arguments: Namespace) -> int:
-    """Play an episode of an agent, print a table of the result, and write a page that shows the episode."""
+    """Play an episode of an agent, print the result, and write a page that shows the episode."""
     run = _open(arguments)
     with _waiting(arguments, "an episode is played and written"):
         from evolve.report.replay import BESIDE, episode_facts, episode_table, write_replay
@@ -116,7 +116,7 @@ def report(arguments: Namespace) -> int:
 
 
 def export(arguments: Namespace) -> int:
-    """Write the radiance in front of an agent's eyes and the eyes' signals as EXR files, and print their number."""
+    """Write the radiance in front of an agent's eyes and the eyes' signals as EXR files, and print where they are."""
     run = _open(arguments)
     with _waiting(arguments, "EXR files are written") as wait:
         from evolve.report.exr_export import export_run

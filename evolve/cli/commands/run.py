@@ -53,7 +53,7 @@ def start(arguments: Namespace) -> int:
 
 
 def resume(arguments: Namespace) -> int:
-    """Continue an interrupted run to its end."""
+    """Continue an interrupted run to its end; for a finished run, write missing files of its results."""
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
@@ -125,7 +125,7 @@ class _Shown:
 
 
 def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
-    """Continue a locked run to its end.
+    """Continue a run, whose lock this process holds, to its end.
 
     After Ctrl-C, print how to continue. No file needs to be written then, because the record is always complete.
     """
@@ -195,7 +195,10 @@ def _scheduler(arguments: Namespace) -> Scheduler | None:
 
 
 def _finish(run: Run, arguments: Namespace) -> int:
-    """Write the report and the EXR files, and print their paths. Return 1 if every candidate failed, else 0."""
+    """Write the report and the EXR files, print their paths and return 0.
+
+    If every candidate failed, only print the last failure, and return 1.
+    """
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
         print(f"evolve: every candidate failed; the last failure: {failures[-1].failure}", file=sys.stderr)

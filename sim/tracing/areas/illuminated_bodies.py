@@ -57,7 +57,7 @@ class IlluminatedBodies:
 
         place: row of a world's table
         bodies: centres of the world's bodies
-        walls_around: see `WallShadows`
+        walls_around: for each cell of the grid, which of its neighbours are walls (`WallShadows.around`)
         reflected: function that returns harmonics for a body's index, the index of a group of four, and the body's
             centre
         """

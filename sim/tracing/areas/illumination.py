@@ -33,9 +33,9 @@ class AreaTables:
     """Arrays of area sampling that are the same in all worlds.
 
     faces: walls' faces, eight numbers each, see `area_tracer`
-    face_ends: see `Columns`
-    cells: see `Footprints`
-    around: see `WallShadows`
+    face_ends: ends of all faces in the ground plan
+    cells: the grid in which walls stand; None: no grid, because walls are few
+    around: for each cell of the grid, which of its neighbours are walls; None without walls
     stripes: textures
     reflected: light that walls and floor reflect to each other; None: reflected light is neglected
     """
@@ -86,7 +86,7 @@ class Illumination:
         self.bodies = IlluminatedBodies(self._shadows, self._directions, self._radii)
 
     def irradiance(self, patch: Patch, now: FrameState) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos θ · visibility over the lights."""
+        """Return the irradiance per component: the sum of level · cos(angle of incidence) · visibility over lights."""
         return self.arriving(patch.normal, self.visibility(patch, now))
 
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
@@ -102,7 +102,7 @@ class Illumination:
         return self._for_bodies(past, self._shadows.visibility(patch, self._directions, now.inputs.around))
 
     def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos θ · fraction over the lights.
+        """Return the irradiance per component: the sum of level · cos(angle of incidence) · fraction over the lights.
 
         lit: fraction of each light that arrives
         """
@@ -208,7 +208,7 @@ class Illumination:
 
 
 def _mean_colour(rays: ClosedForm, place: np.ndarray) -> np.ndarray:
-    """Return the mean reflectance of a texture, (component,), in the components of reflected light.
+    """Return the mean reflectance of a texture with one row, (component,), in the components of reflected light.
 
     place: place of the texture in the atlas, see `Atlas.places`
     """

@@ -65,7 +65,7 @@ class Baking:
         """Return all tables by name, one for each component, float32, flat.
 
         With light of any number of reflections (`lighting.ALL`), each iteration adds one reflection. The iterations end
-        when the tables stop changing, at the latest after ORDERS reflections.
+        when the tables stop changing, at the latest after 16 reflections.
         """
         found = self._surfaces()
         for _ in range(self._orders - 1):
@@ -128,7 +128,9 @@ class Baking:
         return light.reshape(-1, light.shape[-1])
 
     def _on_body(self, radius: float, height: float) -> np.ndarray:
-        """Return harmonics (place, FOURS * 4, component) of the light on a body's surface, ordered by cell, y and x.
+        """Return spherical harmonics of the light on a body's surface, (place, 16, component).
+
+        The places of the body are in order of cell, y and x.
 
         radius, height: radius of the body, and height of its centre [m]
         """
@@ -174,7 +176,7 @@ class Baking:
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
-    """Return the positions of evenly spaced nodes along a length [m], at least MARGIN away from its ends, (nodes,)."""
+    """Return the positions of evenly spaced nodes along a length [m], at least 0.02 m away from its ends, (nodes,)."""
     return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
 
 

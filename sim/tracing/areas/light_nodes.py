@@ -66,7 +66,7 @@ class LightNodes:
         """Return the smallest distance [m] between a body's places in a cell and the borders of the cell.
 
         It is the radius, because walls may stand at the borders, and a body's centre cannot be closer to a wall. The
-        upper limit for large bodies is MOST_MARGIN times the side of the cell.
+        upper limit for large bodies is a quarter of the side of the cell.
 
         radius: radius of the body [m]
         """

@@ -111,7 +111,7 @@ def _table(archive: zipfile.ZipFile, name: str, dtype: np.dtype, size: int) -> n
 def _write(path: Path, tables: dict[str, np.ndarray], world: str) -> None:
     """Write the tables to a file, completely or not at all, even if other processes write it at the same time.
 
-    Of the files in the cache, only the newest KEPT remain.
+    Of the files in the cache, only the newest 200 remain.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     for old in sorted(path.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime)[: -(KEPT - 1)]:

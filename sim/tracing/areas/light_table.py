@@ -54,9 +54,9 @@ class LightTable(NodeLight):
         self._body_nodes = int(nodes.grid.free.sum()) * nodes.places**2
 
     def on_body(self, body: Array, four: Array, centre: Array, tables: LightTables) -> list[Array]:
-        """Return four harmonics of the light that arrives on a body, per component (Vector4f).
+        """Return one group of four harmonics of the light that arrives on a body, per component (Vector4f).
 
-        All FOURS groups together are the coefficients for `sum_of`.
+        All groups together are the coefficients for `sum_of`.
 
         body: index of the body
         four: index of the group of four harmonics

@@ -33,7 +33,7 @@ class SphereTexture:
     """A texture that changes along one axis.
 
     texture: place of the texture in the tables
-    to_column: map column = to_column @ (u, v, 1)
+    to_column: map from texture coordinates to a column of the texture: column = to_column @ (u, v, 1)
     frame: rotation from the sphere's axes to the world's, (3, 3)
     """
 
@@ -135,7 +135,7 @@ class _Edge:
     """An edge of a strip.
 
     place: position across the area, from -1/2 to 1/2
-    angle, sine: parameter of the elliptic outline, and its sine: place = middle[0] + half[0] · sine
+    angle, sine: parameter of the elliptic `_Outline`, and its sine: place = middle[0] + half[0] · sine, with its fields
     """
 
     place: Array
@@ -183,7 +183,8 @@ class _Outline:
 def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Array) -> _Outline:
     """Return the outline of the sphere with its centre at `way` from the eye.
 
-    A direction v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|².
+    A direction v = ahead + x across + y along, with |x| and |y| up to 1/2 in the area, hits the sphere if
+    |way × v|² < radius² |v|².
     """
     x, y, z = (dr.cross(way, v) for v in (across, along, ahead))
     square = radius * radius

@@ -145,7 +145,7 @@ class Stripes:
 
 
 def _least_side(largest: float) -> float:
-    """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most ROUNDING.
+    """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most 0.001.
 
     It is at least one texel, because textures are linear between texels. A mean is a sum of four values of the second
     integral, divided by the product of the sides. Each value is rounded twice: in the table, and after the polynomial

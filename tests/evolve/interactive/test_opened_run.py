@@ -9,6 +9,7 @@ import pytest
 
 import evolve
 from evolve.config.run_config import EyeConfig
+from evolve.interactive.summary import animal_as_html
 from evolve.store.directory import Run
 from tests.evolve.report.reported import FITNESS, HOSTILE, SEEING, make_run
 
@@ -47,6 +48,11 @@ def test_a_notebook_runs_nothing_that_a_record_says(opened):
     assert "&lt;script&gt;" in opened.candidate(2)._repr_html_()
     assert "<td>no. 3, fitness 41.8</td>" in opened._repr_html_()
     assert "2 of 4 × 5 receptors, 33.0° wide" in opened.best._repr_html_()
+
+
+def test_compound_eyes_have_ommatidia(opened):
+    animal = replace(opened.best, phenotype=replace(opened.best.phenotype, facet_diameter_um=20.0))
+    assert "2 of 4 × 5 ommatidia, 33.0° wide" in animal_as_html(animal).markup
 
 
 def test_fitness_is_drawn_as_it_is(opened):

@@ -12,7 +12,7 @@ from evolve.episodes.recorder import Recorder
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.report.picture import display
-from evolve.report.player import write_player
+from evolve.report.player import episode_sentence, write_player
 from sim.worlds.ground_plan import GroundPlan
 from tests.evolve.learning.test_task_module import small, written
 from tests.evolve.report.reported import Page, film_of, picture
@@ -85,6 +85,11 @@ def test_player_is_a_page_of_its_own(run, episode, tmp_path):
     assert page.tags["canvas"] == 2 + 2 * 2
     assert film_of(text)["total"][-1] == pytest.approx(episode.reward.sum(), abs=1e-3)
     assert not re.search(r"https?:", text)
+
+
+@pytest.mark.parametrize(("mode", "name"), [("evaluation", "Evaluation"), ("test", "Test")])
+def test_the_sentence_names_the_kind_of_episode(episode, mode, name):
+    assert episode_sentence(replace(episode, mode=mode)).startswith(f"{name} episode with seed {episode.seed}: ")
 
 
 def test_long_films_of_many_receptors_are_thinned(episode, tmp_path):
