@@ -69,6 +69,13 @@ class Field:
         dr.eval(self.re, self.im)
         return self
 
+    def tensors(self) -> tuple[Array, Array]:
+        """Return the real and the imaginary part as Dr.Jit tensors (y, x)."""
+        re, im = (self.types.Tensor(part, self.grid.shape) for part in (self.re, self.im))
+        return re, im
+
     def numpy(self) -> np.ndarray:
         self.evaluated()
-        return (self.re.numpy() + 1j * self.im.numpy()).reshape(self.grid.shape).astype(self.types.complex_dtype)
+        found = np.empty(self.grid.shape, self.types.complex_dtype)
+        found.real, found.imag = (part.numpy().reshape(self.grid.shape) for part in (self.re, self.im))
+        return found

@@ -5,7 +5,11 @@ separable_kernel    distant and shifted windows by matrix products
 spectrum_filter     near windows by transforms
 transfer_function   free space as a filter of plane waves
 transform_sampling  the period of a finite transform
-system              propagate_through: propagation through pupils and free space
-planes              samples of intermediate planes
+system              propagate_through: propagation through pupils and free space; also for batches of systems
+system_elements     FreeSpace; checks of the elements, and the light in front of them
+stack_result        StackResult: the field behind a system
+planes              samples of pupils
+plane_step          steps between the planes of a system
+field_derivatives   derivatives of fields through steps
 misalignment        Misaligned: decentred and tilted pupils
 """

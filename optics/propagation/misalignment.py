@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,11 +30,21 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import in_range, of_kind, point_2d
+from optics.numerics.array_library import turned
 from optics.numerics.autodiff import Array, number
-from optics.numerics.grid import Grid
+from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["ALIGNED", "Alignment", "Misaligned", "path_to_tilted_plane", "seen_from", "slowness"]
+__all__ = [
+    "ALIGNED",
+    "Alignment",
+    "DepthFactors",
+    "Depths",
+    "Misaligned",
+    "path_to_tilted_plane",
+    "seen_from",
+    "slowness",
+]
 
 STEEPEST_TILT = 0.2  # choice [rad]: largest tilt; a thin element at a larger tilt is no longer thin along the axis
 MOST_NODES = 8  # choice: largest number of depths between which fields are interpolated
@@ -114,40 +125,26 @@ class Alignment:
             f"{math.degrees(math.asin(min(sine, 1))):.2g}° to the axis: widen the tolerance"
         )
 
-    def weights(self, nodes: np.ndarray, grid: Grid, turns: float) -> list[np.ndarray]:
+    def weights(self, nodes: np.ndarray, grid: Grid, turns: float, types: Precision) -> list[np.ndarray]:
         """Return L_j(ζ) exp(2πi ζ turns) for each node j at the samples of a grid about the centre, (y, x) each.
 
         L_j are the Lagrange polynomials of the nodes, and ζ is the depth of the tilted plane.
 
         turns: waves per depth [1/m].
         """
-        depth, found = self.depth(grid), []
-        for j, at in enumerate(nodes):
-            others = np.delete(nodes, j)
-            found.append(np.prod([(depth - other) / (at - other) for other in others], axis=0))
-        return [weight * np.exp(2j * np.pi * turns * depth) for weight in found]
+        depth, found = self.depth(grid).astype(types.dtype), []
+        sides = (sample_positions(n, grid.dx) * slope for n, slope in zip(grid.shape, self.slope[::-1], strict=True))
+        waves = (np.exp(2j * np.pi * turns * side).astype(types.complex_dtype) for side in sides)
+        carrier = np.multiply.outer(*waves)
+        for at in nodes.tolist():
+            others = ((depth - other) / (at - other) for other in nodes.tolist() if other != at)
+            found.append(math.prod(others, start=1) * carrier)
+        return found
 
     def depth(self, grid: Grid) -> np.ndarray:
         """Return the depth ζ [m] of the tilted plane at the samples of a grid about the centre, (y, x)."""
-        rows, columns = (np.arange(n) - n // 2 for n in grid.shape)
-        found: np.ndarray = grid.dx * np.add.outer(self.slope[1] * rows, self.slope[0] * columns)
-        return found
-
-    def leaving(self, u: np.ndarray, dx: float, wavelength: float) -> np.ndarray:
-        """Return a field u (y, x) on the tilted plane times 1 - tan α sin θ, an approximation of the obliquity factor.
-
-        α is the tilt, and θ the angle of the light to the axis.
-
-        wavelength: wavelength [m] in the medium.
-        """
-        if not self.steepness:
-            return u
-        from scipy import fft
-
-        sines = (fft.fftfreq(n, dx).astype(u.real.dtype) * wavelength for n in u.shape)
-        along_y, along_x = (sine * slope for sine, slope in zip(sines, self.slope[::-1], strict=True))
-        factor = 1 - np.add.outer(along_y, along_x)
-        found: np.ndarray = fft.ifft2(fft.fft2(u) * factor, overwrite_x=True)
+        rows, columns = (sample_positions(n, grid.dx) for n in grid.shape)
+        found: np.ndarray = np.add.outer(self.slope[1] * rows, self.slope[0] * columns)
         return found
 
     def error(self, sine: float) -> float:
@@ -164,6 +161,55 @@ class Alignment:
 
 
 ALIGNED = Alignment()
+
+
+@dataclass(frozen=True)
+class DepthFactors:
+    """Pairs of weights (y, x) and factors of the spectrum (fy, fx), one pair for each depth of a tilted plane."""
+
+    leaving: list[tuple[Any, Any]]
+    arriving: list[tuple[Any, Any]]
+
+
+@dataclass(frozen=True)
+class Depths:
+    """Depths between which a step interpolates the fields that leave a plane and that arrive at the next one.
+
+    leaving, arriving: depths [m], (node,), and one array of weights (y, x) per node, see `Alignment.weights`.
+    turns: waves per depth [1/m], (1 - c)/λ, by which the carrier exp(ikcζ) is slower than exp(ikζ).
+    slope: tangents of the tilt along x and y of the plane that the light leaves.
+    """
+
+    leaving: tuple[np.ndarray, list[np.ndarray]]
+    arriving: tuple[np.ndarray, list[np.ndarray]]
+    turns: float
+    slope: Point
+
+    def factors(self, sines: np.ndarray, wavelength: float, types: Precision) -> DepthFactors:
+        """Return the weights, and factors exp(±2πi ζ [turns - sags/λ]) for propagation to and from depths ζ.
+
+        The factors of leaving light include 1 - tan α sin θ, an approximation of the obliquity factor.
+
+        sines: sin θ of each frequency along an axis of the spectrum.
+        wavelength: wavelength [m] in the medium.
+        """
+        slow, found = self.turns - sags(sines) / wavelength, []
+        for sign, (nodes, weights) in ((-1, self.leaving), (1, self.arriving)):
+            found.append(
+                [(w, turned(1.0, sign * at * slow, types.dtype)) for at, w in zip(nodes, weights, strict=True)]
+            )
+        oblique = (1 - np.add.outer(self.slope[1] * sines, self.slope[0] * sines)).astype(types.dtype)
+        return DepthFactors([(weight, factor * oblique) for weight, factor in found[0]], found[1])
+
+
+def sags(sines: np.ndarray) -> np.ndarray:
+    """Return 1 - cos θ for each frequency of a spectrum, (fy, fx); 1 for evanescent waves.
+
+    sines: sin θ of each frequency along an axis.
+    """
+    squared = np.minimum(np.add.outer(sines * sines, sines * sines), 1)
+    found: np.ndarray = squared / (1 + np.sqrt(1 - squared))
+    return found
 
 
 def slowness(sine: float) -> float:

@@ -13,7 +13,7 @@ that lands farther away. Neither is possible close to grazing incidence; the pre
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,12 +23,23 @@ from optics.numerics.arguments import complexes, finite, in_range, shown, vacuum
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, precision
 from optics.numerics.read_only import ReadOnlyArrays
+from optics.propagation.field_derivatives import LinearMap
+from optics.propagation.misalignment import Depths
 from optics.propagation.separable_kernel import SeparableSampling, separable
-from optics.propagation.spectrum_filter import PropagatedPlane, evanescent_share, filtered
+from optics.propagation.spectrum_filter import PropagatedPlane, evanescent_share, filtered, linear_map
 from optics.propagation.transfer_function import EVERYTHING, Passage
 from optics.propagation.transform_sampling import TransformSampling, blur_left, most_spare, sampling
 
-__all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate", "propagated_field"]
+__all__ = [
+    "PROPAGATION_METHODS",
+    "WRAP_RIPPLE_PER_TOLERANCE",
+    "PropagationResult",
+    "lit_part",
+    "propagate",
+    "propagated_between_depths",
+    "propagated_field",
+    "step_map",
+]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 # Choice: fraction of the removed light that may still reach the window, relative to the tolerance. It is small, because
@@ -136,7 +147,7 @@ def propagated_field(
     Raises:
         AccuracyError: no sampling meets the tolerance.
     """
-    lit = _lit(given)
+    lit = lit_part(given)
     source = Grid(lit.shape[-2:], dx)
     sources = lit.reshape(-1, *source.shape)
     if np.may_share_memory(sources, given):  # the result stores the sources, so later changes of u must not affect them
@@ -144,6 +155,29 @@ def propagated_field(
     how, planes = _propagated(sources, passage, (source, window), tolerance, precision(dtype))
     out = np.stack([plane.u for plane in planes]).reshape(*given.shape[:-2], *window.shape)
     return PropagationResult(out, window.dx, _plan(how, planes, tolerance, dtype), window, sources, how)
+
+
+def propagated_between_depths(
+    u: np.ndarray, how: TransformSampling, depths: Depths, tolerance: float, dtype: str
+) -> PropagationResult:
+    """Return the field (y, x) after a step between tilted planes, see optics.propagation.misalignment.
+
+    Raises:
+        AccuracyError: the predicted error exceeds the tolerance.
+    """
+    how = replace(how, step=0)
+    planes = [filtered(u, how, precision(dtype), depths)]
+    return PropagationResult(planes[0].u, how.window.dx, _plan(how, planes, tolerance, dtype), how.window, u[None], how)
+
+
+def step_map(result: PropagationResult, shape: tuple[int, int], depths: Depths | None) -> LinearMap:
+    """Return the propagation of a result, by transforms, as a linear map of fields (y, x) of a shape.
+
+    depths: depths of a step between tilted planes.
+    """
+    how = result._sampling
+    assert isinstance(how, TransformSampling)
+    return linear_map(how, shape, precision(result.u.real.dtype.name), depths)
 
 
 def _field(u: np.ndarray) -> np.ndarray:
@@ -155,7 +189,7 @@ def _field(u: np.ndarray) -> np.ndarray:
     return field
 
 
-def _lit(field: np.ndarray) -> np.ndarray:
+def lit_part(field: np.ndarray) -> np.ndarray:
     """Return the smallest part of a field around the centre sample that contains all light.
 
     Dark samples outside it would only increase the cost.

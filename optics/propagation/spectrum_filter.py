@@ -12,16 +12,19 @@ from optics.numerics.accuracy import FLOAT_NOISE
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
+from optics.propagation.field_derivatives import LinearMap
+from optics.propagation.misalignment import DepthFactors, Depths, sags
 from optics.propagation.transfer_function import Passage, TransferFunction, evanescent
 from optics.propagation.transform_sampling import TransformSampling, blurred_back
 
-__all__ = ["PropagatedPlane", "ScaledPlane", "evanescent_share", "filtered"]
+__all__ = ["PropagatedPlane", "ScaledPlane", "evanescent_share", "filtered", "linear_map"]
 
 # Choice: the evanescent part of the missing light is computed if the missing light exceeds the arriving light by this
 # factor. Smaller amounts hardly affect the predicted error.
 MUCH = 100.0
 
 HELD = (1e-20, 1e30)  # range of the power Σ|u|² for which float32 can represent the terms of the error estimate
+NO_DEPTHS = DepthFactors([(1, 1)], [(1, 1)])  # factors of steps between planes that are not tilted
 ONE = np.ones(1)  # stands for equal weights in a sum
 
 
@@ -68,27 +71,30 @@ class ScaledPlane:
         return result if self.brightest == 1 else result * result.dtype.type(self.brightest)
 
 
-def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> PropagatedPlane:
-    """Return a plane (y, x) after propagation."""
+def filtered(
+    given: np.ndarray, how: TransformSampling, types: Precision, depths: Depths | None = None
+) -> PropagatedPlane:
+    """Return a plane (y, x) after propagation, between tilted planes if depths are given."""
     scaled = ScaledPlane.from_plane(given, types)
     plane, total = scaled.u, scaled.power
     if total == 0:
         return PropagatedPlane(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
     space = _free_space(how, types.dtype)
-    if how.step:
-        spectrum = periodic_spectrum(plane, how.period, how.across)
+    factors = None if depths is None else depths.factors(_sines(how), how.passage.wavelength, types)
+    if factors is None:
+        spectrum = _spectrum(plane, how)
     else:
-        spectrum = fourier_sum(plane, how.period, (how.across, how.across), -1)
+        spectrum = sum(factor * _spectrum(plane * weight, how) for weight, factor in factors.leaving)
     grazing = _power(spectrum, space.grazing) / how.period**2
     blurred = blurred_back(spectrum, how)
     spectrum *= space.transfer
     # By Parseval's theorem, missing power was either faded out or is evanescent. If no power is missing, the difference
     # is a rounding error of float32, which is small compared with the remainder of the fade.
     faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
-    if how.step:
-        result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
+    if factors is None:
+        result = _result(spectrum, how)
     else:
-        result = fourier_sum(spectrum, how.period * how.source.dx / how.window.dx, how.window.shape, +1)
+        result = sum(weight * _result(factor * spectrum, how) for weight, factor in factors.arriving)
     arrived = _power(result) * (how.window.dx / how.source.dx) ** 2
     if not arrived:
         return PropagatedPlane(result, math.inf, math.inf)
@@ -100,6 +106,68 @@ def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> Pro
     blurred_by_fade = 2 * how.passage.ripple * (1 + math.sqrt(faded / arrived)) if how.passage.band.fade else 0.0
     error = 2 * math.sqrt(grazing / arrived) + rounding + blurred_by_fade
     return PropagatedPlane(scaled.restored(result), error, 2 * math.sqrt(blurred / arrived))
+
+
+def linear_map(
+    how: TransformSampling, shape: tuple[int, int], types: Precision, depths: Depths | None = None
+) -> LinearMap:
+    """Return `filtered` as a linear map of fields (y, x) of this shape.
+
+    Its parameter z is the distance, and its rate omits the carrier exp(ikz).
+    """
+    how, crop = replace(how, step=0), _middle(shape, how.source.shape)
+    transfer = _free_space(how, types.dtype).transfer
+    factors = NO_DEPTHS if depths is None else depths.factors(_sines(how), how.passage.wavelength, types)
+
+    def spectrum(u: np.ndarray) -> np.ndarray:
+        return transfer * sum(factor * _spectrum(u[crop] * weight, how) for weight, factor in factors.leaving)
+
+    def onto_window(arriving: np.ndarray) -> np.ndarray:
+        found: np.ndarray = sum(weight * _result(factor * arriving, how) for weight, factor in factors.arriving)
+        return found
+
+    def rate(u: np.ndarray) -> np.ndarray:
+        turns = (sags(_sines(how)) * (-2j * np.pi / how.passage.wavelength)).astype(types.complex_dtype)
+        return onto_window(turns * spectrum(u))
+
+    def adjoint(grad: np.ndarray) -> np.ndarray:
+        size = how.across, how.across
+        back = sum(
+            np.conj(factor) * fourier_sum(np.conj(weight) * grad, how.back_period, size, -1)
+            for weight, factor in factors.arriving
+        )
+        back = back * transfer.conj()
+        found = np.zeros(shape, types.complex_dtype)
+        for weight, factor in factors.leaving:
+            found[crop] += np.conj(weight) * fourier_sum(np.conj(factor) * back, how.period, how.source.shape, +1)
+        return found
+
+    return LinearMap(lambda u: onto_window(spectrum(u)), adjoint, rate)
+
+
+def _middle(shape: tuple[int, int], part: tuple[int, int]) -> tuple[slice, ...]:
+    """Return the index of a part around the centre sample, which is sample n//2 of the whole and of the part."""
+    starts = [n // 2 - m // 2 for n, m in zip(shape, part, strict=True)]
+    return tuple(slice(start, start + m) for start, m in zip(starts, part, strict=True))
+
+
+def _spectrum(plane: np.ndarray, how: TransformSampling) -> np.ndarray:
+    """Return the spectrum of a plane (y, x): (fx, fy) in FFT order with a whole `how.step`, else (fy, fx) centred."""
+    if how.step:
+        return periodic_spectrum(plane, how.period, how.across)
+    return fourier_sum(plane, how.period, (how.across, how.across), -1)
+
+
+def _result(spectrum: np.ndarray, how: TransformSampling) -> np.ndarray:
+    """Return the field (y, x) of a spectrum over the window."""
+    if how.step:
+        return periodic_sum(spectrum, how.period, how.step, how.window.shape)
+    return fourier_sum(spectrum, how.back_period, how.window.shape, +1)
+
+
+def _sines(how: TransformSampling) -> np.ndarray:
+    """Return sin θ for each frequency along an axis of a centred spectrum."""
+    return Grid.square(how.across, how.passage.wavelength / (how.period * how.source.dx)).x
 
 
 def evanescent_share(plane: np.ndarray, period: int, dx: float, passage: Passage) -> float:

@@ -76,6 +76,12 @@ class TransformSampling:
     def samples(self) -> tuple[int, int]:
         return self.period, self.period
 
+    @property
+    def back_period(self) -> float:
+        """Period in samples of the window. It is exactly whole if it is whole but for rounding errors."""
+        period = self.period * self.source.dx / self.window.dx
+        return float(round(period)) if abs(period - round(period)) <= SAME_PITCH else period
+
     def seconds(self, real: str, planes: int = 1) -> float:
         """Return the predicted time [s] of the propagation of planes, including the transfer function.
 
@@ -85,9 +91,8 @@ class TransformSampling:
         if self.step:
             sums = lines_seconds(self.source.shape[0] + 2 * across + self.window.shape[0], period, real)
         else:
-            back = period * self.source.dx / self.window.dx
             sums = sum_seconds(self.source.shape, period, (across, across), real)
-            sums += sum_seconds((across, across), back, self.window.shape, real)
+            sums += sum_seconds((across, across), self.back_period, self.window.shape, real)
         transfer = across * (period if self.step else across) * TRANSFER_SAMPLE
         return PASSAGE_CALL["angular_spectrum"] + planes * sums + transfer
 

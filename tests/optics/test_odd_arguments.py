@@ -214,6 +214,14 @@ MEASURES = {
     "mtf": {"result": SPOT, "arriving": None, "tolerance": 0.02},
     "strehl_ratio": {"result": SPOT},
 }
+BEHIND_SYSTEMS = {
+    "wavelength": 550e-9,
+    "source": optics.PointSource(),
+    "out_dx": 1e-6,
+    "out_shape": (9, 9),
+    "tolerance": 1e-2,
+    "dtype": "float32",
+}
 FIELDS = {
     "propagate": {
         "u": np.ones((8, 8)),
@@ -228,16 +236,8 @@ FIELDS = {
         "method": "auto",
         "dtype": "float32",
     },
-    "propagate_through": {
-        "elements": [LENS, optics.FreeSpace(1e-3)],
-        "u": None,
-        "wavelength": 550e-9,
-        "source": optics.PointSource(),
-        "out_dx": 1e-6,
-        "out_shape": (9, 9),
-        "tolerance": 1e-2,
-        "dtype": "float32",
-    },
+    "propagate_through": {"elements": [LENS, optics.FreeSpace(1e-3)], "u": None, **BEHIND_SYSTEMS},
+    "propagate_through_batch": {"systems": [[LENS, optics.FreeSpace(1e-3)]], **BEHIND_SYSTEMS},
 }
 CALLS = SHAPES | ELEMENTS | SPECTRA | EYES | PICTURES | MEASURES | FIELDS
 

@@ -58,6 +58,12 @@ def through(**asked):
     return found.u, found.x, found.predicted_error
 
 
+def through_batch(**asked):
+    systems = [[Pupil(10e-6), FreeSpace(1e-4), Pupil(20e-6), FreeSpace(distance)] for distance in (1e-4, 1.1e-4)]
+    settings = {"wavelength": 5e-7, "out_dx": 2e-6, "out_shape": (8, 8), **asked}
+    return [(each.u, each.predicted_error) for each in optics.propagate_through_batch(systems, **settings)]
+
+
 def white(**asked):
     return optics.white_psf(Pupil(**LENS), **{"dx": 1e-6, "shape": (9, 9), **asked}).psf
 
@@ -158,6 +164,9 @@ OF_PSFS = {
             "dtype": "float64",
             "backward": With(True, {"u": U, "dx": 1e-6, "elements": [FreeSpace(1e-4), Pupil(20e-6)]}),
         },
+    ),
+    "propagate_through_batch": Walk(
+        through_batch, {"source": optics.PointSource(1e-3), "tolerance": 1e-4, "dtype": "float64"}
     ),
     "FreeSpace": Walk(
         lambda **given: through(u=U, dx=1e-6, elements=[FreeSpace(1e-4, **given)]),

@@ -202,15 +202,14 @@ def test_free_space_has_a_length():
         FreeSpace(-1.0)
 
 
-def test_derivatives_are_refused_not_dropped():
-    import drjit as dr
+def test_derivatives_of_other_libraries_are_refused_not_dropped():
+    import torch
 
-    from optics.numerics.precision import precision
-
-    radius = precision("float64").Float64(1e-5)
-    dr.enable_grad(radius)
-    with pytest.raises(ValueError, match="no derivatives"):
+    radius, distance = torch.tensor([1e-5, 3e-5], requires_grad=True)
+    with pytest.raises(ValueError, match="elements: a pupil requires a derivative of PyTorch, but only"):
         propagate_through([FreeSpace(3e-5), Pupil(radius), FreeSpace(3e-5)], OBJECT, dx=DX, wavelength=WAVELENGTH)
+    with pytest.raises(ValueError, match=r"distance requires a derivative of PyTorch: must be a number or a Dr\.Jit"):
+        FreeSpace(distance)
 
 
 @pytest.mark.parametrize("distance", [np.inf, 0.1])
