@@ -11,7 +11,7 @@ import numpy as np
 from optics.eye.kernel_interpolation import nodes
 from optics.numerics.arguments import positive, shown, without_derivative
 from optics.numerics.autodiff import Scalar, is_differentiable, number
-from optics.numerics.number_types import full_precision
+from optics.numerics.number_types import full_precision, is_boolean
 
 __all__ = ["DISTINCT", "MOST_DISTINCT", "MOST_NODES", "DepthRange", "inverse_distances_in", "layers_for"]
 
@@ -93,6 +93,8 @@ def inverse_distances_in(shape: tuple[int, int], z: Any) -> np.ndarray:
 def _distances(z: Any) -> np.ndarray:
     z = full_precision("z", without_derivative("z", z))
     try:
+        if is_boolean(z):
+            raise TypeError
         distances = np.atleast_1d(np.asarray(z, dtype=np.float64))
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"z = {shown(z)}: must be a distance [m], or an array of them") from None

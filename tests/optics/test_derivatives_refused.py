@@ -108,7 +108,6 @@ DROPPED = {
     "tolerance of an MTF": lambda: optics.mtf(a_picture(), tolerance=asking(0.9)),
     "frequencies": lambda: optics.mtf(a_picture(), tolerance=0.9).profile(asking([1e5])),
     "shares": lambda: a_picture().mean(asking([1.0])),
-    "distance of a plane": lambda: optics.FreeSpace(asking(1e-3)),
     "angle_x": lambda: optics.Ommatidium(PUPIL, optics.Waveguide(2e-6)).sensitivity(asking(0.0), 0.0),
     "focal_length of Snyder": lambda: optics.snyder_acceptance(2.5e-5, asking(5e-5), 2e-6, 5e-7),
     "distance": lambda: optics.propagate(FIELD, dx=1e-6, wavelength=5e-7, distance=asking(1e-3)),

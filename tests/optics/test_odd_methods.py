@@ -63,14 +63,14 @@ CALLS = {
         "radiance": np.ones((4, 6, 6)), "samples_per_receptor": 2, "rng": noise(), "z": 1.0,
         "sight": eye().sight(2), "polarization": None}),
     "Eye.sight": lambda: (eye().sight, {
-        "samples_per_receptor": 2, "z": 1.0, "depth_layers": 1, "tolerance": None, "light_from": "cells"}),
+        "samples_per_receptor": 2, "z": np.array([1.0]), "depth_layers": 1, "tolerance": None, "light_from": "cells"}),
     "FacetLens.focal_length": lambda: (optics.FacetLens(25e-6, 30e-6).focal_length, GREEN),
     "FacetLens.object_focal_length": lambda: (optics.FacetLens(25e-6, 30e-6).object_focal_length, GREEN),
     "FacetLens.power": lambda: (optics.FacetLens(25e-6, 30e-6).power, GREEN),
     "FacetLens.principal_planes": lambda: (optics.FacetLens(25e-6, 30e-6).principal_planes, GREEN),
     "Grid.moved": lambda: (optics.Grid.square(5, 1e-6).moved, {"centre": (0.0, 0.0)}),
     "Grid.square": lambda: (optics.Grid.square, {"n": 5, "dx": 1e-6}),
-    "HumanEye.frequency": lambda: (optics.HumanEye(1e-3).frequency, {"cycles_per_degree": 1.0}),
+    "HumanEye.frequency": lambda: (optics.HumanEye(1e-3).frequency, {"cycles_per_degree": np.array([1.0])}),
     "MTF.first": lambda: (optics.mtf(white()).first, {"count": 1}),
     "MTF.profile": lambda: (optics.mtf(white()).profile, {"frequencies": np.array([0.0, 1e4])}),
     "Microvilli.absorbed": lambda: (optics.Microvilli().absorbed, {"light": focus()}),
@@ -78,7 +78,7 @@ CALLS = {
         {"light": focus(), "radius": 0.5e-6, "centre": None}),
     "Microvilli.signal": lambda: (optics.Microvilli().signal,
         {"light": focus(), "radius": 0.5e-6, "centre": None, "with_error": False}),
-    "Mode.field": lambda: (mode().field, {"x": 0.0, "y": 0.0}),
+    "Mode.field": lambda: (mode().field, {"x": np.zeros(1), "y": np.zeros(1)}),
     "Ommatidium.acceptance_angle": lambda: (facets().ommatidium.acceptance_angle, {"azimuth_deg": 0.0} | GREEN),
     "Ommatidium.mode_power": lambda: (facets().ommatidium.mode_power, ANGLES),
     "Ommatidium.modes": lambda: (facets().ommatidium.modes, GREEN),
@@ -108,7 +108,7 @@ CALLS = {
         white().encircled_energy, {"radii": 1e-6, "centre": None, "with_error": False}),
     "WhitePSF.mtf": lambda: (white().mtf, {"tolerance": 0.02}),
     "WhitePSF.strehl_ratio": lambda: (white().strehl_ratio, {"with_error": False}),
-    "Zernike.at": lambda: (optics.Zernike([0, 0, 0, 0.1], 1e-3).at, {"x": 0.0, "y": 0.0}),
+    "Zernike.at": lambda: (optics.Zernike([0, 0, 0, 0.1], 1e-3).at, {"x": np.zeros(1), "y": np.zeros(1)}),
 }  # fmt: skip
 
 

@@ -172,6 +172,7 @@ def test_poses_are_checked(changes, reason):
     scene = SimpleNamespace(
         model=SimpleNamespace(ngeom=3, nbody=2),
         scene=SimpleNamespace(as_built=SimpleNamespace(refuse_differences=compared.append)),
+        check_count=PreparedScene.check_count,
         _check_finite=PreparedScene._check_finite,
     )
     given = poses(**changes)
