@@ -197,7 +197,8 @@ class SineStack(SineGeometry):
             side = self.at[:, [0, -1]]
             nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
             points = self.points_at(nodes[:, None, :], nodes[:, :, None])
-            return stack.geometry.waves(*points) + self._from(stack, *points), stack.powers(*points)
+            to_middle = self._to_middle(stack.wavelength[:, None, None], *points)[1]
+            return stack.geometry.waves(*points) + to_middle, stack.powers(*points)
 
         straight, powers = self.known.get(("paths", stack.geometry, count), computed)
         paths = straight + stack.polynomial_waves(powers).reshape(-1, count, count)
@@ -206,11 +207,7 @@ class SineStack(SineGeometry):
 
     def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the paths through points (x, y) [m], in waves up to a constant."""
-        return np.asarray(stack.waves(x, y) + self._from(stack, x, y))
-
-    def _from(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the paths from points (x, y) [m] to the middle of the window, in waves up to a constant."""
-        return self._to_middle(stack.wavelength[:, None, None], x, y)[1]
+        return np.asarray(stack.waves(x, y) + self._to_middle(stack.wavelength[:, None, None], x, y)[1])
 
     def _to_middle(self, wavelength: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the `diffraction_kernel` from points (x, y) [m] to the middle of the window."""
@@ -219,9 +216,7 @@ class SineStack(SineGeometry):
     def to_middle(self, wavelength: float | np.ndarray, dtype: str) -> np.ndarray:
         """Return the factor between the light of samples and their contribution to the middle, (pupil, y, x), complex.
 
-        It is the `diffraction_kernel` [1/m²] up to a constant phase, for light whose amplitude includes the areas of
-        the samples.
-
+        It is the `diffraction_kernel` [1/m²] up to a constant phase. The light must include the areas of samples.
         wavelength: wavelength [m] in the medium, a number.
         """
         key = "to_middle", float(wavelength), dtype

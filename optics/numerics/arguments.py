@@ -35,7 +35,6 @@ __all__ = [
     "without_derivative",
 ]
 
-
 # Limits of positive numbers. Their squares, and ratios of the squares, stay within the range of double precision.
 SMALLEST, LARGEST = 1e-15, 1e15
 LONGEST_WAVE = 1.0  # [m]; larger values are probably wavelengths in nanometres
@@ -83,8 +82,7 @@ def positive(
 ) -> float:
     """Return `value` as a float; ValueError about `name` unless it is in [1e-15, `most`], where squares are accurate.
 
-    unit: unit of `value`, for the message. infinite: True if infinity is allowed.
-    carried: True if `value` may carry a derivative, which is otherwise refused.
+    unit: unit of `value`, for the message. infinite: True if infinity is allowed. carried: see `finite`.
     """
     number = _number(name, value, carried)
     if infinite and number == math.inf:

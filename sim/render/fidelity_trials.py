@@ -62,8 +62,7 @@ class FidelityTrials:
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Return a function that maps rays per receptor to the root mean square error of signals.
 
-        The result is the largest error of a population of receptors (`sim.render.populations`). Worlds without objects
-        have one population, and others two.
+        The result is the largest error of the one or two populations of receptors (`sim.render.populations`).
 
         Raises:
             NoRaysError: raised by the returned function if a receptor has no rays.

@@ -37,8 +37,7 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray.
 
-    t: distance [m]; without a hit, the argument `farthest`
-    which: index of the mover; without a hit, the number of movers
+    t: distance [m] (without a hit, the argument `farthest`). which: index of the mover (then, the number of movers)
     normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
     """
 

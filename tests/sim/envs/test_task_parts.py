@@ -146,12 +146,19 @@ def test_a_model_is_a_scene_in_the_bands_of_its_fidelity(monkeypatch, samples, t
 # --- the test of batch tasks
 
 
+class Judged(SimpleNamespace):
+    """Stand-in for a task with its own method `judge`."""
+
+    def judge(self):
+        pass
+
+
 class Worlds:
     """Stand-in for a simulation of two agents. Its state counts actions; the second world ends in the third action."""
 
     def __init__(self, n=3, early=False):
         self.n, self.learners, self.agents = n, 2, [SimpleNamespace(n_actions=k) for k in (1, 2)]
-        self.task, self.felt = SimpleNamespace(renders_early=early), [{"feels": np.zeros((n, 1))}]
+        self.task, self.felt = Judged(renders_early=early), [{"feels": np.zeros((n, 1))}]
         self.log, self.count, self.places, self.changed = [], np.zeros(n), np.zeros((n, 2, 3)), []
 
     def seed(self, seed):

@@ -11,6 +11,7 @@ import optics
 import sim
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.pending_frame import settled
+from sim.render.prepared_scene import PreparedScene
 from sim.render.receptor_noise import FEW
 from sim.render.world_scene import WorldScene
 from sim.tasks.registry import task_of
@@ -113,16 +114,19 @@ def test_few_worlds_are_rendered_apart(worlds, n_envs, lit):
     renderer.n_envs = n_envs
     frames = settled(1 + np.arange(n_envs))
     renderer.launch = lambda poses, light: frames
-    renderer.scene = SimpleNamespace(placed=lambda poses: SimpleNamespace(take=lambda few: few))
-    light = np.arange(n_envs) if lit else None
+    renderer.scene = SimpleNamespace(
+        check_count=PreparedScene.check_count, placed=lambda poses: SimpleNamespace(n=poses.n, take=lambda few: few)
+    )
+    renderer.eye = SimpleNamespace(bands=1)
+    light = 1.0 + np.arange(n_envs)[:, np.newaxis] if lit else None
 
     def few(poses, given):
         assert len(poses) == FEW
-        assert given is None if light is None else (given == poses).all()
+        assert given is None if light is None else (given[:, 0] == 1 + poses).all()
         return settled(-1 - poses)
 
     vars(renderer)["_few"] = SimpleNamespace(launch=few)
     chosen = np.arange(worlds)[::-1]
-    found = renderer.launch_some("poses", chosen, light).wait()
+    found = renderer.launch_some(SimpleNamespace(n=n_envs), chosen, light).wait()
     apart = worlds <= FEW < n_envs
     np.testing.assert_array_equal(found, -1 - chosen if apart else 1 + chosen)

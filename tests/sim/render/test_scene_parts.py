@@ -112,16 +112,20 @@ def test_pictures_of_single_rays(monkeypatch):
 )
 @pytest.mark.parametrize("depths", [None, (0.5, 3.0)])
 def test_settings_of_the_reference(monkeypatch, optional, given, cells, depths):
-    eyes, asked = sim.Eyes(n_eyes=1, resolution=(1, 4), **optional), {}
+    eyes, asked, lit = sim.Eyes(n_eyes=1, resolution=(1, 4), **optional), {}, []
 
     def sight(self, samples, z, layers, light_from):
         asked.update(samples=samples, z=z, layers=layers, light_from=light_from)
         return "sight"
 
-    world = SimpleNamespace(medium=None, model=sim.build_world("maze").model, spectra="spectra")
+    def in_bands(model, spectra, *rest):
+        lit.append(spectra)
+        return "in bands", ["a lamp"]
+
+    world = sim.build_world("maze")
     monkeypatch.setattr(optics.Eye, "sight", sight)
     monkeypatch.setattr(reference_renderer, "replace", lambda found, **given: (found, given))
-    monkeypatch.setattr(reference_renderer, "lights_in_bands", lambda *_: ("in bands", ["a lamp"]))
+    monkeypatch.setattr(reference_renderer, "lights_in_bands", in_bands)
     monkeypatch.setattr(reference_renderer, "mirror", lambda model, **given: given)
     with pytest.warns(sim.MirrorWarning, match="^a lamp$") as warned:
         found = ReferenceRenderer(
@@ -142,6 +146,7 @@ def test_settings_of_the_reference(monkeypatch, optional, given, cells, depths):
     assert asked["z"] == math.inf if depths is None else asked["z"].tolist() == [0.5, 3]
     assert found.sight == ("sight", {"parallax": 0.0})
     assert found._mirror == {"variant": "variant", "spectra": "in bands"}
+    assert lit == [world.spectra]
     assert (found._integrator, found._spp, found._sampler, found._has_depth) == (
         "direct",
         7,
@@ -152,9 +157,10 @@ def test_settings_of_the_reference(monkeypatch, optional, given, cells, depths):
 
 
 def test_the_reference_has_camera_eyes():
-    world = SimpleNamespace(medium=None)
+    facet = optics.FacetLens(25e-6, 30e-6)
+    eyes = sim.Eyes(n_eyes=1, resolution=(4, 4), ommatidium=optics.Ommatidium(facet, optics.Waveguide(2e-6)))
     with pytest.raises(ValueError, match=r"^eyes: their ommatidium must be None"):
-        ReferenceRenderer(world, SimpleNamespace(eye=lambda: "compound"))
+        ReferenceRenderer(sim.build_world("detection"), eyes)
 
 
 def test_signals_of_the_reference():
