@@ -218,7 +218,7 @@ def test_it_says_why():
             lambda _: sim.make_vec_env("detection", DETECTION, 1, rays_per_receptor=4, fidelity=sim.Fidelity(4, 3)),
             "rays_per_receptor = 4: must be left out",
         ),
-        (lambda world: sim.choose_fidelity(world, DETECTION, bands="few"), "bands = 'few': must be one of 'auto', 'own'"),
+        (lambda world: sim.choose_fidelity(world, DETECTION, bands="few"), "bands = 'few': must be one of 'auto'"),
         (lambda world: sim.choose_fidelity(world, DETECTION, tolerance=0), "tolerance = 0"),
         (lambda world: sim.Fidelity(1.0, 0), "bands = 0"),
         (lambda world: sim.Fidelity(1.0, 3, light="path"), "light = 'path': must be one of 'direct', 'bounce', 'all'"),
