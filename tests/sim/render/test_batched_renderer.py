@@ -265,7 +265,7 @@ def test_bad_arguments_are_named():
     world, state = scene("detection")
     with pytest.raises(ValueError, match="n_envs"):
         sim.BatchedRenderer(world, EYES, 0, sim.Fidelity(1, EYES.bands))
-    with pytest.raises(ValueError, match=r"fidelity = 4: must be a sim\.Fidelity"):
+    with pytest.raises(ValueError, match=r"fidelity = 4: must be a kind of Fidelity"):
         sim.BatchedRenderer(world, EYES, 1, 4)
     with pytest.raises(ValueError, match=rf"fidelity\.bands = 3: must be the scene's {EYES.bands}"):
         sim.BatchedRenderer.from_scene(WorldScene(world, EYES), 1, sim.Fidelity(1, bands=3))
