@@ -202,12 +202,13 @@ def test_eyes_have_the_bands_of_the_fidelity(monkeypatch, fidelity):
     monkeypatch.setattr(batched_renderer, "WorldScene", lambda *given: asked.append(given) or "scene")
     monkeypatch.setattr(batched_renderer, "chosen_fidelity", lambda scene: f"chosen for {scene}")
     monkeypatch.setattr(BatchedRenderer, "_open", lambda self, *given: asked.append(given))
-    BatchedRenderer("world", eyes, 5, fidelity, "mitsuba")
+    here = sim.build_world("detection")
+    BatchedRenderer(here, eyes, 5, fidelity, "mitsuba")
     (world, own, tracer), opened = asked
-    assert (world, own.bands, tracer) == ("world", 3 if fidelity is None else 7, "mitsuba")
+    assert (world, own.bands, tracer) == (here, 3 if fidelity is None else 7, "mitsuba")
     assert opened == ("scene", 5, "chosen for scene" if fidelity is None else fidelity)
-    with pytest.raises(ValueError, match=r"^fidelity = 4: must be a sim\.Fidelity"):
-        BatchedRenderer("world", eyes, 5, 4)
+    with pytest.raises(ValueError, match="^fidelity = 4: must be a kind of Fidelity, such as"):
+        BatchedRenderer(here, eyes, 5, 4)
 
 
 @pytest.mark.parametrize("worlds", [2, 3])
