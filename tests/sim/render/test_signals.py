@@ -207,7 +207,7 @@ def test_eyes_have_the_bands_of_the_fidelity(monkeypatch, fidelity):
     (world, own, tracer), opened = asked
     assert (world, own.bands, tracer) == (here, 3 if fidelity is None else 7, "mitsuba")
     assert opened == ("scene", 5, "chosen for scene" if fidelity is None else fidelity)
-    with pytest.raises(ValueError, match="^fidelity = 4: must be a kind of Fidelity, such as"):
+    with pytest.raises(ValueError, match=r"^fidelity = 4: must be a kind of Fidelity, such as"):
         BatchedRenderer(here, eyes, 5, 4)
 
 
