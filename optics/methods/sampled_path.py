@@ -22,10 +22,10 @@ from optics.elements.spline_map import spline_weights
 from optics.elements.wavefront import WavefrontMap, Zernike
 from optics.methods.pixel_nodes import PixelNodes, WindowSamples
 from optics.methods.sine_stack import even_weights, single_stack
-from optics.numerics.array_cache import cached_arrays
 from optics.numerics.array_library import like, sparse_product
 from optics.numerics.autodiff import Array
 from optics.numerics.interpolation import chebyshev_points
+from optics.numerics.kept_values import cached_arrays
 
 __all__ = ["sampled_height", "sampled_wavefront"]
 

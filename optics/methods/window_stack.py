@@ -22,10 +22,10 @@ from optics.methods.slow_factor import Path
 from optics.methods.window_check import window_errors
 from optics.methods.window_sampling import WindowSampling
 from optics.methods.window_sums import intensity_of, window_field
-from optics.numerics.array_cache import cached_arrays
 from optics.numerics.array_library import library, like, turned
 from optics.numerics.autodiff import Array, Scalar, carries_derivative, number
 from optics.numerics.grid import Grid
+from optics.numerics.kept_values import cached_arrays
 
 __all__ = ["WindowStack"]
 

@@ -2,7 +2,6 @@
 
 accuracy        Plan and AccuracyError: predicted errors of results
 arguments       checks of user input
-array_cache     a cache of large results, limited by memory
 array_library   arrays of NumPy, PyTorch and Dr.Jit
 array_sum_cost  predicted times of Fourier sums of NumPy arrays
 autodiff        Array and Scalar: values that may carry derivatives
@@ -16,7 +15,7 @@ fourier         centred Fourier sums of any size and period
 fourier_matrices  Fourier sums as products of matrices
 grid            sample positions
 interpolation   linear, Lagrange, B-splines; tabulated functions
-kept_values     values that are computed once and kept, up to a number of them
+kept_values     values that are computed once and kept, up to a number of them or an amount of memory
 matrices        matrix products of Dr.Jit tensors
 number_types    checks of users' arrays: half precision, masked elements, PyTorch's lazy conjugation and negation
 precision       float32 and float64 in Dr.Jit

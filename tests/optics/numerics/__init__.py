@@ -2,7 +2,6 @@
 
 accuracy: point_spread/test_psf.py, test_accuracy.py
 arguments: test_arguments.py, test_any_input.py
-array_cache: test_array_cache.py
 array_library: elements/test_array_libraries.py
 array_sum_cost: propagation/test_predicted_times.py
 autodiff: point_spread/test_derivatives.py
