@@ -183,7 +183,7 @@ def test_rays_that_bounce_are_as_many_as_their_noise_wants():
     assert np.sqrt(np.mean(off**2)) < 1.1 * found.tolerance
     fewer = sim.choose_model_fidelity(*arguments, [data])
     assert found.rays_per_receptor > fewer.rays_per_receptor
-    with pytest.raises(ValueError, match="light = 'all': must be 'direct', 'bounce' or 'auto'"):
+    with pytest.raises(ValueError, match="light = 'all': must be one of 'direct', 'bounce', 'auto'"):
         sim.choose_model_fidelity(*arguments, [data], light="all")
 
 
