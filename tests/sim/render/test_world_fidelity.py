@@ -66,7 +66,7 @@ def test_without_a_tolerance_half_of_the_noise_is_allowed(stages):
 def test_bad_arguments_are_named(stages, arguments, reason):
     with pytest.raises(ValueError, match=f"^{reason}"):
         choose_fidelity(*arguments)
-    with pytest.raises(ValueError, match=r"^bands = 'few': must be 'auto' or 'own'$"):
+    with pytest.raises(ValueError, match=r"^bands = 'few': must be one of 'auto', 'own'$"):
         choose_fidelity(WORLD, EYES, bands="few")
 
 
