@@ -90,23 +90,41 @@ def fma(a: Array, b: Array, c: Array) -> Array:
 def sparse_product(matrix: Any, values: Array) -> Array:
     """Return the product of a sparse matrix of SciPy and a vector of NumPy or PyTorch.
 
-    Derivatives of PyTorch are the product with the transposed matrix. Tensors must be on the processor.
+    Derivatives of PyTorch are the product with the transposed matrix. SciPy multiplies tensors on the processor, and
+    PyTorch those on another device, so that no number leaves the device.
     """
     own = library(values)
-    return matrix @ values if own is np else _operations(own).sparse_product.apply(values, matrix)
+    if own is np:
+        return matrix @ values
+    if on_host(values):
+        return _operations(own).sparse_product.apply(values, matrix)
+    coordinates = matrix.tocoo()
+    places = own.as_tensor(np.stack([coordinates.row, coordinates.col]), device=values.device)
+    weights = own.as_tensor(coordinates.data, dtype=values.dtype, device=values.device)
+    sparse = own.sparse_coo_tensor(places, weights, matrix.shape)
+    return own.sparse.mm(sparse, values[:, None])[:, 0]
+
+
+def on_host(tensor: Array) -> bool:
+    """Return whether a tensor of PyTorch lies in the memory of the processor, which NumPy shares without a copy."""
+    return bool(tensor.device.type == "cpu")
 
 
 def turned(size: Any, waves: Array, dtype: str) -> Array:
     """Return size · e^{2πi waves} as a complex array of NumPy or PyTorch.
 
     size: real number or array that broadcasts with `waves`.
-    waves: float64 array. Whole waves are subtracted before it is rounded. Tensors must be on the processor.
+    waves: float64 array. Whole waves are subtracted before it is rounded.
     dtype: "float32" or "float64", the type of the real and imaginary parts.
     """
     own = library(waves)
     if own is np:
         return _turned(size, waves, dtype)
-    found = _operations(own).turned.apply(waves, dtype)
+    if on_host(waves):
+        found = _operations(own).turned.apply(waves, dtype)
+    else:
+        angle = ((waves - own.round(waves)) * (2 * np.pi)).to(getattr(own, dtype))
+        found = own.complex(own.cos(angle), own.sin(angle))
     return found * (size.to(getattr(own, dtype)) if hasattr(size, "to") else size)
 
 
@@ -120,7 +138,7 @@ def _turned(size: Any, waves: np.ndarray, dtype: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Operations:
-    """Operations of PyTorch that NumPy and SciPy compute, with their derivatives."""
+    """Operations on tensors in the memory of the processor that NumPy and SciPy compute, with their derivatives."""
 
     sparse_product: Any
     turned: Any

@@ -1,7 +1,8 @@
 """Conversions of tensors to the host in `optics.torch`, counted on the CPU.
 
 On a GPU, each conversion would copy a tensor to the host and wait for it. Counted are all calls that give the numbers
-of a tensor to Python or NumPy.
+of a tensor to Python or NumPy. On the CPU, NumPy shares the memory of tensors, and computes a few operations; the tests
+use the operations for other devices instead.
 """
 
 from collections import Counter
@@ -11,12 +12,20 @@ from unittest import mock
 import numpy as np
 import pytest
 import torch
+from scipy.sparse import csr_matrix
 
 import optics.torch
 from optics.methods.window_stack import WindowStack
+from optics.numerics import array_library
 
 TO_HOST = ("numpy", "__array__", "cpu", "tolist", "item", "__float__", "__int__", "__bool__")
 VIEW = {"dx": 1e-6, "shape": (17, 17), "tolerance": 1e-2}
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(monkeypatch):
+    """Let operations treat tensors as if they lay on another device than the CPU."""
+    monkeypatch.setattr(array_library, "on_host", lambda tensor: False)
 
 
 @contextmanager
@@ -98,3 +107,20 @@ def test_a_round_trip_is_counted(between):
     with mock.patch.object(window_stack, "window_field", there_and_back):
         optics.torch.psf(pupil(heights), [500e-9], sensor_distance=0.61e-3, **VIEW)
     assert between[0][0]["numpy"] == 1
+
+
+def test_operations_of_other_devices_agree_with_those_of_the_cpu(monkeypatch):
+    rng = np.random.default_rng(0)
+    matrix = csr_matrix(rng.random((7, 5)) * (rng.random((7, 5)) < 0.5))
+    numbers, size = rng.normal(size=5), torch.tensor(rng.random(7))
+    found = []
+    for host in (True, False):
+        monkeypatch.setattr(array_library, "on_host", lambda tensor, host=host: host)
+        values = torch.tensor(numbers, requires_grad=True)
+        waves = array_library.sparse_product(matrix, values)
+        light = array_library.turned(size, waves, "float64")
+        (light * 1j).real.sum().backward()
+        found.append([waves.detach().numpy(), light.detach().numpy(), values.grad.numpy()])
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(found[0][1], size * np.exp(2j * np.pi * (matrix @ numbers)), rtol=1e-13)
