@@ -101,7 +101,7 @@ def sparse_product(matrix: Any, values: Array) -> Array:
     coordinates = matrix.tocoo()
     places = own.as_tensor(np.stack([coordinates.row, coordinates.col]), device=values.device)
     weights = own.as_tensor(coordinates.data, dtype=values.dtype, device=values.device)
-    sparse = own.sparse_coo_tensor(places, weights, matrix.shape)
+    sparse = own.sparse_coo_tensor(places, weights, matrix.shape, check_invariants=False)
     return own.sparse.mm(sparse, values[:, None])[:, 0]
 
 
