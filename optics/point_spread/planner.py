@@ -191,7 +191,7 @@ def _seconds(option: Sampling, problem: Problem) -> float:
 
 
 def _bytes(option: Sampling, problem: Problem) -> float:
-    return option.bytes + window_bytes(problem)
+    return option.bytes + window_bytes(problem, option)
 
 
 def _cost(option: Sampling, problem: Problem) -> tuple[bool, float]:

@@ -7,6 +7,7 @@ import math
 from optics.methods.method_sampling import Sampling
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import LANES
+from optics.methods.window_sampling import WindowSampling
 from optics.numerics.accuracy import MOST_BYTES, MOST_SECONDS, AccuracyError, size_of
 from optics.numerics.cost import (
     CHECK_BYTES,
@@ -46,9 +47,13 @@ def check_seconds(problem: Problem, sampling: Sampling) -> float:
     return needed if samples < EFFORT.fewest else min(needed, most * sampling.seconds * slower)
 
 
-def window_bytes(problem: Problem) -> float:
-    """Return the peak memory [bytes] of all arrays that are as large as the window."""
-    each = OUTPUT_ARRAYS * ITEM_BYTES[problem.dtype] + (0.0 if problem.reach is not None else CHECK_BYTES)
+def window_bytes(problem: Problem, sampling: Sampling) -> float:
+    """Return the peak memory [bytes] of all arrays that are as large as the window.
+
+    The spot check sorts all samples of the window. `WindowSampling` has a check of a few rows instead.
+    """
+    sorts = problem.reach is None and not isinstance(sampling, WindowSampling)
+    each = OUTPUT_ARRAYS * ITEM_BYTES[problem.dtype] + (CHECK_BYTES if sorts else 0.0)
     return math.prod(problem.window.shape) * each
 
 

@@ -47,10 +47,12 @@ def test_a_window_costs_its_samples(dtype, symmetric):
     problem = problem_of(dtype=dtype, symmetric=symmetric)
     check = cost.CHECK_SYMMETRIC_SAMPLE if symmetric else cost.CHECK_SAMPLE
     assert window_cost.window_seconds(problem) == pytest.approx(600 * (cost.OUTPUT_SAMPLE[dtype] + check))
-    assert window_cost.window_bytes(problem) == 600 * (cost.OUTPUT_ARRAYS * cost.ITEM_BYTES[dtype] + cost.CHECK_BYTES)
+    assert window_cost.window_bytes(problem, sampling()) == 600 * (
+        cost.OUTPUT_ARRAYS * cost.ITEM_BYTES[dtype] + cost.CHECK_BYTES
+    )
     unchecked = problem_of(dtype=dtype, symmetric=symmetric, reach=1e-4)
     assert window_cost.window_seconds(unchecked) == pytest.approx(600 * cost.OUTPUT_SAMPLE[dtype])
-    assert window_cost.window_bytes(unchecked) == 600 * cost.OUTPUT_ARRAYS * cost.ITEM_BYTES[dtype]
+    assert window_cost.window_bytes(unchecked, sampling()) == 600 * cost.OUTPUT_ARRAYS * cost.ITEM_BYTES[dtype]
 
 
 @pytest.mark.parametrize("samples", [1, EFFORT.fewest - 1, EFFORT.fewest, EFFORT.few - 1, EFFORT.few, 10**6])
@@ -114,7 +116,7 @@ def test_half_of_the_tolerance_is_for_sampling():
 
 def test_limits_include_the_window():
     problem = problem_of()
-    seconds, size = window_cost.window_seconds(problem), window_cost.window_bytes(problem)
+    seconds, size = window_cost.window_seconds(problem), window_cost.window_bytes(problem, sampling())
     option = sampling(seconds=2.0, size=MOST_BYTES - size)
     assert planner._seconds(option, problem) == pytest.approx(2.0 + seconds)
     assert planner._within(option, problem, planner._seconds(option, problem))

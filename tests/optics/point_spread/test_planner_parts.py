@@ -16,7 +16,7 @@ def given(monkeypatch):
     """Return a function that chooses among given samplings, and the names of the methods that were planned."""
     monkeypatch.setattr(planner, "window_seconds", lambda problem: 0.0)
     monkeypatch.setattr(planner, "check_seconds", lambda problem, option: 0.0)
-    monkeypatch.setattr(planner, "window_bytes", lambda problem: 0.0)
+    monkeypatch.setattr(planner, "window_bytes", lambda *_: 0.0)
 
     def choose(options, method="auto", most_seconds=60.0, coarse=None, **changes):
         planned = []

@@ -96,7 +96,8 @@ def test_predicted_memory_has_the_right_size(shape, dtype, bent):
     pupil = Pupil(30e-6, BSplineRelief(1e-7 * np.eye(4)) if bent else None, thin_lens_focal_length=240e-6)
     beam = Beam(pupil, PointSource(), 550e-9, 240e-6)
     problem = Problem.from_beam(beam, Grid(shape, 2e-5 / max(shape)), 1e-3, dtype)
-    predicted = choose(problem)[1].bytes + window_bytes(problem)
+    chosen = choose(problem)[1]
+    predicted = chosen.bytes + window_bytes(problem, chosen)
     command = [sys.executable, "-c", MEASURE, repr((shape, dtype, bent))]
     peak = float(subprocess.run(command, capture_output=True, check=True, text=True).stdout)
     assert peak / 1.5 < predicted < 2.5 * peak
