@@ -1,6 +1,6 @@
 """Measurement of the speed of this machine.
 
-A few seconds of real training are timed, in as many processes at once as the run will have.
+A few seconds of real training are timed, at once in the number of processes that the run will have.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ def _slowest(paces: list[Pace]) -> Pace:
 def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
-    The first update has all passes over the samples, and the second update may have only half as many. The time of a
+    The first update has all passes over the samples, and the second update may have only half of them. The time of a
     pass follows from the difference between the times of the two updates.
 
     policy: path for the trained policy. Its folder belongs to the parent process, which removes it even after Ctrl-C

@@ -20,9 +20,9 @@ Tree = dict[str, Any]
 def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
     """Return the settings `tree`, with the start values of relief genes converted to the number of genes of the eyes.
 
-    The start values in `tree` may describe a whole relief of 4 x 4 points, by all its genes or by those of a symmetric
-    relief. If the eyes have more points, these values are converted to the same surface with more points. If reliefs
-    are symmetric, start values that follow from others are removed.
+    The start values in `tree` may describe a whole relief of 4 x 4 points, by all its genes or by the genes of a
+    symmetric relief. If the eyes have more points, these values are converted to the same surface with more points. If
+    reliefs are symmetric, start values that follow from others are removed.
 
     Raises:
         ConfigError: `tree` contains start values for more than 4 x 4 genes, and the eyes have more genes than that.
@@ -49,7 +49,7 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
 
 
 def _patches(eye: EyeConfig) -> list[list[str]]:
-    """Return the names of the genes of 4 x 4 heights: all of them, or only those of a symmetric relief."""
+    """Return the names of the genes of 4 x 4 heights: all of them, or only the genes of a symmetric relief."""
     return [representatives(PATCH, symmetric) for symmetric in (False, True)[: 1 + eye.relief_symmetric]]
 
 

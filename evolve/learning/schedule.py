@@ -45,7 +45,7 @@ def schedule(config: LearningConfig, steps: int) -> tuple[int, float]:
 def mean_passes(config: LearningConfig, begin: int, end: int) -> float:
     """Return the mean number of passes in the updates between the steps `begin` and `end`.
 
-    If there is no update between these steps, the result is the number of passes in the next update.
+    Without an update between these steps, the result is the number of passes in the next update.
     """
     rollout = config.n_envs * config.n_steps
     passes = [schedule(config, steps)[0] for steps in range(begin + rollout, max(end, begin + rollout) + 1, rollout)]

@@ -26,8 +26,7 @@ class Bitmap(ReadOnlyArrays):
     The pixels fill the square [-1, 1]² in pupil radii, and their edges are exact. `union` closes all parts outside the
     pupil's circle.
 
-    image: array (y, x) of n x n pixels, 1 or True where the shape is open, 0 or False where it is closed. y ascends
-        with the row.
+    image: array (y, x) of n x n pixels, 1 or True in open pixels, 0 or False in closed ones. y ascends with the row.
 
     Raises:
         ValueError: image is not square, has more than 512 pixels along a side or more than 4,000 edges, or contains a

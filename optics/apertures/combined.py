@@ -41,8 +41,8 @@ class Combined(Aperture):
         all others are subtracted from the first.
 
     Raises:
-        ValueError: the rule is unknown, an argument is not a shape, there is no shape (or only one, for a difference),
-            the open area is below 1e-9 squared pupil radii, or edges almost coincide.
+        ValueError: the rule is unknown, an argument is not a shape, shapes are missing (a difference needs two), the
+            open area is below 1e-9 squared pupil radii, or edges almost coincide.
     """
 
     rule: str
@@ -129,7 +129,7 @@ def hexagonal_segments(
 ) -> Combined:
     """Return a segmented mirror: rings of hexagons around a central hexagon.
 
-    The outermost corners, including those of omitted segments, lie on the pupil's rim.
+    The outermost corners, including the corners of omitted segments, lie on the pupil's rim.
 
     rings: number of rings, 0 to 12.
     gap: gap between neighbours, in units of the distance between their centres.

@@ -45,5 +45,6 @@ rays                 end points of rays in geometrical optics
 pupil_sampling       samples of the pupil for matrix products
 sine_samples         samples of the pupil that are evenly spaced in the sines of rays to the window
 sine_stack           such samples of several pupils at once
+single_stack         such samples of a single pupil as a stack of one, kept for further PSFs
 spectral_taper       the taper of a spectrum before grazing incidence
 """

@@ -21,7 +21,8 @@ from optics.elements.relief import BSplineRelief, HeightMap
 from optics.elements.spline_map import spline_weights
 from optics.elements.wavefront import WavefrontMap, Zernike
 from optics.methods.pixel_nodes import PixelNodes, WindowSamples
-from optics.methods.sine_stack import even_weights, single_stack
+from optics.methods.sine_stack import even_weights
+from optics.methods.single_stack import single_stack
 from optics.numerics.array_library import like, sparse_product
 from optics.numerics.autodiff import Array
 from optics.numerics.interpolation import chebyshev_points

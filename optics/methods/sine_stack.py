@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Protocol
 
 import numpy as np
 
@@ -18,13 +17,13 @@ from optics.apertures.circular import SoftAnnulus
 from optics.apertures.curved_disk import curved_ring
 from optics.elements.light_stack import LightStack
 from optics.methods.diffraction_kernel import FAR, diffraction_kernel, near_field
-from optics.methods.sine_samples import MOST_SQUARE, MOST_STRETCH, RIM, SineSamples
+from optics.methods.sine_samples import MOST_SQUARE, MOST_STRETCH, RIM
 from optics.numerics.array_library import turned
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 from optics.numerics.kept_values import KeptValues
 from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines", "single_stack"]
+__all__ = ["SineGeometry", "SineStack", "even_weights", "rim_sines"]
 
 # Choices for tables of the transmittance against r²: number of values per cycle of the edge, and of smoothed waves.
 PER_CYCLE, SMOOTHED_LEVELS = 1000, 16384
@@ -221,21 +220,6 @@ class SineStack(SineGeometry):
         """
         key = "to_middle", float(wavelength), dtype
         return np.asarray(self.known.get(key, lambda: turned(*self._to_middle(wavelength, *self.points), dtype)))
-
-
-class Stackable(Protocol):
-    def stack(self) -> SineStack: ...
-
-
-@lru_cache(maxsize=16)
-def single_stack(samples: SineSamples | Stackable) -> SineStack:
-    """Return the samples of a single pupil as a stack of one. Many PSFs have the same samples, so it is cached."""
-    if not isinstance(samples, SineSamples):
-        return samples.stack()
-    numbers = samples.distance, samples.steepest, samples.elsewhere, samples.edge.radius
-    distance, steepest, elsewhere, radius = (np.array([value]) for value in numbers)
-    edges = (samples.edge.aperture,)
-    return SineStack(distance, samples.centre, steepest, elsewhere, samples.at[None], edges, radius, np.zeros(1))
 
 
 def rim_sines(

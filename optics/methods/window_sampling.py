@@ -19,7 +19,8 @@ from optics.methods.pixel_nodes import WindowSamples, pixel_plan
 from optics.methods.problem import Problem
 from optics.methods.pupil_edge import PupilEdge
 from optics.methods.sine_samples import SineSamples
-from optics.methods.sine_stack import SineStack, single_stack
+from optics.methods.sine_stack import SineStack
+from optics.methods.single_stack import single_stack
 from optics.methods.slow_factor import Path, fourier_kernel, slow_factor
 from optics.methods.window_images import window_image_errors, window_images
 from optics.methods.window_plan import TIGHTEST, WindowPlan

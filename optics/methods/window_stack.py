@@ -17,7 +17,7 @@ from optics.elements.pupil_path import lens_path
 from optics.elements.source import PointSource
 from optics.methods.pixel_nodes import WindowSamples
 from optics.methods.sampled_path import sampled_height, sampled_wavefront
-from optics.methods.sine_stack import single_stack
+from optics.methods.single_stack import single_stack
 from optics.methods.slow_factor import Path
 from optics.methods.window_check import window_errors
 from optics.methods.window_sampling import WindowSampling

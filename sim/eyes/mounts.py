@@ -9,11 +9,21 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean, finite, in_range, items, of_kind, one_of, reals, shown, whole
+from optics.numerics.arguments import (
+    LARGEST,
+    did_you_mean,
+    finite,
+    in_range,
+    items,
+    of_kind,
+    one_of,
+    reals,
+    shown,
+    whole,
+)
 
 EXAMPLE = "sim.Mount('head')"
 MOST_EYES = 10_000  # chosen limit for the eyes of a fan or ring
-LONGEST = 1e15  # [m] chosen limit for the radius of a ring
 KINDS = ("site", "camera", "body")  # kinds of objects among which a name is searched, in this order
 # Axes (ahead, left, up) in the frame of the object that carries the eye, as rows. In the frame of a body or site, x
 # points ahead and z up. MuJoCo's cameras look along -z, with x to the right.
@@ -144,7 +154,7 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
     Raises:
         ValueError: an argument is invalid.
     """
-    return fan(Mount(on, offset=(in_range("radius", radius, 0, LONGEST), 0.0, 0.0)), n_eyes, placement_range_deg)
+    return fan(Mount(on, offset=(in_range("radius", radius, 0, LARGEST), 0.0, 0.0)), n_eyes, placement_range_deg)
 
 
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:

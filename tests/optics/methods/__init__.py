@@ -37,6 +37,7 @@ method_sampling: point_spread/test_planner.py
 scalar_theory: test_scalar_theory.py
 sine_samples: test_sine_samples.py
 sine_stack: test_sine_stack.py
+single_stack: test_kept_plans.py
 smooth_pupil: test_smooth_spectrum.py
 smooth_spectrum: test_smooth_spectrum.py, eye/test_steep_reliefs.py
 smythe: point_spread/test_vector_focus.py

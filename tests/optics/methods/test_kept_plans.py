@@ -9,9 +9,11 @@ import optics
 from optics.elements import light_geometry
 from optics.elements.beam import Beam
 from optics.elements.light_stack import LightStack
-from optics.methods import sine_stack, window_geometry
+from optics.methods import single_stack, window_geometry
+from optics.methods.problem import Problem
 from optics.methods.window_images import window_image_errors
 from optics.methods.window_plan import WindowPlan
+from optics.methods.window_sampling import window_sampling
 
 WAVEFRONT = optics.Zernike({(3, 1): 0.08, (2, 0): 0.05, (4, -2): 0.03})
 LENS = optics.Pupil(100e-6, wavefront=WAVEFRONT, thin_lens_focal_length=1.5e-3)
@@ -55,7 +57,7 @@ def found(name):
 
 
 def forget():
-    for cached in (light_geometry._kept, window_geometry._kept, sine_stack.single_stack):
+    for cached in (light_geometry._kept, window_geometry._kept, single_stack._small, single_stack._large):
         cached.cache_clear()
 
 
@@ -116,3 +118,23 @@ def test_rays_are_kept_for_one_geometry():
         factor = geometry.ray_factor(21, *map(np.array, zip(numbers)))
         rows.append((*factor.samples.steepest, *factor.samples.elsewhere))
     assert rows == [(0.1, 0.02), (0.1, 0.03), (0.2, 0.03), (0.1, 0.02)]
+
+
+@pytest.mark.parametrize(("side", "kept"), [(256, 16), (257, 1)])
+def test_few_stacks_of_many_samples_are_kept(side, kept):
+    """A stack keeps arrays of all its samples."""
+    forget()
+    pupil = sampling_of(LENS).pupil
+    stacks = [
+        single_stack.single_stack(replace(pupil, grid=optics.Grid((side, side), 1e-4 + 1e-6 * i))) for i in range(16)
+    ]
+    again = single_stack.single_stack(replace(pupil, grid=optics.Grid((side, side), 1e-4)))
+    assert (again is stacks[0]) == (kept == 16)
+    counts = [cached.cache_info().currsize for cached in (single_stack._small, single_stack._large)]
+    assert counts == [16, 0] if kept == 16 else counts == [0, 1]
+
+
+def sampling_of(pupil):
+    """Return the samples of a PSF of this pupil."""
+    beam = Beam(pupil, optics.PointSource(), 550e-9, 1.5e-3)
+    return window_sampling(Problem.from_beam(beam, optics.Grid((33, 33), 1e-6), 1e-2))

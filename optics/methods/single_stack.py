@@ -1,0 +1,48 @@
+"""Samples of a single pupil as a stack of one, kept for further PSFs with the same samples.
+
+A stack keeps arrays that do not depend on the light (`SineStack.known`), which grow with the number of samples.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+
+from optics.methods.sine_samples import SineSamples
+from optics.methods.sine_stack import SineStack
+from optics.numerics.grid import Grid
+
+__all__ = ["single_stack"]
+
+LARGE = 2**16  # choice, limited by memory: 16 stacks are kept up to this number of samples, else one
+
+
+class Stackable(Protocol):
+    """Samples that return their own stack, such as `PixelNodes`."""
+
+    @property
+    def grid(self) -> Grid: ...
+
+    def stack(self) -> SineStack: ...
+
+    def __hash__(self) -> int: ...
+
+
+def single_stack(samples: SineSamples | Stackable) -> SineStack:
+    """Return the samples of a single pupil as a stack of one."""
+    return (_large if math.prod(samples.grid.shape) > LARGE else _small)(samples)
+
+
+def _stack(samples: SineSamples | Stackable) -> SineStack:
+    if not isinstance(samples, SineSamples):
+        return samples.stack()
+    numbers = samples.distance, samples.steepest, samples.elsewhere, samples.edge.radius
+    distance, steepest, elsewhere, radius = (np.array([value]) for value in numbers)
+    edges = (samples.edge.aperture,)
+    return SineStack(distance, samples.centre, steepest, elsewhere, samples.at[None], edges, radius, np.zeros(1))
+
+
+_small, _large = (lru_cache(maxsize=count)(_stack) for count in (16, 1))
