@@ -17,7 +17,9 @@ from optics.numerics.grid import Grid
 
 __all__ = ["single_stack"]
 
-LARGE = 2**16  # choice, limited by memory: 16 stacks are kept up to this number of samples, else one
+# Choice, limited by memory (about 200 MB): 16 stacks are kept up to this number of samples. Of larger ones two are kept,
+# because a PSF and its check have different samples.
+LARGE = 2**17
 
 
 class Stackable(Protocol):
@@ -45,4 +47,4 @@ def _stack(samples: SineSamples | Stackable) -> SineStack:
     return SineStack(distance, samples.centre, steepest, elsewhere, samples.at[None], edges, radius, np.zeros(1))
 
 
-_small, _large = (lru_cache(maxsize=count)(_stack) for count in (16, 1))
+_small, _large = (lru_cache(maxsize=count)(_stack) for count in (16, 2))
