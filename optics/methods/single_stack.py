@@ -17,8 +17,8 @@ from optics.numerics.grid import Grid
 
 __all__ = ["single_stack"]
 
-# Choice, limited by memory (about 200 MB): 16 stacks are kept up to this number of samples. Of larger ones two are kept,
-# because a PSF and its check have different samples.
+# Choice, limited by memory (about 200 MB): 16 stacks are kept up to this number of samples. Of larger stacks, two are
+# kept, because a PSF and its check have different samples.
 LARGE = 2**17
 
 
