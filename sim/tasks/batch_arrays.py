@@ -98,8 +98,10 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
         raise ValueError(
             f"judge: the term {outcome.terms.names[place]!r} is {value} in world {row % n}: must be finite"
         )
-    require_worlds("judge: changed", outcome.changed, n)
-    require_worlds("judge: failure", outcome.failure, n)
+    if np.size(outcome.changed):  # rarely
+        require_worlds("judge: changed", outcome.changed, n)
+    if outcome.failure:
+        require_worlds("judge: failure", outcome.failure, n)
 
 
 def require_worlds(where: str, named: Iterable[Any], n: int) -> None:

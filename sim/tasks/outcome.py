@@ -31,7 +31,8 @@ class RewardTerms:
     """
 
     def __init__(self, names: Sequence[str], terms: np.ndarray) -> None:
-        if isinstance(names, str) or not is_sized(names):
+        # Built-in tasks pass tuples in each step, which need no further check.
+        if not isinstance(names, tuple) and (isinstance(names, str) or not is_sized(names)):
             raise ValueError(f"names = {shown(names)}: must be the names of the terms, such as ('goal',)")
         self.names, self.terms = tuple(names), terms  # (term, row)
         is_table = isinstance(terms, np.ndarray) and terms.ndim == 2 and terms.dtype.kind in "biuf"
