@@ -1,8 +1,8 @@
 """Whole populations: PSFs per CPU second and their errors
 
 How many PSFs of different eyes can be computed per CPU second, and how accurately? At a tolerance of 0.01, `psf_batch`
-computes 2487 PSFs per CPU second with a median error of 4.9e-04, and `psf` computes 270 with the same error. The
-fastest peer, prysm with 32 samples, computes 2397 with a median error of 6.9e-03. Only rhabdom predicts the error of
+computes 2633 PSFs per CPU second with a median error of 4.9e-04, and `psf` computes 261 with the same error. The
+fastest peer, prysm with 32 samples, computes 2929 with a median error of 6.9e-03. Only rhabdom predicts the error of
 each PSF, which takes a part of its time.
 
 **Method.** The eyes resemble the eyes in an evolutionary search: pupil radii of 15 to 40 µm, a relief of 4 x 4 control
@@ -21,12 +21,11 @@ new pupil. The lens has a numerical aperture of 0.067 and a focal length of 22.2
 their plans share what does not depend on the wavefront. In the column "other", the pitch changes with each PSF, and
 nothing is shared. The goals are for the column "same". The error is the distance from a PSF at a tolerance of 1e-5.
 
-**Limits.** The first table was measured on an idle core. The second one was measured beside ten other programs on two
-cores, which lengthens CPU times. The other codes cannot share a plan between the eyes of a population. Unlike
-`optics.psf`, they also have no exact propagator whose output grid can be chosen freely. Their matrix Fourier transform
-from the pupil to the focal plane is used instead. This transform equals Fresnel's integral if the phase kr²/2z is added
-to the field in the pupil. The errors of these codes therefore come from the paraxial model, and from the hard or grey
-edge of the sampled pupil.
+**Limits.** Both tables were measured in one run on an idle machine. The other codes cannot share a plan between the eyes
+of a population. Unlike `optics.psf`, they also have no exact propagator whose output grid can be chosen freely. Their
+matrix Fourier transform from the pupil to the focal plane is used instead. This transform equals Fresnel's integral if
+the phase kr²/2z is added to the field in the pupil. The errors of these codes therefore come from the paraxial model,
+and from the hard or grey edge of the sampled pupil.
 
     python -m validation.peers.population_speed [--eyes N] [--without-peers] [--out DIR] [--docs DIR]
 """
