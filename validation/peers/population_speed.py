@@ -21,11 +21,11 @@ new pupil. The lens has a numerical aperture of 0.067 and a focal length of 22.2
 their plans share what does not depend on the wavefront. In the column "other", the pitch changes with each PSF, and
 nothing is shared. The goals are for the column "same". The error is the distance from a PSF at a tolerance of 1e-5.
 
-**Limits.** Both tables were measured in one run on an idle machine. The other codes cannot share a plan between the eyes
-of a population. Unlike `optics.psf`, they also have no exact propagator whose output grid can be chosen freely. Their
-matrix Fourier transform from the pupil to the focal plane is used instead. This transform equals Fresnel's integral if
-the phase kr²/2z is added to the field in the pupil. The errors of these codes therefore come from the paraxial model,
-and from the hard or grey edge of the sampled pupil.
+**Limits.** Both tables were measured in one run on an idle machine. The other codes cannot share a plan between the
+eyes of a population. Unlike `optics.psf`, they also have no exact propagator whose output grid can be chosen freely.
+Their matrix Fourier transform from the pupil to the focal plane is used instead. This transform equals Fresnel's
+integral if the phase kr²/2z is added to the field in the pupil. The errors of these codes therefore come from the
+paraxial model, and from the hard or grey edge of the sampled pupil.
 
     python -m validation.peers.population_speed [--eyes N] [--without-peers] [--out DIR] [--docs DIR]
 """
