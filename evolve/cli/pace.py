@@ -112,7 +112,7 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of processes. If an exception leaves the context, they are terminated instead of awaited.
+    """Yield a pool of processes. If an exception leaves the context, the processes are terminated, not awaited.
 
     Jobs must be submitted within `interrupts_held`, so that only the parent receives Ctrl-C.
     """

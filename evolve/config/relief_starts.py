@@ -49,7 +49,7 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
 
 
 def _patches(eye: EyeConfig) -> list[list[str]]:
-    """Return the names of the genes of 4 x 4 heights: all of them, or only the genes of a symmetric relief."""
+    """Return the gene of each of 4 x 4 heights: without symmetry and, if reliefs are symmetric, with symmetry."""
     return [representatives(PATCH, symmetric) for symmetric in (False, True)[: 1 + eye.relief_symmetric]]
 
 

@@ -237,7 +237,7 @@ def _brain() -> list[Gene]:
 
 
 def _spectra() -> list[Gene]:
-    """Return the genes for the number of receptor types and for the peak sensitivity of each.
+    """Return the genes for the number of receptor types and for the wavelength at which each type absorbs most.
 
     The template of pigment spectra in `optics` was measured for peaks from 357 to 620 nm, and accepts peaks from 330 to
     700 nm.

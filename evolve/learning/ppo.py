@@ -1,4 +1,4 @@
-"""PPO of stable-baselines3 (SB3) on batched worlds. Training ends early if returns no longer improve.
+"""PPO of stable-baselines3 (SB3) in many worlds at once. Training ends early if returns no longer improve.
 
 `evolve.config.settings.LearningConfig` defines the settings and their ranges.
 """

@@ -1,4 +1,4 @@
-"""Recording of an episode for the viewer Rerun, which opens it with `rerun FILE.rrd`. It needs the extra `rerun`.
+"""Recording of an episode for the viewer Rerun. `rerun FILE.rrd` opens it. The extra `rerun` must be installed.
 
 A recording has two timelines: `action` is the number of the action, and `time` is the time in the world [s]. The
 recording has the following entities.
