@@ -44,7 +44,7 @@ class Coincidences:
         return self.lifts.get(geom, 0.0)
 
     def message(self, model: mujoco.MjModel) -> str | None:
-        """Return a text that warns of coinciding geoms of different groups, such as collision and visual geoms, else None."""
+        """Return a warning if geoms of different groups coincide (such as collision and visual ones), or None."""
         found = [pair for pair in self.pairs if len(set(model.geom_group[list(pair)])) > 1]
         if not found:
             return None
@@ -125,7 +125,7 @@ def _points(data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom: int, apart: float) -> bool:
-    """Return whether any of the points is closer than `apart` to a geom's surface, and the normals there are nearly parallel.
+    """Return whether any of the points is closer than `apart` to a geom's surface, with nearly parallel normals.
 
     points, normals: points of another surface [m], and its normals there, unit vectors, in the world's frame, (n, 3)
     apart: distance [m]

@@ -2,8 +2,8 @@
 
 Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle, sphere, cylinder, disk). Geoms
 for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated, and so are long planes and spheres with
-cube textures. Ellipsoids are tessellated, too, because Mitsuba intersects its own ellipsoids in float32, with wrong hit points on small, flat or
-distant ellipsoids.
+cube textures. Ellipsoids are tessellated, too, because Mitsuba intersects its own ellipsoids in float32, with wrong hit
+points on small, flat or distant ellipsoids.
 """
 
 from __future__ import annotations
