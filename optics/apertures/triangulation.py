@@ -84,7 +84,7 @@ def triangles(vertices: np.ndarray) -> np.ndarray:
 
 
 def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bool:
-    """Return whether the corner a, b, c turns left and its triangle contains no other corner.
+    """Return whether the corner a, b, c turns left or is straight, and its triangle contains no other corner.
 
     left: indices of the corners of the remaining polygon.
     """

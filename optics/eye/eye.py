@@ -233,7 +233,7 @@ class Eye(EyeSpec):
             kernels within the tolerance.
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside their
             range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
-            last call are kept. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
+            last call are cached. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
         polarization: (degree, angle_deg) of the light, for an eye with microvilli. These are the degree of linear
             polarisation in [0, 1], and the angle of the electric field, from right towards up. Each is a number or an
             array (band,), (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do

@@ -146,7 +146,7 @@ WindowSamples = SineSamples | PixelNodes
 
 
 class PixelPlan(NamedTuple):
-    """Nodes, finer nodes of the check, rank of the slow factor, half width [m] of its points, time [s] and memory."""
+    """Nodes, finer nodes for `window_check`, rank of the slow factor, half width [m] of its points, time and memory."""
 
     pupil: PixelNodes
     finer: PixelNodes

@@ -1,6 +1,6 @@
 """The part of a plan for a window that depends neither on reliefs, wavefronts and masks nor on the tolerance.
 
-Users often compute many PSFs of one window whose wavefronts differ. The geometry of a single beam is therefore kept.
+Users often compute many PSFs of one window whose wavefronts differ. The geometry of a single beam is therefore cached.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class PathSlopes(NamedTuple):
 
 
 class PlannedRays(NamedTuple):
-    """Points of the pupils whose rays determine the rank.
+    """Points of the pupils whose rays determine the rank of the slow factor.
 
     some: which of the `disk_points` they are.
     at: points (x, y) [m] relative to the middle of the window, (beam, ray).
@@ -143,7 +143,7 @@ class WindowGeometry:
 
 
 def window_geometry(stack: LightStack, window: Grid) -> WindowGeometry:
-    """Return the geometry of light and a window. That of a single beam is kept."""
+    """Return the geometry of light and a window. The geometry of a single beam is cached."""
     light = stack.geometry
     return _kept(light, window) if len(stack.beams) == 1 else WindowGeometry(light, window)
 

@@ -123,7 +123,7 @@ def path_rounding(problem: Problem, darkness: float) -> float:
 
 
 def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
-    """Return the number of digits by which the amplitude in the window is below that of all light in phase.
+    """Return by how many digits the window's amplitude is below the amplitude that all light in phase would have.
 
     If the light of the whole aperture (area A) arrived in phase, its amplitude would be U = A/(λz), and the PSF U²/A =
     A/(λz)². The error of the direct sum is proportional to this U. The digits are those of the amplitude, half of those
