@@ -29,7 +29,7 @@ Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (b
 
 @dataclass(frozen=True)
 class Description:
-    """Limits of an eye in white daylight, near its axis. Frequencies [cycles/degree] are in the visual field.
+    """Limits of an eye in white daylight, in the middle of its field. Frequencies [cycles/degree] are visual angles.
 
     relative_aperture: a, the pupil's diameter relative to that of a pupil with a throughput of 1.
     throughput: a², times the open fraction of the aperture's disk, times the mask's transmission.

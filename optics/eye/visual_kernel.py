@@ -42,7 +42,7 @@ class _WindowNeeds:
 
     half_window: half side [m] of the window around the geometric image.
     pitch: pitch [m] that resolves the PSF.
-    band: frequency [1/m] above which the spectrum of the PSF is below the tolerance.
+    band: frequency [1/m] beyond which light behind the pupil may be omitted, within the tolerance.
     half_of_rays: half side [m] of a window that contains the hit points of rays, without diffraction.
     """
 

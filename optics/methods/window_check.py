@@ -71,7 +71,7 @@ def window_errors(
 
 @dataclass(frozen=True, eq=False)
 class _CheckSums:
-    """Sums over samples of pupils in rows and columns of a window. Parts that do not depend on the light are kept.
+    """Sums over samples of pupils in rows and columns of a window. Parts independent of the light are cached.
 
     The slow factor, divided by its values A along both axes, is interpolated from a few points (ξ_a, η_b) of the pupil
     with weights L_a and L_b:

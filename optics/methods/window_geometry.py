@@ -138,7 +138,7 @@ class WindowGeometry:
 
     @cached_property
     def known(self) -> KeptValues:
-        """Values that depend on the geometry and on their key."""
+        """Cached values that depend on the geometry and on their key."""
         return KeptValues(KEPT)
 
 

@@ -1,4 +1,4 @@
-"""Fraction of the pupil's light that arrives on an unbounded plane. The rest is evanescent."""
+"""Fraction of the pupil's light that arrives on an unbounded plane. A mask absorbs the rest, or it is evanescent."""
 
 from __future__ import annotations
 
