@@ -17,7 +17,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
-    """Return the indices of the first two edges that intersect elsewhere than at a shared end; None if none do."""
+    """Return the indices of the first two edges that intersect elsewhere than at a shared end; None without any."""
     n = len(vertices)
     along = np.roll(vertices, -1, axis=0) - vertices
     following = np.roll(along, -1, axis=0)

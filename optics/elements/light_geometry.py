@@ -87,7 +87,7 @@ class LightGeometry:
 
     @cached_property
     def _slopes(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Known results of `slopes`, by the number of points across the pupil."""
+        """Cached results of `slopes`, by the number of points across the pupil."""
         return {}
 
 

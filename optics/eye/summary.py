@@ -124,7 +124,7 @@ class Description:
         return "\n".join(f"{name:<20}{value}" for name, value in rows.items())
 
     def _vertical_rows(self, bound: str) -> dict[str, str]:
-        """Return rows on the vertical direction, unless receptors are square."""
+        """Return table rows on the vertical direction; none if receptors are square."""
         if math.isclose(self.interommatidial_vertical_deg, self.interommatidial_angle_deg, rel_tol=1e-9):
             return {}
         apart = f"rows of receptors {self.interommatidial_vertical_deg:.3g}° apart"

@@ -146,7 +146,12 @@ WindowSamples = SineSamples | PixelNodes
 
 
 class PixelPlan(NamedTuple):
-    """Nodes, finer nodes for `window_check`, rank of the slow factor, half width [m] of its points, time and memory."""
+    """Nodes for a pupil of pixels, and what follows from them.
+
+    finer: finer nodes for `window_check`.
+    rank, half: rank of the slow factor, and half width [m] of the square of its interpolation points.
+    seconds, bytes: predicted time and memory.
+    """
 
     pupil: PixelNodes
     finer: PixelNodes

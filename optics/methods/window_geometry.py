@@ -44,12 +44,12 @@ class PathSlopes(NamedTuple):
 class PlannedRays(NamedTuple):
     """Points of the pupils whose rays determine the rank of the slow factor.
 
-    some: which of the `disk_points` they are.
+    some: their indices in `disk_points`.
     at: points (x, y) [m] relative to the middle of the window, (beam, ray).
-    scale: distance to the window [m] for a slope of 1, (beam, ray).
+    scale: displacement [m] of a ray on its way to the window for a slope of 1, (beam, ray).
     blur: distance [m] by which diffraction spreads the light, (beam, 1).
     directions: sines of the lines from the middle of the window, relative to those of the pupil's centre, (beam, ray).
-    sine2: sum of their squares.
+    sine2: sum of the squares of both sines, (beam, ray).
     """
 
     some: slice
