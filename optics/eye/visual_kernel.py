@@ -145,6 +145,9 @@ def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retin
     """Return the result of `compute` for the area that the light reaches.
 
     If `compute` refuses a steep relief, the area is limited to the longer or else to the shorter side of the retina.
+
+    Raises:
+        AccuracyError: `compute` fails for each area. The error is that for the first one.
     """
     errors: list[AccuracyError] = []
     for most in (math.inf, max(retina.size), min(retina.size)):
@@ -168,6 +171,9 @@ def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
 
     most: largest half side [m]. If it is the longer side of the retina, the area contains the light that arrives at any
         receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
+
+    Raises:
+        CellsError: the area has too many cells.
     """
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)

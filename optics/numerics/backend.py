@@ -190,6 +190,8 @@ def _write_cache(content: dict[str, Any]) -> None:
 def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm | None, list[Llvm]]:
     """Return the first usable LLVM library among `paths` (default: `candidates()`), and all test results up to it.
 
+    The library is None if none is usable.
+
     cached: True to use test results of former processes.
     """
     tried: list[Llvm] = []
