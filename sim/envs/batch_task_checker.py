@@ -38,7 +38,7 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     - After a stored state has been restored, the same actions have the same results.
 
     Raises:
-        ValueError: the task does not behave as described, is no `sim.BatchTask`, or a number is out of range. The
+        ValueError: the task does not behave as described, is not a `sim.BatchTask`, or a number is out of range. The
             message states the method, the array, the world, and the correct behaviour.
         RuntimeError: the task changes the model of all worlds, or the model enables MuJoCo's "sleep".
 

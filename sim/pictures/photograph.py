@@ -38,7 +38,7 @@ def read_photograph(path: str | Path) -> np.ndarray:
     """Read an image file as sRGB values (y, x, 3) in [0, 1], rotated according to its EXIF orientation.
 
     Raises:
-        ValueError: `path` is no path; or the file is no image, is damaged or too large, has transparency, or has
+        ValueError: `path` is not a path; or the file is not an image, is damaged or too large, has transparency, or has
             neither three channels of 8 bits nor a palette.
         OSError: the file cannot be read.
     """

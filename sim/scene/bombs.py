@@ -35,7 +35,7 @@ OWNERS = {"geom": "geom", "body": "body", "mat": "material", "light": "light"}
 def require_modest(text: str, name: str) -> None:
     """Refuse MJCF with more than 20,000 elements, or with a height field of more than 4096² cells.
 
-    Text that is no XML is ignored; MuJoCo refuses it.
+    Text that is not XML is ignored; MuJoCo refuses it.
 
     Raises:
         ValueError: there are too many elements, or too many cells in a height field. The message states their number.
