@@ -24,7 +24,7 @@ def lint(config: RunConfig) -> list[str]:
 
 
 def coarse_bands(config: RunConfig) -> list[str]:
-    """Return a warning if the error of signals, which is due to few spectral bands, exceeds a receptor's noise.
+    """Return a warning if signals have errors above a receptor's noise because there are too few spectral bands.
 
     Errors up to 0.001 of the signal of a white surface are ignored. The result is a list with one line, or [].
 

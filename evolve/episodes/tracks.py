@@ -79,9 +79,9 @@ def tracks(
 
 
 class _Watcher:
-    """Records positions of the animal and of objects while episodes are played.
+    """Recorder of the positions of the animal and of objects while episodes are played.
 
-    worlds: environments in which they are played
+    worlds: environments in which the episodes are played
     mount: place of the animal's first eye, on whose body, site or camera the animal's position is measured
     """
 

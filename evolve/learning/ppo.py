@@ -1,4 +1,4 @@
-"""PPO of stable-baselines3 (SB3) on batched worlds. Training ends early if returns no longer improve.
+"""PPO of stable-baselines3 (SB3) in many worlds at once. Training ends early if returns no longer improve.
 
 `evolve.config.settings.LearningConfig` defines the settings and their ranges.
 """
@@ -228,7 +228,7 @@ def train(
 
     After every `eval_interval` steps, the policy plays one episode in each of the evaluation worlds. Training ends
     after `patience` evaluations without a better mean return, or after `total_steps`. The result is the policy at the
-    evaluation with the highest mean return, or at the earliest of several.
+    evaluation with the highest mean return; if several evaluations share it, at the earliest.
 
     seed: seed of initial weights, exploration and mini-batches, and of the evaluation worlds
     progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
