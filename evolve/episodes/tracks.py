@@ -11,8 +11,8 @@ from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
 from evolve.learning.final_figures import require_fit
+from evolve.learning.played_episodes import Episodes, play
 from evolve.learning.policy import EyePolicy
-from evolve.learning.ppo import Episodes, play
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.mounts import Mount

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from evolve.learning.ppo import Episodes
+    from evolve.learning.played_episodes import Episodes
     from sim.tasks.encounter import Frozen
     from sim.tasks.task import Task
 
