@@ -76,7 +76,8 @@ def psf(
     pixel_means: True for the mean of the PSF over each square pixel of side dx, as a sensor measures it. False for the
         samples of `optics.psf`.
     requires_grad: True to raise a ValueError if no tensor requires a gradient.
-    device: device of the result. None: the device of the tensors that require gradients, or the CPU without any.
+    device: device of the result, and of the computation if no tensor requires a gradient. None: the device of the
+        tensors that require gradients, or the CPU without any.
     view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.
 
     Returns a tensor (pupil, distance, wavelength, y, x) [1/m²], float32 unless dtype="float64". It has an axis of
@@ -84,7 +85,7 @@ def psf(
     has the device and the precision of its tensor. Only first derivatives are available.
 
     At tolerances of 3e-4 or more, the source distances and wavelengths of a pupil share a plan and samples. One call
-    for all of them is then much faster than separate calls.
+    for all of them is then much faster than separate calls. It computes on the device of the tensors.
 
     A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
 

@@ -23,6 +23,9 @@ __all__ = [
     "torch_place",
 ]
 
+# Types of devices for whose tensors the processor computes: "mps" has no double precision, and "meta" no numbers.
+ON_PROCESSOR = ("cpu", "mps", "meta")
+
 
 class Once(torch.autograd.Function):
     """The identity; an attempt to compute its second derivative raises an error."""
@@ -131,26 +134,25 @@ def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
 def computing_device(numbers: Mapping[str, torch.Tensor], otherwise: torch.device) -> torch.device:
     """Return the device on which PyTorch computes with these tensors.
 
-    It is the device of the tensors with axes. If they have several, or there are none, it is `otherwise`. If this is
-    the processor, but Dr.Jit computes on a GPU, it is the GPU.
+    It is the device of the tensors with axes. If they have several, or there are none, it is `otherwise`. If it is
+    one of ON_PROCESSOR, the device of Dr.Jit is returned.
     """
     places = {tensor.device for tensor in numbers.values() if tensor.ndim or tensor.device.type != "cpu"}
     found = places.pop() if len(places) == 1 else otherwise
-    return found if found.type != "cpu" else torch.device(torch_place())
+    return torch.device(torch_place()) if found.type in ON_PROCESSOR else found
 
 
 def plain_numbers(numbers: Mapping[str, torch.Tensor]) -> dict[str, Any]:
     """Return the numbers of tensors by name, without derivatives, as NumPy arrays or numbers.
 
-    Those of tensors on another device than the processor are copied together, because the program waits for each copy.
+    Those of tensors on a GPU are copied together, because the program waits for each copy.
     """
-    away = {name: tensor for name, tensor in numbers.items() if tensor.device.type != "cpu" and not is_known(tensor)}
+    away = {name: t for name, t in numbers.items() if t.device.type not in ON_PROCESSOR and not is_known(t)}
+    copied: dict[str, Any] = {}
     if len(away) > 1 and len({tensor.device for tensor in away.values()}) == 1:
         flat = torch.cat([tensor.detach().double().reshape(-1) for tensor in away.values()]).cpu().numpy()
         parts = np.split(flat, np.cumsum([tensor.numel() for tensor in away.values()])[:-1])
         copied = {name: part.reshape(away[name].shape)[()] for name, part in zip(away, parts, strict=True)}
-    else:
-        copied = {}
     return {name: copied[name] if name in copied else plain(tensor)[()] for name, tensor in numbers.items()}
 
 
