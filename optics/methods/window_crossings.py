@@ -1,9 +1,9 @@
 """Crossings of a few rows and columns, at which the check of a PSF computes it (`window_check`).
 
-Rows are drawn at even steps of their cumulative probability. This is a mixture of four distributions. The first is
-uniform. The second is proportional to the square root of the intensity, like the error of the intensity if the error of
-the amplitude is the same everywhere. The third favours the brightest samples and their neighbours, and the last the
-sides of the window, where phases change fastest.
+Rows are drawn at even steps of their cumulative probability. The probability is a mixture of four distributions. The
+first is uniform. The second is proportional to the square root of the intensity, like the error of the intensity if the
+error of the amplitude is the same everywhere. The third favours the brightest samples and their neighbours, and the
+last the sides of the window, where phases change fastest.
 """
 
 from __future__ import annotations
