@@ -149,7 +149,7 @@ class Zernike(Aberration):
 
     def ahead(self, x: Array, y: Array) -> Array:
         if library(x).__name__ != "drjit" and on_host(x) and not carries_derivative(x):
-            return self.ahead_at(*map(on_processor, (x, y)), x)
+            return self.ahead_at(on_processor(x), on_processor(y), x)
         total = like(x, 0.0)
         for n, m in self._named:
             total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
