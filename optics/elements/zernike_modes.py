@@ -47,9 +47,9 @@ def _jacobi(order: int, highest: int, t: Any) -> Iterator[Any]:
 
 
 def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: Any) -> Any:
-    """Return Σ w Z_n^m at (x, y) for weights w of the modes `named`, (n, m).
+    """Return Σ w Z_n^m at (x, y), with one weight w for each mode (n, m) in `named`.
 
-    Unless they are too large, the polynomials are cached, since many wavefronts are evaluated at the same points.
+    The polynomials are cached unless they have too many values, since many wavefronts are evaluated at the same points.
 
     weights, x, y: arrays of NumPy or PyTorch, in float64. Positions carry no derivatives.
     """
