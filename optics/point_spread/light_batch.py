@@ -13,8 +13,9 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.window_stack import WindowStack
 from optics.numerics.arguments import is_sized, items, pair
-from optics.numerics.autodiff import Array, Scalar, number
+from optics.numerics.autodiff import Array, Scalar, entries, number
 from optics.numerics.grid import Grid
+from optics.point_spread.coarse_stack import coarse_stack
 from optics.point_spread.psf import psf
 from optics.point_spread.request import sensor_place
 
@@ -54,8 +55,8 @@ class LightBatch:
                 f"{counts['source_distance']}: must be of equal length, because they are used pairwise"
             )
         count = next(iter(counts.values()), 1)
-        sensors, sources = (tuple(row) if name in counts else (row,) * count for name, row in rows.items())
-        angle = pair("source_angle", source_angle, "angles (x, y) [rad]")
+        sensors, sources = (tuple(entries(row)) if name in counts else (row,) * count for name, row in rows.items())
+        angle = pair("source_angle", entries(source_angle), "angles (x, y) [rad]")
         for source in sources:
             PointSource(source, angle)
         return cls(several, tuple(zip(sensors, sources, strict=True)), angle)
@@ -78,6 +79,28 @@ class LightBatch:
             found.append(psf(pupil, wavelengths, sensor, source, self.angle, **view).tensor)
         flat: Array = dr.concat([tensor.array for tensor in found])
         return type(found[0])(flat, (len(found), *found[0].shape))
+
+    def coarse_images(
+        self,
+        fixed: LightBatch,
+        wavelengths: np.ndarray,
+        view: Mapping[str, Any],
+        convert: Callable[[np.ndarray], Array],
+    ) -> dict[int, Array]:
+        """Return {index of a member: its PSFs (wavelength, y, x)} for members that stacks compute accurately enough.
+
+        fixed: the same light without derivatives.
+        convert: see `stacks`.
+        """
+        found: dict[int, Array] = {}
+        asked = wavelengths, Grid(view["shape"], view["dx"], view["centre"]), view["dtype"]
+        both = zip(self.stacks(*asked, convert), fixed.stacks(*asked, np.asarray), strict=True)
+        for (places, own), (_, without) in both:
+            part = coarse_stack(own, without, view["tolerance"], view["method"])
+            if part is not None:
+                images, met = part[0], np.all(part[1], axis=1)
+                found |= {place: image for place, image, right in zip(places, images, met, strict=True) if right}
+        return found
 
     def stacks(
         self, wavelengths: np.ndarray, window: Grid, dtype: str, convert: Callable[[np.ndarray], Array]
