@@ -118,7 +118,7 @@ def torch_place() -> str:
 
 
 def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
-    """Return the device of all tensors, or the CPU without any; ValueError if they differ.
+    """Return the device of all tensors, or the CPU if there are none; ValueError if their devices differ.
 
     Single numbers on the CPU fit any device.
     """

@@ -27,7 +27,7 @@ class LightBatch:
     """Light through several pupils, for several distances. All numbers may carry derivatives.
 
     pupils: the pupils.
-    distances: pairs of the sensor's and the source's distance [m].
+    distances: pairs of the sensor's and the source's distance [m]. The sensor's may be None, see `optics.psf`.
     angle: direction (x, y) [rad] in which the light travels.
     """
 
@@ -40,7 +40,7 @@ class LightBatch:
         """Return the light for a pupil or a sequence of pupils, and for distances that are numbers or sequences.
 
         Raises:
-            ValueError: something else is given, a sequence is empty, or two rows differ in length.
+            ValueError: something else is given, a sequence is empty, or the sequences of distances differ in length.
         """
         several = items("pupil", pupil, Pupil, "Pupil(25e-6)") if is_row(pupil) else (pupil,)
         items("pupil", several, Pupil, "Pupil(25e-6)")
@@ -122,7 +122,7 @@ class LightBatch:
         return found
 
     def cutoff(self, wavelengths: np.ndarray) -> float:
-        """Return the highest frequency [1/m] of all intensities; see `PSFResult.cutoff`."""
+        """Return an upper bound on the frequencies [1/m] of all intensities; see `PSFResult.cutoff`."""
         slopes = [
             1 / math.hypot(1, number(sensor_place(pupil, sensor, source)) / pupil.radius)
             for pupil, sensor, source in self.members
@@ -132,5 +132,5 @@ class LightBatch:
 
 
 def is_row(value: Any) -> bool:
-    """Return whether `value` is a sequence or an array with entries, as opposed to a number."""
+    """Return whether `value` is a sequence or an array with at least one axis, as opposed to a number."""
     return is_sized(value) and not isinstance(value, str)
