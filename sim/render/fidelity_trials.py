@@ -104,10 +104,7 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """Return a function that maps areas per receptor to errors, see `errors`.
-
-        The errors include the noise of the reference.
-        """
+        """Return a function that maps areas per receptor to errors, with the reference's noise; see `errors`."""
         populations = self._populations(sampling)
         truths = [
             self._signals(self._truth(sampling, p.receptors), sampling.depth, light, p.views, TRUE_RAYS)
