@@ -98,7 +98,7 @@ class PupilSampling:
         if (1 + FADE) * limit < band:
             band, kept = (1 + FADE) * limit, limit
         passed: tuple[float, float, float] = (turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH
-        soft = SoftPixels.of_pupil(pupil, *passed, stop.alignment) if pixels else pupil.aperture.soften(*passed)
+        soft = SoftPixels.from_pupil(pupil, *passed, stop.alignment) if pixels else pupil.aperture.soften(*passed)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         grid = Grid.square(2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1, pitch)
         if field is not None:

@@ -27,7 +27,7 @@ from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES, AccuracyError
 from optics.numerics.array_library import like
-from optics.numerics.autodiff import grad_enabled, is_differentiable
+from optics.numerics.autodiff import carries_derivative, grad_enabled
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.precision import Precision, padded_for_packets
@@ -58,7 +58,7 @@ class SoftPixels:
     alignment: Alignment
 
     @classmethod
-    def of_pupil(
+    def from_pupil(
         cls, pupil: Pupil, passband: float, ripple: float, widest_reach: float, alignment: Alignment
     ) -> SoftPixels:
         """Return the filter that leaves frequencies up to `passband` unchanged along x and y, to within `ripple`.
@@ -69,8 +69,10 @@ class SoftPixels:
             ValueError: the radius of the pupil carries a derivative.
             AccuracyError: the pixels need too many nodes.
         """
-        if is_differentiable(pupil.aperture_radius):
-            raise ValueError("aperture_radius: must be a plain number for a PixelRelief in a system, without derivative")
+        if carries_derivative(pupil.aperture_radius):
+            raise ValueError(
+                "aperture_radius: must be a plain number for a PixelRelief in a system, without derivative"
+            )
         stretch = _stretch(alignment)
         edge = SoftEdge.cheapest(stretch * passband, ripple, widest_reach / stretch, pupil.aperture.half_widths)
         parts, most = 1, MOST_SAMPLES // pupil.pixels
@@ -155,9 +157,7 @@ class _Filter:
         orders = np.arange(-(most := math.ceil(edge.stopband * period)), most + 1)
         step = -2j * np.pi / period
         response = edge.line_response(orders / period) / period
-        from_nodes, back, onto = (
-            np.exp(step * np.multiply.outer(orders, at)) for at in (nodes, -shifts, -samples)
-        )
+        from_nodes, back, onto = (np.exp(step * np.multiply.outer(orders, at)) for at in (nodes, -shifts, -samples))
         dtype = types.complex_dtype
         return cls(None, (from_nodes.astype(dtype), (response[:, None] * back).astype(dtype), onto.T.astype(dtype)))
 
