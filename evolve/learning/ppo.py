@@ -263,8 +263,13 @@ def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 
 
-def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
+def play(
+    policy: EyePolicy, worlds: VecEnv, seed: int, watch: Callable[[np.ndarray], None] | None = None
+) -> Episodes:
     """Reset all worlds with this seed, and play one episode in each; the policy acts without exploration.
+
+    watch: function that is called before each action with a mask (world,), True for worlds whose episode has not ended;
+        None: no function
 
     Raises:
         TrainingDiverged: actions or returns are not finite.
@@ -276,6 +281,8 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
     task = batch_task_of(worlds)
     verdicts: list[bool | None] = [None] * worlds.num_envs
     while playing.any():
+        if watch is not None:
+            watch(playing)
         action, _ = policy.predict(observation, deterministic=True)
         observation, reward, done, infos = worlds.step(action)
         returns[playing] += reward[playing]
