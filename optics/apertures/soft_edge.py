@@ -86,7 +86,8 @@ class SoftEdge:
         """Return the spectrum of `line` at frequencies from -`stopband` to `stopband`; 1 at frequency 0."""
         nodes, weights = self._line_nodes
         wave: np.ndarray = np.cos(2 * pi * np.multiply.outer(frequencies, nodes))
-        return wave @ (weights * self._bare_line(nodes)) / self._line_integral
+        found: np.ndarray = wave @ (weights * self._bare_line(nodes)) / self._line_integral
+        return found
 
     @cached_property
     def _line_nodes(self) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +102,8 @@ class SoftEdge:
     def _bare_line(self, x: np.ndarray) -> np.ndarray:
         """Return the result of `line` without normalisation."""
         window = np.i0(self.beta * np.sqrt(np.maximum(1 - (x / self.reach) ** 2, 0)))
-        return np.sinc((self.passband + self.stopband) * x) * window
+        found: np.ndarray = np.sinc((self.passband + self.stopband) * x) * window
+        return found
 
     @cached_property
     def _odd_series(self) -> Chebyshev:

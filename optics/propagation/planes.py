@@ -97,7 +97,8 @@ class PupilSampling:
         limit = rays + settings.margin / pupil.radius
         if (1 + FADE) * limit < band:
             band, kept = (1 + FADE) * limit, limit
-        passed: tuple[float, float, float] = (turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH
+        soft: SoftAperture | SoftPixels
+        passed = (turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH
         soft = SoftPixels.from_pupil(pupil, *passed, stop.alignment) if pixels else pupil.aperture.soften(*passed)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         grid = Grid.square(2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1, pitch)
