@@ -140,7 +140,7 @@ def test_batches_pass_pixels():
 
 
 def test_backward_light_is_the_adjoint_of_forward_light():
-    """With the forward map F of fields of finite extent and the backward map B, <v, F u> = <B v, u>."""
+    """The forward map F and the backward map B of fields of finite extent fulfil <v, F u> = <B v, u>."""
     at = (np.arange(65) - 32) * DX
     u, v = (
         np.exp(-np.add.outer((at - y) ** 2, (at - x) ** 2) / (4e-6) ** 2).astype(complex)
