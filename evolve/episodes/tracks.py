@@ -11,8 +11,8 @@ from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
 from evolve.learning.final_figures import require_fit
+from evolve.learning.played_episodes import Episodes, play
 from evolve.learning.policy import EyePolicy
-from evolve.learning.ppo import Episodes, play
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.mounts import Mount
@@ -79,9 +79,9 @@ def tracks(
 
 
 class _Watcher:
-    """Records positions of the animal and of objects while episodes are played.
+    """Recorder of the positions of the animal and of objects while episodes are played.
 
-    worlds: environments in which they are played
+    worlds: environments in which the episodes are played
     mount: place of the animal's first eye, on whose body, site or camera the animal's position is measured
     """
 

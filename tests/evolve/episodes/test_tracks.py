@@ -10,8 +10,8 @@ from evolve.config.assemble import assemble
 from evolve.episodes.tracks import _Watcher, tracks
 from evolve.learning.animal_task import animal_task
 from evolve.learning.final_figures import UnfitPolicy, final_episodes
+from evolve.learning.played_episodes import Episodes
 from evolve.learning.policy import PolicyConfig, build_policy, load_policy
-from evolve.learning.ppo import Episodes
 from sim.envs.prepared_task import PreparedTask
 from tests.evolve.small_run import PHENOTYPE
 
