@@ -20,6 +20,7 @@ from optics.methods.sampled_path import sampled_height, sampled_wavefront
 from optics.methods.single_stack import single_stack
 from optics.methods.slow_factor import Path
 from optics.methods.window_check import window_errors
+from optics.methods.window_crossings import WindowCrossings
 from optics.methods.window_sampling import WindowSampling
 from optics.methods.window_sums import intensity_of, window_field
 from optics.numerics.array_library import library, like, turned
@@ -60,18 +61,20 @@ class WindowStack:
         images = [self._image(light, sampling, path) for path, light in lights]
         return library(images[0]).stack(images, 1) / self.pupil.area
 
-    def errors(self, sampling: WindowSampling, images: np.ndarray, tolerance: float) -> np.ndarray:
+    def errors(self, sampling: WindowSampling, images: Array, tolerance: float) -> Array:
         """Return the relative L2 error of each PSF over the window, see `window_errors`, (source, wavelength).
 
-        images: result of `intensity` as a NumPy array. The stack carries no derivatives.
+        images: result of `intensity` without derivatives, in the library and on the device of `convert`.
         tolerance: tolerance of the PSFs.
         """
-        seen, finer = np.moveaxis(images * self.pupil.area, 1, 0), single_stack(sampling.finer)
-        found = [
-            window_errors(finer, path, light * finer.to_middle(path.wavelength, self.dtype), own, tolerance)
-            for path, light, own in zip(self._paths, self._light(sampling.finer), seen, strict=True)
-        ]
-        return np.stack(found, 1)
+        seen, finer = (images * self.pupil.area).swapaxes(0, 1), single_stack(sampling.finer)
+        crossings, count = WindowCrossings.from_images(seen.reshape(-1, *seen.shape[2:])), len(self.sources)
+        found = []
+        for place, (path, light) in enumerate(zip(self._paths, self._light(sampling.finer), strict=True)):
+            own = crossings.part(slice(place * count, (place + 1) * count))
+            arriving = light * self.convert(finer.to_middle(path.wavelength, self.dtype))
+            found.append(window_errors(finer, path, arriving, own, tolerance))
+        return library(images).stack(found, 1)
 
     @property
     def _paths(self) -> list[Path]:
