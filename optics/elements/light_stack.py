@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.elements.light_geometry import FEW, MANY, LightGeometry, disk_points, light_geometry
+from optics.elements.light_geometry import FEW, MANY, RIM, LightGeometry, disk_points, light_geometry
 from optics.elements.pupil_path import relief_height, wavefront_ahead
 from optics.elements.pupil_polynomials import power_sum, powers_of
 from optics.numerics.autodiff import number
@@ -22,6 +22,8 @@ __all__ = ["LightStack", "StackSlopes"]
 SPHERE_POINTS = (
     8  # choice: number of Chebyshev points across the pupil for spheres, in addition to those of polynomials
 )
+STEEP_POWERS = 5  # choice: number of powers from which on the slopes of polynomials beyond the rim are considered
+TILT_STEP = 1e-3  # choice: step [radii] of the slopes of oblique waves
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,11 +203,7 @@ class LightStack:
         coefficients, others = self._polynomials
         pieces = {place: self.beams[place].pupil.pieces(self.beams[place].wavelength) for place in others}
         across = MANY if any(4 * count > FEW for count in pieces.values()) else FEW
-        grid, x, y = disk_points(across)
-        by_x, by_y = _power_slopes(across, coefficients.shape[1])
-        flat, scale = coefficients.reshape(len(coefficients), -1), (self.vacuum_wavelength / self.radius)[:, None]
-        spheres_x, spheres_y = self.geometry.slopes(across)
-        along_x, along_y = flat @ by_x * scale + spheres_x, flat @ by_y * scale + spheres_y
+        (grid, x, y), (along_x, along_y) = disk_points(across), self._smooth_slopes(across)
         for place in range(len(self.beams)):
             if place in others or self._tilted[place]:
                 inside = np.hypot(grid[None, :], grid[:, None]) <= 1
@@ -218,6 +216,31 @@ class LightStack:
                     )
                     along[place] += ((ahead - behind) / (2 * step))[inside]
         return StackSlopes(across, x, y, along_x, along_y)
+
+    @cached_property
+    def rim_slopes(self) -> StackSlopes | None:
+        """Slopes on circles about the rim, beyond which polynomials of high order are steep.
+
+        None if there are no such polynomials. Slopes of maps are omitted.
+        """
+        if self._polynomials[0].shape[1] < STEEP_POWERS:
+            return None
+        _, x, y = disk_points(RIM)
+        along_x, along_y = self._smooth_slopes(RIM)
+        for place in np.flatnonzero(self._tilted):
+            source, index, radius = self.beams[place].source, self._indices[place][1], self.radius[place]
+            for along, (dx, dy) in ((along_x, (TILT_STEP, 0.0)), (along_y, (0.0, TILT_STEP))):
+                ahead, behind = (source.path((x + s * dx) * radius, (y + s * dy) * radius) for s in (1, -1))
+                along[place] += index * (ahead - behind) / (2 * TILT_STEP * radius)
+        return StackSlopes(RIM, x, y, along_x, along_y)
+
+    def _smooth_slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the slopes of polynomials and of spheres about the axis at `disk_points`, along x and along y."""
+        coefficients = self._polynomials[0]
+        by_x, by_y = _power_slopes(across, coefficients.shape[1])
+        flat, scale = coefficients.reshape(len(coefficients), -1), (self.vacuum_wavelength / self.radius)[:, None]
+        spheres_x, spheres_y = self.geometry.slopes(across)
+        return flat @ by_x * scale + spheres_x, flat @ by_y * scale + spheres_y
 
 
 def _powers(values: np.ndarray, count: int) -> np.ndarray:

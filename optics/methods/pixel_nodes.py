@@ -8,7 +8,7 @@ lens, wavefront and path requires for an average point of the window. Light behi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -16,7 +16,6 @@ import numpy as np
 
 from optics.apertures.pixelated import MOST_NODES
 from optics.elements.beam import Beam
-from optics.elements.light_stack import LightStack
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PixelSamples
 from optics.methods.remaining_factor import RemainingFactor
@@ -30,8 +29,10 @@ from optics.numerics.array_library import turned
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.kept_values import cached_arrays
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import gauss_legendre
+from optics.numerics.read_only import read_only
 
 __all__ = ["PixelNodes", "PixelPlan", "WindowSamples", "pixel_plan"]
 
@@ -39,6 +40,7 @@ QUADRATURE_SHARE = 0.7  # choice: part of the tolerance that quadrature errors m
 PARTS = 0.25, 0.5, 0.75  # choice: open parts of pixels that the edge of the aperture cuts
 LARGEST = 50.0  # largest phase [rad] of the table of errors, for which all numbers of nodes are too small
 PHASES = np.linspace(0, LARGEST, 4001)
+MOST_BYTES = 64e6  # choice, limited by memory: all nodes that are cached
 POINTS = 40  # choice: number of points of the pupil that determine the rank
 
 
@@ -74,13 +76,13 @@ class PixelNodes:
     @property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
         """Nodes (x, y) [m], (y, x)."""
-        x, y = np.meshgrid(self.nodes.at, self.nodes.at)
+        x, y, _ = self.layout
         return x, y
 
     @property
     def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Nodes x and y [m], and their weights [m²], (y, x)."""
-        return *self.points, self.nodes.aperture.weights(self.nodes.across) * self.nodes.radius**2
+        return _layout(self.nodes)
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (x, y) [m] of the pupil in directions (s, t)."""
@@ -128,7 +130,7 @@ class PixelStack(SineStack):
 
     @cached_property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
-        x, y = np.meshgrid(self.nodes.at, self.nodes.at)
+        x, y, _ = _layout(self.nodes)
         return x[None], y[None]
 
     def _cosine2(self, dtype: str = "float64") -> np.ndarray:
@@ -140,6 +142,13 @@ class PixelStack(SineStack):
     def _new_sizes(self, dtype: str) -> np.ndarray:
         weight = self.nodes.aperture.weights(self.nodes.across)[None] * np.square(self.radius[0])
         return np.asarray(weight * self._cosine2() / self.distance[0], dtype)
+
+
+@cached_arrays(MOST_BYTES, lambda layout: sum(part.nbytes for part in layout))
+def _layout(nodes: PixelSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return `PixelNodes.layout`, which many pupils share."""
+    x, y = np.meshgrid(nodes.at, nodes.at)
+    return read_only(x), read_only(y), read_only(nodes.aperture.weights(nodes.across) * nodes.radius**2)
 
 
 WindowSamples = SineSamples | PixelNodes
@@ -179,7 +188,7 @@ def _across(problem: Problem) -> int | None:
     Pixels that the edge of the aperture cuts have larger errors. See `_squared_errors`.
     """
     assert problem.pixelated is not None
-    level = LightStack((replace(problem.light, pupil=problem.light.pupil.level),))
+    level = problem.level
     slopes, geometry = level.slopes, window_geometry(level, problem.window)
     path = geometry.to_middle(slopes.across)
     rays = np.stack([slopes.along_x + path.along_x, slopes.along_y + path.along_y]).ravel() * path.cycles[0, 0]

@@ -44,6 +44,8 @@ def sampled_height(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Ar
     convert: function that converts a NumPy array to the library of the computation, NumPy or PyTorch.
     """
     relief = pupil.height
+    if relief is None:
+        return None
     if isinstance(relief, PixelRelief) and isinstance(samples, PixelNodes):
         numbers = like(convert(np.zeros(0)), relief.samples).reshape(-1)
         return sparse_product(_pixel_weights(samples), numbers).reshape(samples.grid.shape)
@@ -59,6 +61,8 @@ def sampled_wavefront(pupil: Pupil, samples: WindowSamples, convert: Convert) ->
     See `sampled_height`.
     """
     wavefront = pupil.wavefront
+    if wavefront is None:
+        return None
     if isinstance(wavefront, WavefrontMap):
         return _of_map(wavefront, wavefront.radius or pupil.radius, samples, convert)
     powers = wavefront.order + 1 if isinstance(wavefront, Zernike) and wavefront.order <= HIGHEST_ORDER else None

@@ -12,6 +12,7 @@ directions of the rays at the edge.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
@@ -21,6 +22,7 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH, SoftAperture
 from optics.apertures.circular import Annulus, Circle
 from optics.apertures.soft_edge import SoftEdge
+from optics.elements.light_geometry import ANGLES
 from optics.elements.light_stack import LightStack
 from optics.elements.wavefront import Zernike
 from optics.methods.window_geometry import WindowGeometry
@@ -40,7 +42,8 @@ NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
 # Choices: the same spread for light behind maps, whose fine detail diffracts light away from its rays. Cycles at a
 # tolerance of 0.01, the same relative to those of the rays at the edge, and exponent of the tolerance.
 MAPPED_CYCLES, MAPPED_RIM_CYCLES, MAPPED_EXPONENT = 4.0, 3.0, -0.4
-RIM_CYCLES = 1.2  # choice: cycles of most of the rays of the edge, relative to their median
+CIRCLE, OUTER, OUTER_SHARE = 0, 1, 0.9
+RIM_SHARE = 0.9  # choice: share of the rays of the edge whose light the soft edge must not change
 # Choices for PSFs that carry derivatives, to which points near the edge contribute as much as others. The soft edge is
 # then narrow: ripples as above, passband relative to the stopband; cycles per radius at a tolerance of 0.01, the same
 # relative to those of the rays at the edge, exponent of the tolerance, and cycles per cell between knots.
@@ -83,7 +86,8 @@ class WindowEdges:
     @cached_property
     def edges(self) -> list[SoftAperture]:
         """Soft apertures of the samples, (beam,)."""
-        wide = partial(self._wide, self._choice[1].passband, self._ripples(self.curvature)[0])
+        bands = self._choice[1]
+        wide = partial(self._wide, bands.passband, bands.stopband, self._ripples(self.curvature)[0])
         return self._unless_mapped(wide, partial(self._narrow, self.density, CARRIED_RIPPLES[0]))
 
     @cached_property
@@ -93,8 +97,10 @@ class WindowEdges:
 
     def _finer_wide(self) -> list[SoftAperture]:
         bands, ripple = self._choice[1], self._ripples(self.curvature)[1]
-        passband = np.maximum(FINER * self.density - bands.around - _transitions(ripple), bands.passband)
-        return self._wide(np.minimum(passband, SHARPER * bands.passband), ripple)
+        stopband = FINER * self.density - bands.around
+        narrow = np.minimum(stopband * bands.passband / bands.stopband, stopband - _transitions(ripple))
+        passband = np.clip(narrow, bands.passband, SHARPER * bands.passband)
+        return self._wide(passband, stopband * bands.sharp, ripple)
 
     def _unless_mapped(
         self, wide: Callable[[], list[SoftAperture]], narrow: Callable[[], list[SoftAperture]]
@@ -147,17 +153,23 @@ class WindowEdges:
         if curved:
             off = [np.abs(part - bend * at) for part, at in zip(self._to_middle, (slopes.x, slopes.y), strict=True)]
             rest = np.maximum(*off)
-        at_rim = _medians(rest[:, rim])
+        at_rim = 1.2 * _medians(rest[:, rim])
+        beyond = self._beyond
+        steep = at_rim
+        if beyond is not None:
+            steep = np.maximum(at_rim, _quantiles(beyond[:, CIRCLE], RIM_SHARE))
         if self.derivatives is not None:
-            return self._carried(at_rim, cycles + self._reach(along))
+            return self._carried(_medians(rest[:, rim]), cycles + self._reach(along))
         # Light from the edge matters near the middle of the window, and other light in the whole window.
-        near = np.where(curvature != 0, cycles, np.minimum(cycles, NEAR_CYCLES)) + RIM_CYCLES * at_rim
+        near = np.where(curvature != 0, cycles, np.minimum(cycles, NEAR_CYCLES)) + steep
         passband = near + EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
         if curved:
             bent = np.abs(bend) * np.hypot(slopes.x, slopes.y)
             passband = np.maximum(passband, np.where(along <= (cycles + SPREAD_CYCLES)[:, None], bent, 0).max(axis=1))
         stopband = passband + _transitions(self._ripples(curvature)[0])
         reach = self._reach(np.where(bent > stopband[:, None], 0, along) if curved else along)
+        if beyond is not None:
+            reach = np.maximum(reach, _quantiles(beyond[:, OUTER], OUTER_SHARE))
         spread: np.ndarray | float = SPREAD_CYCLES
         if mapped.any():
             detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * _medians(along[:, rim])
@@ -165,7 +177,8 @@ class WindowEdges:
         density = self._masks + np.maximum(cycles + reach + spread, near + stopband)
         if mapped.any():
             density = np.maximum(density, np.where(mapped, self._widest, 0))
-        return _Bands(density, passband, near)
+        spare = np.maximum((density - self._masks - near) / stopband, 1.0)
+        return _Bands(density, spare * passband, spare * stopband, near, (spare > 1.0).astype(float))
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> _Bands:
         """Return the bands of light that carries derivatives.
@@ -181,7 +194,8 @@ class WindowEdges:
         sharp = sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT
         density = np.maximum(direct + sharp + self._masks, self._widest)
         density = 2.0 ** (np.ceil(CARRIED_STEPS * np.log2(density) - 1e-9) / CARRIED_STEPS)
-        return _Bands(density, np.zeros_like(density), np.zeros_like(density))
+        none = np.zeros_like(density)
+        return _Bands(density, none, none, none, none)
 
     @property
     def _widest(self) -> np.ndarray:
@@ -214,6 +228,15 @@ class WindowEdges:
         return np.asarray(np.maximum(*map(np.abs, self._to_middle)))
 
     @cached_property
+    def _beyond(self) -> np.ndarray | None:
+        slopes = self.stack.rim_slopes
+        if slopes is None:
+            return None
+        path = self.geometry.to_middle(slopes.across)
+        x, y = (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
+        return np.maximum(np.abs(x), np.abs(y)).reshape(len(x), -1, ANGLES)
+
+    @cached_property
     def _to_middle(self) -> tuple[np.ndarray, np.ndarray]:
         """Cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
         slopes = self.stack.slopes
@@ -233,10 +256,11 @@ class WindowEdges:
         share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0)
         return np.asarray(share**RIPPLE_EXPONENT)
 
-    def _wide(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
+    def _wide(self, passband: np.ndarray, stopband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
         """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""
         passband = 2.0 ** (np.ceil(EDGES * np.log2(passband) - 1e-9) / EDGES)
-        return self._soft(passband, passband + _transitions(ripples), ripples)
+        stopband = 2.0 ** (np.floor(EDGES * np.log2(np.maximum(stopband, 1e-9)) + 1e-9) / EDGES)
+        return self._soft(passband, np.maximum(stopband, passband + _transitions(ripples)), ripples)
 
     def _narrow(self, density: np.ndarray, ripple: float) -> list[SoftAperture]:
         """Return soft apertures that are as narrow as a density of samples allows."""
@@ -261,12 +285,14 @@ class _Bands:
 
     density: np.ndarray
     passband: np.ndarray
+    stopband: np.ndarray
     around: np.ndarray
+    sharp: np.ndarray
 
     def where(self, chosen: np.ndarray, other: _Bands) -> _Bands:
         """Return these bands for chosen beams, and others for all other beams."""
-        pairs = (self.density, other.density), (self.passband, other.passband), (self.around, other.around)
-        return _Bands(*(np.where(chosen, own, their) for own, their in pairs))
+        names = "density", "passband", "stopband", "around", "sharp"
+        return _Bands(*(np.where(chosen, getattr(self, name), getattr(other, name)) for name in names))
 
 
 def _medians(values: np.ndarray) -> np.ndarray:
@@ -275,6 +301,12 @@ def _medians(values: np.ndarray) -> np.ndarray:
     first = (values.shape[1] - 1) // 2
     ordered = np.partition(values, sorted({first, last}), axis=1)
     return np.asarray((ordered[:, first] + ordered[:, last]) / 2)
+
+
+def _quantiles(values: np.ndarray, share: float) -> np.ndarray:
+    """Return the values of rows that a share of them does not exceed."""
+    place = math.ceil(share * values.shape[1]) - 1
+    return np.asarray(np.partition(values, place, axis=1)[:, place])
 
 
 def _transitions(ripples: np.ndarray) -> np.ndarray:

@@ -80,9 +80,10 @@ class WindowStack:
 
     def _light(self, samples: WindowSamples) -> Iterator[Array]:
         """Yield the light behind the pupil times the areas of the samples, (source, η, ξ), for each wavelength."""
-        pupil, (x, y, _) = self.pupil, samples.layout
+        pupil = self.pupil
         height, ahead = (found(pupil, samples, self.convert) for found in (sampled_height, sampled_wavefront))
         if pupil.mask is not None:
+            x, y, _ = samples.layout
             amplitude = pupil.amplitude(self.convert(x / pupil.radius), self.convert(y / pupil.radius))
         for wavelength in self.wavelengths:
             light = self._straight(samples, wavelength)
