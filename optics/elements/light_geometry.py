@@ -14,11 +14,10 @@ import numpy as np
 
 from optics.numerics.read_only import read_only
 
-__all__ = ["ANGLES", "FEW", "MANY", "RIM", "LightGeometry", "disk_points", "light_geometry"]
+__all__ = ["FEW", "MANY", "RIM", "LightGeometry", "disk_points", "light_geometry"]
 
 FEW, MANY = 21, 53  # choices: points across the pupil at which slopes are evaluated, without and with fine detail
-RIM = 0  # stands for points on circles instead of points across the pupil, see `disk_points`
-CIRCLES, ANGLES = (1.0, 1.035, 1.1), 48  # choices: radii of these circles, and number of points on each
+RIM, ANGLES = 0, 48  # stands for points on the rim, see `disk_points`; choice: number of these points
 
 
 @dataclass(frozen=True)
@@ -105,12 +104,11 @@ def _kept(beam: tuple[float, ...]) -> LightGeometry:
 def disk_points(across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return positions along an axis, and points (x, y) of the square grid inside the unit disk.
 
-    across: number of points across the disk. RIM: ANGLES points on each of several circles about the rim instead, and
-        no positions along an axis.
+    across: number of points across the disk. RIM: points on the rim instead, and no positions along an axis.
     """
     if across == RIM:
-        r, angle = np.meshgrid(CIRCLES, 2 * np.pi * np.arange(ANGLES) / ANGLES, indexing="ij")
-        return read_only(np.empty(0)), read_only((r * np.cos(angle)).ravel()), read_only((r * np.sin(angle)).ravel())
+        angle = 2 * np.pi * np.arange(ANGLES) / ANGLES
+        return read_only(np.empty(0)), read_only(np.cos(angle)), read_only(np.sin(angle))
     grid = np.linspace(-1, 1, across)
     x, y = np.meshgrid(grid, grid)
     inside = np.hypot(x, y) <= 1

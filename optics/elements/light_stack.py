@@ -22,7 +22,7 @@ __all__ = ["LightStack", "StackSlopes"]
 SPHERE_POINTS = (
     8  # choice: number of Chebyshev points across the pupil for spheres, in addition to those of polynomials
 )
-STEEP_POWERS = 5  # choice: number of powers from which on the slopes of polynomials beyond the rim are considered
+STEEP_POWERS = 5  # choice: number of powers from which on polynomials are much steeper at the rim than elsewhere
 TILT_STEP = 1e-3  # choice: step [radii] of the slopes of oblique waves
 
 
@@ -200,7 +200,7 @@ class LightStack:
     @cached_property
     def slopes(self) -> StackSlopes:
         """Slopes of the wavefronts at some points of the disks, which may miss the steepest point."""
-        coefficients, others = self._polynomials
+        others = self._polynomials[1]
         pieces = {place: self.beams[place].pupil.pieces(self.beams[place].wavelength) for place in others}
         across = MANY if any(4 * count > FEW for count in pieces.values()) else FEW
         (grid, x, y), (along_x, along_y) = disk_points(across), self._smooth_slopes(across)
@@ -219,7 +219,7 @@ class LightStack:
 
     @cached_property
     def rim_slopes(self) -> StackSlopes | None:
-        """Slopes on circles about the rim, beyond which polynomials of high order are steep.
+        """Slopes at points on the rim, where polynomials of high order are steepest.
 
         None if there are no such polynomials. Slopes of maps are omitted.
         """

@@ -29,6 +29,7 @@ window_edges         soft edges and densities of these samples, smoothed waves o
 window_rank          rank of the slow factor for the samples of `window_plan`
 window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         several sources and wavelengths through one pupil, from the same samples
+stack_operation      these PSFs as one operation of PyTorch, with the derivatives by the phase of the pupil
 pixel_nodes          nodes of pupils of pixels, for `low_rank` at coarse tolerances
 sampled_path         reliefs and wavefronts at samples of the pupil, from arrays that many pupils share
 window_check         error of such PSFs, by a sum over other samples in a few places

@@ -22,7 +22,7 @@ from optics.methods.remaining_factor import RemainingFactor
 from optics.methods.sine_samples import SineSamples
 from optics.methods.sine_stack import SineStack
 from optics.methods.slow_factor import RANKS, Path
-from optics.methods.window_geometry import window_geometry
+from optics.methods.window_geometry import half_window, window_geometry
 from optics.methods.window_plan import MOST_ENTRIES, plan_costs
 from optics.methods.window_rank import MOST_RANK, PLACES, RANK_OF_DISTANCE, RANK_SHARE, interpolation_errors
 from optics.numerics.array_library import turned
@@ -174,12 +174,12 @@ def pixel_plan(problem: Problem) -> PixelPlan | None:
         PixelNodes(PixelSamples(aperture, count, problem.radius), problem.window.centre, problem.distance)
         for count in (across, across + 1)
     )
-    rank = _rank(problem, pupil)
+    rank = _rank(pupil, Path.from_problem(problem), problem.tolerance, RANK_OF_DISTANCE if problem.moves else 1)
     inner = 0 if rank is None else rank * len(pupil.at)
     if rank is None or max(inner, len(finer.at)) > math.sqrt(MOST_ENTRIES):
         return None
     seconds, needed = plan_costs(problem.window, rank, len(pupil.at), len(finer.at))
-    return PixelPlan(pupil, finer, rank, window_geometry(problem.stack, problem.window).half, seconds, needed)
+    return PixelPlan(pupil, finer, rank, half_window(problem.window), seconds, needed)
 
 
 def _across(problem: Problem) -> int | None:
@@ -218,21 +218,25 @@ def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
     return found[0], np.mean(found[1:], axis=0)
 
 
-def _rank(problem: Problem, pupil: PixelNodes) -> int | None:
-    """Return the rank that is sufficient on average over pupil and window; None if it is too large."""
-    half = window_geometry(problem.stack, problem.window).half
+@lru_cache(maxsize=64)
+def _rank(pupil: PixelNodes, path: Path, tolerance: float, least: int) -> int | None:
+    """Return the rank that is sufficient on average over pupil and window; None if it is too large.
+
+    least: smallest rank.
+    """
+    half = half_window(path.window)
     # Points on a spiral cover a disk evenly.
     turn, r = np.arange(POINTS) * (math.sqrt(5) - 1), np.sqrt((np.arange(POINTS) + 0.5) / POINTS)
-    x, y = (problem.radius * r * part(np.pi * turn) for part in (np.cos, np.sin))
-    stack, path = pupil.stack(), Path.from_problem(problem)
+    x, y = (pupil.nodes.radius * r * part(np.pi * turn) for part in (np.cos, np.sin))
+    stack = pupil.stack()
     s, t = stack.directions(x[None, None, :], y[None, None, :])
     factor = RemainingFactor(path, stack, (s, t))
     side = half * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
     across, down = (at.reshape(1, -1, 1) for at in np.meshgrid(side, side))
     place = across, down
-    exact, least = factor.at(place), RANK_OF_DISTANCE if problem.moves else 1
+    exact = factor.at(place)
     for rank in (each for each in RANKS if least <= each <= MOST_RANK):
         nodes = half * chebyshev_points(rank)
-        if interpolation_errors(factor, place, np.ones(1), nodes, exact)[0] < RANK_SHARE * problem.tolerance / 2:
+        if interpolation_errors(factor, place, np.ones(1), nodes, exact)[0] < RANK_SHARE * tolerance / 2:
             return rank
     return None

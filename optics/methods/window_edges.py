@@ -12,7 +12,6 @@ directions of the rays at the edge.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
@@ -22,7 +21,6 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH, SoftAperture
 from optics.apertures.circular import Annulus, Circle
 from optics.apertures.soft_edge import SoftEdge
-from optics.elements.light_geometry import ANGLES
 from optics.elements.light_stack import LightStack
 from optics.elements.wavefront import Zernike
 from optics.methods.window_geometry import WindowGeometry
@@ -42,8 +40,10 @@ NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
 # Choices: the same spread for light behind maps, whose fine detail diffracts light away from its rays. Cycles at a
 # tolerance of 0.01, the same relative to those of the rays at the edge, and exponent of the tolerance.
 MAPPED_CYCLES, MAPPED_RIM_CYCLES, MAPPED_EXPONENT = 4.0, 3.0, -0.4
-CIRCLE, OUTER, OUTER_SHARE = 0, 1, 0.9
-RIM_SHARE = 0.9  # choice: share of the rays of the edge whose light the soft edge must not change
+RIM_CYCLES = 1.2  # choice: cycles of most of the rays of the edge, relative to their median
+# Choices for polynomials of high order, of which some rays of the edge are much steeper than the median: share of the
+# points on the rim whose rays may be steeper than assumed, at a tolerance of 0.01, and exponent of the tolerance.
+RIM_MISSED, MISSED_EXPONENT = 0.1, 0.6
 # Choices for PSFs that carry derivatives, to which points near the edge contribute as much as others. The soft edge is
 # then narrow: ripples as above, passband relative to the stopband; cycles per radius at a tolerance of 0.01, the same
 # relative to those of the rays at the edge, exponent of the tolerance, and cycles per cell between knots.
@@ -153,14 +153,11 @@ class WindowEdges:
         if curved:
             off = [np.abs(part - bend * at) for part, at in zip(self._to_middle, (slopes.x, slopes.y), strict=True)]
             rest = np.maximum(*off)
-        at_rim = 1.2 * _medians(rest[:, rim])
-        beyond = self._beyond
-        steep = at_rim
-        if beyond is not None:
-            steep = np.maximum(at_rim, _quantiles(beyond[:, CIRCLE], RIM_SHARE))
+        at_rim = _medians(rest[:, rim])
         if self.derivatives is not None:
-            return self._carried(_medians(rest[:, rim]), cycles + self._reach(along))
+            return self._carried(at_rim, cycles + self._reach(along))
         # Light from the edge matters near the middle of the window, and other light in the whole window.
+        steep = np.maximum(RIM_CYCLES * at_rim, self._steepest(curvature))
         near = np.where(curvature != 0, cycles, np.minimum(cycles, NEAR_CYCLES)) + steep
         passband = near + EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
         if curved:
@@ -168,8 +165,6 @@ class WindowEdges:
             passband = np.maximum(passband, np.where(along <= (cycles + SPREAD_CYCLES)[:, None], bent, 0).max(axis=1))
         stopband = passband + _transitions(self._ripples(curvature)[0])
         reach = self._reach(np.where(bent > stopband[:, None], 0, along) if curved else along)
-        if beyond is not None:
-            reach = np.maximum(reach, _quantiles(beyond[:, OUTER], OUTER_SHARE))
         spread: np.ndarray | float = SPREAD_CYCLES
         if mapped.any():
             detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * _medians(along[:, rim])
@@ -227,14 +222,19 @@ class WindowEdges:
         """Cycles per radius of the paths to the middle of the window, the larger of both axes, (beam, ray)."""
         return np.asarray(np.maximum(*map(np.abs, self._to_middle)))
 
-    @cached_property
-    def _beyond(self) -> np.ndarray | None:
+    def _steepest(self, curvature: np.ndarray) -> np.ndarray | float:
+        """Return the cycles per radius of nearly all rays at the rim behind polynomials of high order, (beam,)."""
         slopes = self.stack.rim_slopes
         if slopes is None:
-            return None
-        path = self.geometry.to_middle(slopes.across)
-        x, y = (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
-        return np.maximum(np.abs(x), np.abs(y)).reshape(len(x), -1, ANGLES)
+            return 0.0
+        path, bend = self.geometry.to_middle(slopes.across), curvature[:, None]
+        along = (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
+        rest = [np.abs(part - bend * at) for part, at in zip(along, (slopes.x, slopes.y), strict=True)]
+        ordered = np.sort(np.maximum(*rest), axis=1)
+        missed = np.minimum(RIM_MISSED * (self.tolerance / 0.01) ** MISSED_EXPONENT, 1.0)
+        place = np.ceil((1 - missed) * (ordered.shape[1] - 1)).astype(int)
+        found: np.ndarray = np.where(self.stack.mapped, 0.0, ordered[np.arange(len(place)), place])
+        return found
 
     @cached_property
     def _to_middle(self) -> tuple[np.ndarray, np.ndarray]:
@@ -301,12 +301,6 @@ def _medians(values: np.ndarray) -> np.ndarray:
     first = (values.shape[1] - 1) // 2
     ordered = np.partition(values, sorted({first, last}), axis=1)
     return np.asarray((ordered[:, first] + ordered[:, last]) / 2)
-
-
-def _quantiles(values: np.ndarray, share: float) -> np.ndarray:
-    """Return the values of rows that a share of them does not exceed."""
-    place = math.ceil(share * values.shape[1]) - 1
-    return np.asarray(np.partition(values, place, axis=1)[:, place])
 
 
 def _transitions(ripples: np.ndarray) -> np.ndarray:
