@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -65,6 +65,11 @@ class LightStack:
         mine = [k for k, place in enumerate(places) if int(place) in chosen.intersection(others)]
         found.__dict__["_polynomials"] = read_only(coefficients[np.asarray(places, int)]), mine
         return found
+
+    @cached_property
+    def level(self) -> LightStack:
+        """The light of the same pupils without reliefs."""
+        return LightStack(tuple(replace(beam, pupil=beam.pupil.level) for beam in self.beams))
 
     @cached_property
     def geometry(self) -> LightGeometry:
@@ -196,6 +201,13 @@ class LightStack:
             if beam.pupil.mask is not None:
                 found[place] = beam.pupil.amplitude(x[place] / radius, y[place] / radius)
         return found
+
+    def mask_cycles(self, levels: np.ndarray) -> np.ndarray:
+        """Return the cycles per radius above which the masks vary by less than these levels, (beam,)."""
+        return np.array([
+            0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(level, radius) * radius
+            for beam, radius, level in zip(self.beams, self.radius, levels.tolist(), strict=True)
+        ])  # fmt: skip
 
     @cached_property
     def slopes(self) -> StackSlopes:

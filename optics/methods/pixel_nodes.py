@@ -188,7 +188,7 @@ def _across(problem: Problem) -> int | None:
     Pixels that the edge of the aperture cuts have larger errors. See `_squared_errors`.
     """
     assert problem.pixelated is not None
-    level = problem.level
+    level = problem.stack.level
     slopes, geometry = level.slopes, window_geometry(level, problem.window)
     path = geometry.to_middle(slopes.across)
     rays = np.stack([slopes.along_x + path.along_x, slopes.along_y + path.along_y]).ravel() * path.cycles[0, 0]

@@ -132,11 +132,6 @@ class Problem:
         return LightStack((self.light,))
 
     @cached_property
-    def level(self) -> LightStack:
-        """The light of a pupil whose pixelated relief is replaced by a flat one, as a stack of one beam."""
-        return LightStack((replace(self.light, pupil=self.light.pupil.level),))
-
-    @cached_property
     def slopes(self) -> Slopes:
         """Slopes of the wavefront, on a grid that resolves all maps."""
         return self.light.pupil.slopes(self.light.wavelength, self.light.source)
@@ -255,7 +250,7 @@ class Problem:
     def steepest_sine(self) -> float:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
         straight = self.radius / math.hypot(self.radius, self.distance)
-        slopes = float((self.stack if self.pixelated is None else self.level).slopes.steepest[0])
+        slopes = float((self.stack if self.pixelated is None else self.stack.level).slopes.steepest[0])
         if SLOPE_MARGIN * slopes >= straight * self.medium_n:
             return straight  # all slopes and finer detail can only increase the sine of light that leaves the pupil
         band = SLOPE_MARGIN * slopes / self.light.wavelength + self.detail

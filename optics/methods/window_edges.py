@@ -21,7 +21,7 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH, SoftAperture
 from optics.apertures.circular import Annulus, Circle
 from optics.apertures.soft_edge import SoftEdge
-from optics.elements.light_stack import LightStack
+from optics.elements.light_stack import LightStack, StackSlopes
 from optics.elements.wavefront import Zernike
 from optics.methods.window_geometry import WindowGeometry
 from optics.methods.window_rank import Derivatives
@@ -41,8 +41,8 @@ NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
 # tolerance of 0.01, the same relative to those of the rays at the edge, and exponent of the tolerance.
 MAPPED_CYCLES, MAPPED_RIM_CYCLES, MAPPED_EXPONENT = 4.0, 3.0, -0.4
 RIM_CYCLES = 1.2  # choice: cycles of most of the rays of the edge, relative to their median
-# Choices for polynomials of high order, of which some rays of the edge are much steeper than the median: share of the
-# points on the rim whose rays may be steeper than assumed, at a tolerance of 0.01, and exponent of the tolerance.
+# Choices for polynomials of high order: share of the points on the rim whose rays may be steeper than assumed, at a
+# tolerance of 0.01, and exponent of the tolerance.
 RIM_MISSED, MISSED_EXPONENT = 0.1, 0.6
 # Choices for PSFs that carry derivatives, to which points near the edge contribute as much as others. The soft edge is
 # then narrow: ripples as above, passband relative to the stopband; cycles per radius at a tolerance of 0.01, the same
@@ -86,8 +86,7 @@ class WindowEdges:
     @cached_property
     def edges(self) -> list[SoftAperture]:
         """Soft apertures of the samples, (beam,)."""
-        bands = self._choice[1]
-        wide = partial(self._wide, bands.passband, bands.stopband, self._ripples(self.curvature)[0])
+        wide = partial(self._wide, self._choice[1].passband, self._ripples(self.curvature)[0])
         return self._unless_mapped(wide, partial(self._narrow, self.density, CARRIED_RIPPLES[0]))
 
     @cached_property
@@ -97,10 +96,8 @@ class WindowEdges:
 
     def _finer_wide(self) -> list[SoftAperture]:
         bands, ripple = self._choice[1], self._ripples(self.curvature)[1]
-        stopband = FINER * self.density - bands.around
-        narrow = np.minimum(stopband * bands.passband / bands.stopband, stopband - _transitions(ripple))
-        passband = np.clip(narrow, bands.passband, SHARPER * bands.passband)
-        return self._wide(passband, stopband * bands.sharp, ripple)
+        passband = np.maximum(FINER * self.density - bands.around - _transitions(ripple), bands.passband)
+        return self._wide(np.minimum(passband, SHARPER * bands.passband), ripple)
 
     def _unless_mapped(
         self, wide: Callable[[], list[SoftAperture]], narrow: Callable[[], list[SoftAperture]]
@@ -123,18 +120,13 @@ class WindowEdges:
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
             return none, flat
-        able = self._round & ~self.stack.mapped
+        able = [isinstance(beam.pupil.aperture, Circle | Annulus) for beam in self.stack.beams] & ~self.stack.mapped
         curvature = np.where(able & (np.abs(self._rim_curvature) >= LEAST_CURVATURE), self._rim_curvature, 0)
         if not curvature.any():
             return none, flat
         curved = self._bands(curvature)
         chosen = (curvature != 0) & (curved.density < WORTH * flat.density)
         return np.where(chosen, curvature, 0), curved.where(chosen, flat)
-
-    @cached_property
-    def _round(self) -> np.ndarray:
-        """True for apertures that are disks or rings, (beam,)."""
-        return np.array([isinstance(beam.pupil.aperture, Circle | Annulus) for beam in self.stack.beams])
 
     @cached_property
     def _rim_curvature(self) -> np.ndarray:
@@ -149,11 +141,8 @@ class WindowEdges:
         """Return the bands of waves that are smoothed with these curvatures, (beam,)."""
         slopes, bend, cycles, mapped = self.stack.slopes, curvature[:, None], self.geometry.cycles, self.stack.mapped
         along, curved = self._along, bool(curvature.any())
-        rest, rim = along, self.geometry.to_middle(slopes.across).rim
-        if curved:
-            off = [np.abs(part - bend * at) for part, at in zip(self._to_middle, (slopes.x, slopes.y), strict=True)]
-            rest = np.maximum(*off)
-        at_rim = _medians(rest[:, rim])
+        rest = _unbent(self._to_middle, slopes, curvature) if curved else along
+        at_rim = _medians(rest[:, rim := self.geometry.to_middle(slopes.across).rim])
         if self.derivatives is not None:
             return self._carried(at_rim, cycles + self._reach(along))
         # Light from the edge matters near the middle of the window, and other light in the whole window.
@@ -172,8 +161,7 @@ class WindowEdges:
         density = self._masks + np.maximum(cycles + reach + spread, near + stopband)
         if mapped.any():
             density = np.maximum(density, np.where(mapped, self._widest, 0))
-        spare = np.maximum((density - self._masks - near) / stopband, 1.0)
-        return _Bands(density, spare * passband, spare * stopband, near, (spare > 1.0).astype(float))
+        return _Bands(density, passband, near)
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> _Bands:
         """Return the bands of light that carries derivatives.
@@ -189,8 +177,7 @@ class WindowEdges:
         sharp = sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT
         density = np.maximum(direct + sharp + self._masks, self._widest)
         density = 2.0 ** (np.ceil(CARRIED_STEPS * np.log2(density) - 1e-9) / CARRIED_STEPS)
-        none = np.zeros_like(density)
-        return _Bands(density, none, none, none, none)
+        return _Bands(density, np.zeros_like(density), np.zeros_like(density))
 
     @property
     def _widest(self) -> np.ndarray:
@@ -201,10 +188,7 @@ class WindowEdges:
     @cached_property
     def _masks(self) -> np.ndarray:
         """Cycles per radius of the masks, (beam,)."""
-        return np.array([
-            0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(min(tolerance, 0.1), radius) * radius
-            for beam, radius, tolerance in zip(self.stack.beams, self.stack.radius, self.tolerance, strict=True)
-        ])  # fmt: skip
+        return self.stack.mask_cycles(np.minimum(self.tolerance, 0.1))
 
     def _reach(self, along: np.ndarray) -> np.ndarray:
         """Return the cycles per radius up to which nearly all light reaches, (beam,).
@@ -214,8 +198,7 @@ class WindowEdges:
         share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
         last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
         ordered = np.partition(along, sorted({*last.tolist()}), axis=1)
-        found: np.ndarray = ordered[np.arange(len(last)), last]
-        return found
+        return np.asarray(ordered[np.arange(len(last)), last])
 
     @cached_property
     def _along(self) -> np.ndarray:
@@ -227,19 +210,17 @@ class WindowEdges:
         slopes = self.stack.rim_slopes
         if slopes is None:
             return 0.0
-        path, bend = self.geometry.to_middle(slopes.across), curvature[:, None]
-        along = (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
-        rest = [np.abs(part - bend * at) for part, at in zip(along, (slopes.x, slopes.y), strict=True)]
-        ordered = np.sort(np.maximum(*rest), axis=1)
+        ordered = np.sort(_unbent(self._paths(slopes), slopes, curvature), axis=1)
         missed = np.minimum(RIM_MISSED * (self.tolerance / 0.01) ** MISSED_EXPONENT, 1.0)
         place = np.ceil((1 - missed) * (ordered.shape[1] - 1)).astype(int)
-        found: np.ndarray = np.where(self.stack.mapped, 0.0, ordered[np.arange(len(place)), place])
-        return found
+        return np.where(self.stack.mapped, 0.0, ordered[np.arange(len(place)), place])
 
     @cached_property
     def _to_middle(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
-        slopes = self.stack.slopes
+        return self._paths(self.stack.slopes)
+
+    def _paths(self, slopes: StackSlopes) -> tuple[np.ndarray, np.ndarray]:
+        """Return cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
         path = self.geometry.to_middle(slopes.across)
         return (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
 
@@ -256,11 +237,10 @@ class WindowEdges:
         share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0)
         return np.asarray(share**RIPPLE_EXPONENT)
 
-    def _wide(self, passband: np.ndarray, stopband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
+    def _wide(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
         """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""
         passband = 2.0 ** (np.ceil(EDGES * np.log2(passband) - 1e-9) / EDGES)
-        stopband = 2.0 ** (np.floor(EDGES * np.log2(np.maximum(stopband, 1e-9)) + 1e-9) / EDGES)
-        return self._soft(passband, np.maximum(stopband, passband + _transitions(ripples)), ripples)
+        return self._soft(passband, passband + _transitions(ripples), ripples)
 
     def _narrow(self, density: np.ndarray, ripple: float) -> list[SoftAperture]:
         """Return soft apertures that are as narrow as a density of samples allows."""
@@ -285,14 +265,18 @@ class _Bands:
 
     density: np.ndarray
     passband: np.ndarray
-    stopband: np.ndarray
     around: np.ndarray
-    sharp: np.ndarray
 
     def where(self, chosen: np.ndarray, other: _Bands) -> _Bands:
         """Return these bands for chosen beams, and others for all other beams."""
-        names = "density", "passband", "stopband", "around", "sharp"
-        return _Bands(*(np.where(chosen, getattr(self, name), getattr(other, name)) for name in names))
+        pairs = (self.density, other.density), (self.passband, other.passband), (self.around, other.around)
+        return _Bands(*(np.where(chosen, own, their) for own, their in pairs))
+
+
+def _unbent(paths: tuple[np.ndarray, np.ndarray], slopes: StackSlopes, curvature: np.ndarray) -> np.ndarray:
+    """Return cycles per radius of paths without the curvature of smoothed waves, the larger of both axes."""
+    parts = zip(paths, (slopes.x, slopes.y), strict=True)
+    return np.asarray(np.maximum(*(np.abs(part - curvature[:, None] * at) for part, at in parts)))
 
 
 def _medians(values: np.ndarray) -> np.ndarray:
