@@ -26,6 +26,7 @@ window_sampling      `low_rank` at coarse tolerances, for one PSF
 window_plan          samples of several pupils that the light in a window needs, at coarse tolerances
 window_geometry      the part of these plans that does not depend on reliefs and wavefronts
 window_edges         soft edges and densities of these samples, smoothed waves of wide pupils without a lens
+window_bands         frequencies of the light and of these soft edges
 window_rank          rank of the slow factor for the samples of `window_plan`
 window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         several sources and wavelengths through one pupil, from the same samples

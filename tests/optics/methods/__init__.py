@@ -16,6 +16,7 @@ window_check: test_window_sampling.py
 window_rank: test_window_sampling.py, test_torch_stacks.py
 window_sampling: test_window_sampling.py
 window_edges: test_window_edges.py
+window_bands: test_window_edges.py
 window_geometry: test_kept_plans.py, test_window_sampling.py
 window_plan: test_window_sampling.py, point_spread/test_coarse_batch.py
 window_images: test_sine_stack.py, point_spread/test_coarse_batch.py
