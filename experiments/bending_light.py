@@ -111,7 +111,7 @@ def table(store: Store, phase: int) -> str:
 
 
 def prediction(store: Store) -> str:
-    """Return a table of the pupils at the end of phase I and the best pinholes by each measure."""
+    """Return a table that compares the pupils at the end of phase I with the best pinhole by each measure."""
     lines = []
     for group in store.groups:
         sigma = store.noise_sigma(group)

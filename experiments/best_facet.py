@@ -50,7 +50,7 @@ DRAWN = (1.0, 10.0, 100.0, 1e4)  # light levels of the right panel [lx]
 class Seen:
     """Contrast transfer and photons of one ommatidium.
 
-    cycles: spatial frequencies [cycles per λ/D, for the wavelength WAVELENGTH], ascending from 0
+    cycles: spatial frequencies [cycles per angle λ/D, with λ = WAVELENGTH], ascending from 0
     contrast: contrast transferred at these frequencies, 1 at 0
     photons: photons of the mean scene absorbed per integration time, for an illuminance of 1 lx
     """
@@ -148,7 +148,10 @@ def information(one: Seen, parameter: float, illuminance: float) -> float:
 
 
 def resolved(parameter: float) -> float:
-    """Return the finest grating [cycles/rad] of an eye of the radius RADIUS with this parameter [wavelengths]."""
+    """Return the finest resolved grating [cycles/rad] of an eye with the radius RADIUS.
+
+    parameter: eye parameter [wavelengths]
+    """
     return LAW / math.sqrt(parameter * WAVELENGTH / RADIUS)
 
 

@@ -94,7 +94,7 @@ def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[
 
 
 def stripes(contrasts: Floats, throughput: float, width: int) -> float:
-    """Return the throughput times the MTF for stripes of a width in receptors.
+    """Return the throughput times the MTF for stripes that are `width` receptors wide.
 
     The frequency of these stripes is the Nyquist frequency divided by the width. The result is the amplitude of the
     stripes in the signals, independent of noise. It is 0 beyond the first zero of the MTF, where stripes are reversed

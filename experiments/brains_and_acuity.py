@@ -37,7 +37,7 @@ FACTORS: dict[str, Size] = {
 
 
 def error(row: Row) -> float:
-    """Return the share of episodes in which the goal was not reached first.
+    """Return the share of episodes in which the animal did not reach the goal, or reached an adversary first.
 
     If these are k of n episodes, the share is estimated as (k + 1/2) / (n + 1) (Jeffreys' mean), which is never 0, so
     that its logarithm exists. In a maze, no animal reaches the goal. The error is then 1 minus the ratio of the fitness

@@ -45,7 +45,7 @@ class Row:
     parameters: number of parameters of the trained policy, including the critic
     full_return: return of an episode straight to the goal without any contact; NaN if a new goal follows each goal
     above_noise: contrast above the noise, as in experiments.best_pupil
-    above_noise_of_hole: contrast above the noise of the same pupil without its relief
+    above_noise_of_hole: the same for the pupil without its relief
     relief: heights of the relief in [0, 1], row by row; empty for perfect lenses
     glass_power: power of the glass relative to the power that focuses; see experiments.glass
     facet_diameter_um: width of the facets of compound eyes; NaN for camera eyes

@@ -275,7 +275,7 @@ def _made(experiment: Experiment, chosen: Namespace) -> None:
 
 
 def _train(experiment: Experiment, data: Path, workers: int) -> None:
-    """Train the missing animals; new results may make further training runs unnecessary, or require some."""
+    """Train the missing animals; new results may make further training runs unnecessary or necessary."""
     every = experiment.designs()
     while True:
         needed = every if experiment.needed is None else experiment.needed(read_rows(Trained, data))

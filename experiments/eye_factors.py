@@ -1,4 +1,4 @@
-"""Factors of eyes: number, resolution, arc and height, crossed in unseen layouts and in detection, with controls
+"""Factors of eyes: number, resolution, arc and height, combined in unseen mazes and in detection, with controls
 
 python -m experiments.eye_factors [--compute] [--workers N] [--docs DIR]
 """
@@ -117,7 +117,7 @@ def _controls_table(rows: Sequence[Trained]) -> str:
 
 
 def _power_table(rows: Sequence[Trained]) -> str:
-    """Return a table of standard deviations in each task after the first look, and of the training runs needed."""
+    """Return a table: standard deviations in each task after the first planned tests, and training runs needed."""
     first = [row for row in rows if row.seed < LOOKS[0]]
     lines = []
     for task in TASKS:

@@ -1,4 +1,4 @@
-"""Best animals of the searches for eyes, which are trained again with new seeds, and random search at equal budgets."""
+"""Best animals of the searches for eyes, trained again with new seeds, and random search for comparison."""
 
 from __future__ import annotations
 

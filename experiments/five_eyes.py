@@ -35,7 +35,7 @@ SPP = 128
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of the eye, which is defined by its pupil.
+    """One of the five eyes, which differ only in their pupils.
 
     power: power of the glass in the pupil, 1 in focus; 0: no glass
     """

@@ -170,7 +170,7 @@ def draw(store: Store, path: Path) -> None:
 
 
 def _draw_control(axes: Any) -> None:
-    """Draw fitness and success of all training runs with the published eyes and others, without evolution."""
+    """Draw fitness and success of all training runs without evolution, with the published eyes and with other eyes."""
     rows = read_rows(Trained, CONTROL)
     panels = [(task, what) for task in CONTRASTED for what in CEILINGS]
     for place, (task, what) in zip(axes, panels, strict=True):

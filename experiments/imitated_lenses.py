@@ -1,4 +1,4 @@
-"""Searches for lenses with surrogate fitness: their end, and the sharpness of their lenses
+"""Searches for lenses with surrogate fitness: the animals at their end, and the sharpness of the lenses
 
 python -m experiments.imitated_lenses [--compute] [--docs DIR]
 """

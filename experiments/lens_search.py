@@ -43,7 +43,7 @@ def searches(rows: Sequence[Row], method: str) -> list[list[Row]]:
 
 
 def found_after(search: Sequence[Row]) -> Row | None:
-    """Return the first row of a search from which all rows have a good lens; None if the last row has none."""
+    """Return the row of a search from which on all rows have a good lens; None if the last row has none."""
     kept = None
     for row in reversed(search):
         if row.strehl < GOOD:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 import tomllib
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Sequence
@@ -79,6 +81,14 @@ def _settings(table: dict[str, object], above: str = "") -> dict[str, object]:
     return found
 
 
+def _copy_record(record: Path, out: Path) -> None:
+    """Copy a record to the directory of a run, completely or not at all, if there is a record and no run."""
+    if record.exists() and not out.exists():
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=out.parent) as folder:
+            shutil.copytree(record, Path(folder) / out.name).rename(out)
+
+
 def main(text: str, searches: Sequence[PlannedSearch], arguments: Sequence[str] | None = None) -> int:
     """List the searches, or carry them out one after another.
 
@@ -91,6 +101,9 @@ def main(text: str, searches: Sequence[PlannedSearch], arguments: Sequence[str] 
     options.add_argument("folder", metavar="DIR", type=Path, nargs="?", help="directory of the runs")
     options.add_argument("--list", action="store_true", help="print the commands that start the searches, then stop")
     options.add_argument("--workers", type=int, default=1, help="processes of a new run (default: 1)")
+    options.add_argument(
+        "--records", type=Path, metavar="DIR", help="continue the records in DIR whose runs are missing, as copies"
+    )
     chosen = options.parse_args(arguments)
     if chosen.list:
         for one in searches:
@@ -99,6 +112,8 @@ def main(text: str, searches: Sequence[PlannedSearch], arguments: Sequence[str] 
     if chosen.folder is None:
         options.error("DIR: missing; name the directory of the runs, or use --list")
     for one in searches:
+        if chosen.records is not None:
+            _copy_record(chosen.records / one.name, chosen.folder / one.name)
         code = evolve(command(one, chosen.folder, chosen.workers))
         if code:
             return code

@@ -158,7 +158,7 @@ def ranked() -> tuple[Design, ...]:
 
 
 def ranks_table(rows: Sequence[Trained], full: Sequence[Trained]) -> str:
-    """Return a table of rank correlations, over animals, of single training runs with means of full training runs.
+    """Return a table of rank correlations between single training runs and the means of full training runs.
 
     The fitness of a single run is compared with the mean fitness of full runs that have other seeds. In one column, the
     single run consists of the first 106,496 steps of a full one. In the other column, it is a full run.

@@ -1,4 +1,7 @@
-"""Standard streams that stay usable for the whole program: closed, full, badly encoded, or closed by a user's code."""
+"""Standard streams that stay usable even if they were closed from the start, are full, or a user's code closes them.
+
+The encoding of a stream is replaced if it cannot encode text.
+"""
 
 from __future__ import annotations
 

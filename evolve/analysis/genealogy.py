@@ -1,4 +1,4 @@
-"""Lines of descent. If a candidate has several parents, its line of descent follows the one with the nearest genome."""
+"""Lines of descent. If a candidate has several parents, its line follows the parent with the nearest genome."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Cand
     """Return the recorded parent with the smallest Euclidean distance between genomes; None if no parent is recorded.
 
     If several parents have the same distance, the one with the lowest id is returned. Candidates of CMA-ES have many
-    parents, because CMA-ES samples a generation around the mean of the better half of the previous generation.
+    parents, because CMA-ES samples a generation around a weighted mean of the better half of the previous generation.
 
     known: candidates on record, by id
     """
@@ -25,7 +25,7 @@ def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Cand
 
 
 def descent(candidate: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Return a candidate's line of descent, from its first ancestor to the candidate itself.
+    """Return a candidate's line of descent, from its earliest recorded ancestor to the candidate itself.
 
     candidates: candidates on record, among which the ancestors are searched
     """

@@ -152,8 +152,8 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
     Genes of a pupil are present only if the animal has one, and spectral genes only if they determine its receptors.
     For receptor types that the animal lacks, the peak wavelengths are NaN.
 
-    eye: settings of a run's eyes. Only genes that this run has are returned, such as an eighth of a symmetric relief's
-        heights, or one side of a square eye. None: all values are returned
+    eye: settings of a run's eyes. Only values of genes of this run are returned: for a symmetric relief, the heights in
+        an eighth of its area, and for a square eye, only one side. None: all values are returned
     """
     height, width = phenotype.resolution
     values = {

@@ -1,4 +1,4 @@
-"""Image quality and contrast of an animal's eyes, and comparison of its images with a perfect lens."""
+"""Image quality and contrast of an animal's eyes, and comparison of its images with those of a perfect lens."""
 
 from __future__ import annotations
 

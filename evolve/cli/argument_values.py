@@ -13,7 +13,7 @@ LONGEST = 4000  # maximum number of digits of an argument; Python converts at mo
 
 
 def seed(text: str) -> int:
-    """Return the seed in the text of an argument.
+    """Return the seed that an argument specifies as text.
 
     Raises:
         ArgumentTypeError: the text is not a whole number, 0 or more.
@@ -24,7 +24,7 @@ def seed(text: str) -> int:
 
 
 def every(text: str) -> int:
-    """Return the number of actions from one image to the next, in the text of an argument.
+    """Return the number of actions from one image to the next that an argument specifies as text.
 
     Raises:
         ArgumentTypeError: the text is not a whole number from 1 to 1,000,000.
@@ -35,7 +35,7 @@ def every(text: str) -> int:
 
 
 def searches(text: str) -> int:
-    """Return the number of searches with random fitness, in the text of an argument.
+    """Return the number of searches with random fitness that an argument specifies as text.
 
     Raises:
         ArgumentTypeError: the text is not a whole number from 2 to 100,000.

@@ -55,7 +55,7 @@ class Parser(argparse.ArgumentParser):
     """Argument parser whose error messages are one line, with a suggestion for a mistyped word."""
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        """Print help or the version as a result of the command."""
+        """Print help or the version on stdout, like the results of other commands."""
         say(message, end="")
 
     def error(self, message: str) -> NoReturn:

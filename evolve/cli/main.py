@@ -1,8 +1,8 @@
 """The command `evolve`: parses the arguments and runs one of its subcommands.
 
-Errors that users can correct are printed as one line. The exit code is 0 after success, 1 if all candidates of a run or
-a validation script failed, 2 if the input or the environment is wrong, and 130 after an interruption. Modules of
-subcommands are imported on use, so that help appears immediately.
+Errors that users can correct are printed as one line. The exit code is 0 after success, 1 if all candidates of a run
+failed or a validation script failed, 2 if the input or the environment is wrong, and 130 after an interruption. Modules
+of subcommands are imported on use, so that help appears immediately.
 """
 
 from __future__ import annotations

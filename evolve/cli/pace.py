@@ -1,6 +1,6 @@
 """Measurement of the speed of this machine.
 
-A few seconds of real training are timed, at once in the number of processes that the run will have.
+A few seconds of real training are timed. They run at the same time in as many processes as the run will have.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Pace:
     steps_per_s: number of agent steps per second at the beginning of training, including updates of the policy
     play_s: time of one evaluation, whose episodes run in parallel [s]
     policy_bytes: size of the file of a trained policy [bytes]
-    pass_s: time of one pass over the samples in an update, divided by the number of agent steps [s]
+    pass_s: time of one pass over the samples in an update, divided by their number, the agent steps of a rollout [s]
     """
 
     start_s: float
@@ -112,7 +112,7 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of processes. If an exception leaves the context, they are terminated instead of awaited.
+    """Yield a pool of processes. If an exception leaves the context, the processes are terminated, not awaited.
 
     Jobs must be submitted within `interrupts_held`, so that only the parent receives Ctrl-C.
     """

@@ -90,7 +90,7 @@ class RunPlan:
 
     @property
     def disk_bytes(self) -> int:
-        """Predicted size of policies, record, report and EXR files [bytes], for the larger of the two animals.
+        """Predicted size of policies, record, report and EXR files [bytes], for the larger of the animals in `animals`.
 
         The prediction requires measured paces.
         """

@@ -26,7 +26,7 @@ FOLDER = "tensorboard"
 
 
 class TensorBoardWriter:
-    """Watcher that writes a run's scalars. It is used as a context manager.
+    """Watcher of a run (see `evolve.search.loop`) that writes its scalars. It is used as a context manager.
 
     Raises:
         ExecutorError: TensorBoard is not installed.

@@ -63,13 +63,13 @@ def assemble(
 ) -> RunConfig:
     """Return a run's configuration, assembled from all sources. Settings without a source have their default values.
 
-    task: name of a built-in task, or FILE.py:CLASS, which overrides the other sources; None: the task that the preset,
-        the file or an assignment names
+    task: name of a built-in task, or FILE.py:CLASS; it overrides the other sources. None: the task that the preset, the
+        file or an assignment names
     preset: name of a preset; None: no preset
     file: TOML file with settings; None: no file
     assignments: settings such as "search.population=8"
     starts: start values of the genes, which `evolve.runs.start_from` reads from another run; None: the default values
-    scale: scale of a preset that has several, "laptop" or "paper"; None: "laptop". It needs such a preset.
+    scale: "laptop" or "paper", only for a preset that has several scales; None: "laptop" for such a preset
 
     Raises:
         ConfigError: no source names a task; or a task, preset, scale or key is unknown; or a value has the wrong type

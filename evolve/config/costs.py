@@ -1,4 +1,4 @@
-"""Costs of an animal's eyes and brain, which the search subtracts from its task fitness."""
+"""Costs of an animal's eyes and brain, which are subtracted from the animal's task fitness."""
 
 from __future__ import annotations
 

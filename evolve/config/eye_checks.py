@@ -1,4 +1,4 @@
-"""Checks of the settings of eyes that depend on each other."""
+"""Checks of settings of eyes: of names, and of values that depend on each other."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def lint(config: RunConfig) -> list[str]:
 
 
 def coarse_bands(config: RunConfig) -> list[str]:
-    """Return a warning if the error of signals, which is due to few spectral bands, exceeds a receptor's noise.
+    """Return a warning if signals have errors above a receptor's noise because there are too few spectral bands.
 
     Errors up to 0.001 of the signal of a white surface are ignored. The result is a list with one line, or [].
 
@@ -102,7 +102,8 @@ def idle_genes(config: RunConfig) -> list[str]:
         notes.append("genome.placement_range_deg is open but has no effect: genome.n_eyes is fixed at 1")
     if not config.eye.compound:
         notes += _idle_glass(uses, [name for name in table if name.startswith("doe_")])
-    if config.card.grey and any(uses[name].open for name in LAMBDA_MAX):
+    grey = config.card.grey and config.world.medium == AIR
+    if grey and any(uses[name].open for name in LAMBDA_MAX):
         notes.append(f"genes of lambda_max are open but have no effect: the world of {config.task} is grey")
     types = uses["receptor_types"]
     most = int(types.high if types.open else types.start)

@@ -165,7 +165,7 @@ class RunConfig:
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_clusters(self) -> None:
-        """Check that at least one gene is open, and that no gene is open that the run does not use.
+        """Check that at least one gene is open, and that the run uses all open genes.
 
         Raises:
             ConfigError: one of these conditions is not met.

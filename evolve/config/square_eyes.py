@@ -33,7 +33,7 @@ def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
 
 
 def no_such_side(name: str, eye: EyeConfig) -> str:
-    """Return a message that explains why these eyes lack the gene for one side, or for both sides."""
+    """Return a message that explains why these eyes lack a gene: that of a single side, or that of both sides."""
     if eye.square:
         return f"genome.{name}: square eyes have the gene {SIDE} for both sides; set it, or eye.square = false"
     return f"genome.{name}: only square eyes have this gene, others have {' and '.join(SIDES)}; set eye.square = true"

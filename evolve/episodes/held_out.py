@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from evolve.episodes.recorder import damage_named, trained_policy
 from evolve.learning.final_figures import final_episodes, require_test_set
-from evolve.learning.ppo import Episodes
+from evolve.learning.played_episodes import Episodes
 from evolve.store.directory import Run
 
 __all__ = ["held_out_episodes"]

@@ -74,8 +74,8 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     are not high enough. If eyes overlap, they are spread over a larger part of the head. If the searched range of their
     placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number of its
     receptors, the numbers of eyes and of receptors are instead reduced in the same proportion. Rhabdoms become at most
-    as wide as the shorter side of a receptor, but not narrower than the valid range of their gene; all other genes stay
-    within their searched ranges.
+    as wide as the shorter side of a receptor, but at least as wide as the lowest valid value of their gene. All other
+    genes stay within their searched ranges.
 
     For compound eyes, see `evolve.genome.head_surface`.
 
@@ -126,7 +126,7 @@ class _RowsThatFit:
     """Test of whether rows of receptors, each at least `eye.receptor_width` high, fit on a retina.
 
     columns: number of receptors along the width
-    square: True if the number of columns equals the number of rows, and `columns` is ignored
+    square: True if the number of columns equals the number of rows; `columns` is then ignored
     sizes: settings of the eyes
     """
 

@@ -237,10 +237,10 @@ def _brain() -> list[Gene]:
 
 
 def _spectra() -> list[Gene]:
-    """Return the genes for the number of receptor types and for the peak sensitivity of each.
+    """Return the genes for the number of receptor types and for the wavelength at which each type absorbs most.
 
-    Known pigments have peaks from 357 to 620 nm. The template of pigment spectra in `optics` is limited to peaks from
-    330 to 700 nm.
+    The template of pigment spectra in `optics` was measured for peaks from 357 to 620 nm, and accepts peaks from 330 to
+    700 nm.
     """
     gene, most = partial(_gene, "spectral"), len(LAMBDA_MAX)
     return [

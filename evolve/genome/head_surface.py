@@ -1,8 +1,8 @@
 """Space constraints of compound eyes: their facets share the surface of the head.
 
-A facet of the width D is a hexagon with the area (√3/2) D². All facets of all eyes have at most the area
-`eye.facet_area` together. Facets touch each other, so the local radius of an eye's surface is R = D/Δφ, where Δφ is the
-interommatidial angle. In an acute zone, Δφ is smaller, and the surface is flatter. `sim.hexagonal_rows` places
+A facet of the width D is a hexagon with the area (√3/2) D². The facets of all eyes together have at most the area
+`eye.facet_area`. Facets touch each other, so the local radius of an eye's surface is R = D/Δφ, where Δφ is the
+interommatidial angle. In an acute zone, Δφ is smaller, and the surface is flatter. `sim.eyes.hexagonal_rows` places
 ommatidia in Mercator's projection. Eyes are at most 180 degrees high in this projection, because the ommatidia of
 higher eyes would crowd near the poles.
 """

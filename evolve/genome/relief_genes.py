@@ -21,7 +21,7 @@ def doe_names(points: int) -> list[str]:
 
 
 def representatives(points: int, symmetric: bool) -> list[str]:
-    """Return the name of the gene that determines each height of the relief, in the order of `doe_names`.
+    """Return, for each height of the relief in the order of `doe_names`, the name of the gene that determines it.
 
     A symmetric relief does not change under reflection and rotation by 90°, so an eighth of its heights determines all
     of them. Only the genes of this eighth exist. Without symmetry, each height has its own gene.

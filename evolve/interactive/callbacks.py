@@ -1,4 +1,4 @@
-"""Calls of a user's functions after each evaluated candidate."""
+"""Calls of a user's functions after each evaluation of a candidate."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Callback = Callable[[Run, Candidate], Any]
 
 @dataclass(frozen=True)
 class CallbackWatcher:
-    """Watcher that calls a user's functions with each candidate, after the candidate is evaluated and recorded."""
+    """Watcher of a run that calls a user's functions with each candidate after it is evaluated and recorded."""
 
     run: Run
     callbacks: Sequence[Callback]
@@ -39,7 +39,7 @@ class CallbackWatcher:
 class Callbacks:
     """Functions that a run from Python calls, and display of its progress.
 
-    callbacks: functions that are called as callback(run, candidate) after every evaluated candidate
+    callbacks: functions that are called as callback(run, candidate) after every evaluation of a candidate
     progress: True to show a progress bar, or lines if stderr is not a terminal
 
     Raises:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from evolve.learning.ppo import Episodes
+    from evolve.learning.played_episodes import Episodes
     from sim.tasks.encounter import Frozen
     from sim.tasks.task import Task
 
@@ -81,7 +81,7 @@ class OpenedRun(Run):
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate with the highest fitness, the earliest if several have it; None before one has succeeded."""
+        """Candidate with the highest fitness (the earliest of several); None before a candidate has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 

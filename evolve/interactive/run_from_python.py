@@ -46,8 +46,8 @@ def run(
     start_from: "RUN:ID" of an animal of another run, or "RUN" for its best animal, whose genes are the start values;
         None: the default values
     out: run directory; None: runs/TASK-PRESET-N, with the first free number N
-    callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
-        the run
+    callbacks: functions that are called as callback(run, candidate) after every evaluation of a candidate; an exception
+        ends the run
     progress: True to print the progress to stderr
 
     Raises:
@@ -84,8 +84,8 @@ def resume(
     task: "FILE.py:CLASS" if the run has a user task, whose code runs only if you name it here; else None
     before_damage: True to continue from the lines of the record before the first damaged line, and to keep a copy of
         the damaged record
-    callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
-        the run
+    callbacks: functions that are called as callback(run, candidate) after every evaluation of a candidate; an exception
+        ends the run
     progress: True to print the progress to stderr
 
     Raises:

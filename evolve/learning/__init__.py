@@ -6,6 +6,7 @@ animal_task       a run's task with one animal in it
 training_envs     environments for training, selection and fitness
 task_module       execution of the code of a user task
 task_trial        short trial of a user task before a run
+played_episodes   episodes that a policy plays without exploration
 ppo               PPO training, which stops early if returns no longer improve
 policy            policy of an animal (actor and critic), and its storage in files
 distribution      normal distribution of a policy's actions

@@ -24,7 +24,7 @@ __all__ = ["animal_task", "azimuths", "with_phenotype"]
 def animal_task(
     phenotype: Phenotype, config: RunConfig, mode: str = "evaluation", eyes: Eyes | None = None
 ) -> BatchTask:
-    """Return the run's task with this animal in it, for arrays of worlds.
+    """Return the run's task with this animal in it, in a form that runs in many worlds at once.
 
     mode: "training", "evaluation" or "test", which may have different layouts of worlds
     eyes: eyes that replace the animal's own; None: the animal's own eyes
@@ -62,7 +62,8 @@ def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes
     """Return a user task with this animal in it.
 
     The eyes are rendered with the run's setting `eye.rays_per_receptor`. If this setting is "auto", the task's own
-    fidelity is used, with the run's number of bands. A medium other than air replaces the task's own.
+    fidelity is used. If this is a `Fidelity`, it receives the run's number of bands. The run's medium replaces the
+    task's own, unless the run's medium is air.
 
     eyes: eyes that replace the animal's own; None: the animal's own eyes
 

@@ -1,9 +1,10 @@
 """Encoder of the eyes' signals for actor and critic: a multilayer perceptron for each eye over a memory of frames.
 
 Each eye has its own weights, unless `wiring.shared_encoder` is set. The same encoder is applied to each frame in
-memory: three layers of width w map the signals of a frame to a code of w numbers. One further layer then maps the codes
-of all frames, `memory` x w numbers, to the w features of the eye. The features of all eyes are joined with the other
-entries of the observation: proprioception and the previous action.
+memory: three layers of width w map the signals of a frame to a code of w numbers. (For a compound eye, the outputs of
+two hexagonal layers take the place of the signals, and all ommatidia count as one eye.) One further layer then maps the
+codes of all frames, `memory` x w numbers, to the w features of the eye. The features of all eyes are joined with the
+other entries of the observation: proprioception and the previous action.
 
 Units are leaky rectifiers. With tanh, the agent needed a third more samples to learn detection, and each unit took ten
 times as long to compute. Receptors adapt: the first layer subtracts the running mean of the signals, and divides by
@@ -67,7 +68,8 @@ class EyeFeatures(BaseFeaturesExtractor):
     All layers have the same width. An observation may have one of two forms, which give the same features. Environments
     return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each frame once:
     `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number of steps
-    since the first frame of the episode. The samples are then the pairs (step, segment) in row-major order.
+    since the first frame of the episode. A segment is a sequence of steps of one world. The samples are then the pairs
+    (step, segment) in row-major order.
 
     Frames of a compound eye have the axes (ommatidium, channel) instead of (eye, channel, height, width). Two layers of
     `hexagonal_layers` come before the encoder, and all ommatidia of the observation count as one eye.

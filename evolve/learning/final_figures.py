@@ -10,8 +10,8 @@ from evolve.config.settings import FAMILY
 from evolve.config.task_card import LAYOUTS, tasks_with
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
+from evolve.learning.played_episodes import Episodes, play
 from evolve.learning.policy import EyePolicy
-from evolve.learning.ppo import Episodes, play
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
 

@@ -17,8 +17,9 @@ from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from evolve.learning.checkpoint_file import CheckpointError, set_aside
+from evolve.learning.played_episodes import Episodes, play
 from evolve.learning.policy import Brain, TrainingDiverged, save_policy
-from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, train
+from evolve.learning.ppo import Progress, Training, Worlds, train
 from evolve.learning.training_envs import worlds_of
 from evolve.learning.training_rung import TrainingRung
 from evolve.store.evaluation import Evaluation, most_frequent

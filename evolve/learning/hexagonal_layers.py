@@ -93,7 +93,7 @@ def neighbourhoods(directions: np.ndarray) -> np.ndarray:
 
 
 def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Return the indices `near`, all but the first sorted by the azimuth of their directions around the first one."""
+    """Return the indices `near`, with all but the first sorted by azimuth around the direction of the first."""
     ahead, left, _ = directions[near[0]]
     level = np.hypot(ahead, left)
     rightwards = np.array([left, -ahead, 0]) / level if level > 0 else np.array([0.0, -1.0, 0.0])

@@ -1,11 +1,10 @@
-"""PPO of stable-baselines3 (SB3) on batched worlds. Training ends early if returns no longer improve.
+"""PPO of stable-baselines3 (SB3) in many worlds at once. Training ends early if returns no longer improve.
 
 `evolve.config.settings.LearningConfig` defines the settings and their ranges.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -21,6 +20,7 @@ from evolve.config.run_config import LearningConfig
 from evolve.learning.adam import Adam
 from evolve.learning.checkpoint import Checkpoint
 from evolve.learning.checkpoint_file import CheckpointError
+from evolve.learning.played_episodes import batch_task_of, play
 from evolve.learning.policy import (
     FIRST_SPREAD,
     Brain,
@@ -38,7 +38,6 @@ from sim.tasks.batch_task import BatchTask
 # In each rollout, log(unit of rewards) moves by this fraction of its distance to log(spread of returns).
 UNIT_RATE = 0.2
 SPEED = "speed"  # name of the command whose initial values follow from `learning.first_speed`
-VERDICTS = {True: 1, False: -1, None: 0}
 FLAT = 1e-6  # lower limit of the returns' spread, so that it is never 0
 
 Progress = Callable[[int, int], None]  # (steps trained, steps planned)
@@ -58,23 +57,6 @@ class Training:
     steps: int
     curve: tuple[tuple[int, float], ...]
     end: Checkpoint
-
-
-@dataclass(frozen=True)
-class Episodes:
-    """Results of one complete episode in each world.
-
-    returns: sum of rewards, (world,)
-    verdicts: +1 solved, -1 not solved, 0 undecided, see `BatchTask.solved`, (world,)
-    """
-
-    returns: np.ndarray
-    verdicts: np.ndarray
-
-    @property
-    def successes(self) -> np.ndarray:
-        """True for each world whose episode was solved, (world,)."""
-        return self.verdicts > 0
 
 
 class AdaptingPPO(PPO):
@@ -228,7 +210,7 @@ def train(
 
     After every `eval_interval` steps, the policy plays one episode in each of the evaluation worlds. Training ends
     after `patience` evaluations without a better mean return, or after `total_steps`. The result is the policy at the
-    evaluation with the highest mean return, or at the earliest of several.
+    evaluation with the highest mean return; if several evaluations share it, at the earliest.
 
     seed: seed of initial weights, exploration and mini-batches, and of the evaluation worlds
     progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
@@ -261,36 +243,6 @@ def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
     """Return whether none of the last `patience` evaluations exceeds the best evaluation before them."""
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
-
-
-def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
-    """Reset all worlds with this seed, and play one episode in each; the policy acts without exploration.
-
-    Raises:
-        TrainingDiverged: actions or returns are not finite.
-    """
-    worlds.seed(seed)
-    observation = worlds.reset()
-    returns = np.zeros(worlds.num_envs)
-    playing = np.ones(worlds.num_envs, bool)
-    task = batch_task_of(worlds)
-    verdicts: list[bool | None] = [None] * worlds.num_envs
-    while playing.any():
-        action, _ = policy.predict(observation, deterministic=True)
-        observation, reward, done, infos = worlds.step(action)
-        returns[playing] += reward[playing]
-        for world in np.flatnonzero(playing):
-            verdicts[world] = task.solved(verdicts[world], infos[world])
-        playing &= ~done
-    if not math.isfinite(returns.sum()):
-        raise TrainingDiverged("returns of the evaluation episodes not finite")
-    return Episodes(returns, np.array([VERDICTS[verdict] for verdict in verdicts]))
-
-
-def batch_task_of(worlds: VecEnv) -> BatchTask:
-    """Return the task of these worlds."""
-    task: BatchTask = worlds.get_attr("batch_task")[0]
-    return task
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:

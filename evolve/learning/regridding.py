@@ -1,7 +1,7 @@
 """Averaging of an eye's signals on a coarser grid, and repetition on a finer one, before they reach the encoder.
 
-Both are controls in experiments on resolution. An eye of 15 x 15 receptors whose signals are averaged on 4 x 4 cells
-and repeated on 15 x 15 has the acuity of 4 x 4 receptors, but still 15 x 15 inputs.
+Both serve as controls in experiments on resolution. An eye of 15 x 15 receptors whose signals are averaged on 4 x 4
+cells and repeated on 15 x 15 has the acuity of 4 x 4 receptors, but still 15 x 15 inputs.
 """
 
 from __future__ import annotations

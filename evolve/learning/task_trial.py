@@ -35,7 +35,7 @@ class UnusedSettingWarning(UserWarning):
 
 
 def check_settings(config: RunConfig) -> None:
-    """Refuse a user task with mounts that no animal would use, and warn about other settings without effect.
+    """Refuse a user task with mounts (places for eyes) that no animal would use; warn about other idle settings.
 
     The default method `place` of a task spreads an animal's eyes around a single mount. Runs on record are not checked,
     so they can always be continued and replayed with their eyes.

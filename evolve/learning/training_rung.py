@@ -54,7 +54,7 @@ class TrainingRung:
         return tuple({**common, "rung": number, "ends": list(self.ends[: number + 1])} for number in numbers)
 
     def set_aside_unusable(self, phenotype: Phenotype, config: RunConfig, seed: int) -> None:
-        """Rename unusable checkpoints of earlier rungs, from the latest back to the first usable one; see `set_aside`.
+        """Rename unusable checkpoints of earlier rungs, from the latest rung back to a usable one; see `set_aside`.
 
         Raises:
             OSError: a checkpoint is not a regular file, or cannot be renamed.

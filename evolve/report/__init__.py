@@ -19,7 +19,7 @@ svg              conversion of figures to SVG in the page's theme
 theme            colours of the report
 markup           pieces of HTML
 comparison       comparison of several runs
-gene_drift       comparison of runs with the null model of their search
+gene_drift       comparison of runs with searches with random fitness
 moving_picture   episode as a GIF or video
 replay           replay of an episode
 exr_export       radiance and signals of an agent, as EXR files

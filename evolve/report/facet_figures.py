@@ -21,7 +21,7 @@ SHOWN = 1e-3  # the image extends to this fraction of the maximum
 def white_acceptance(eye: sim.CompoundEye) -> tuple[np.ndarray, np.ndarray]:
     """Return angles off the axis, and the acceptance function of the first ommatidium in white daylight.
 
-    The angles [degrees], (n,), belong to rows and to columns. The values of the function, (up, right), (n, n), are
+    The angles [degrees], (n,), are those of rows and columns. The values of the function, (up, right), (n, n), are
     fractions of its maximum. Bands are weighted by daylight and by the mean sensitivity of the eye's channels.
     """
     bands, accepted = eye.spectral_bands, eye.acceptance(0)

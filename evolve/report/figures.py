@@ -132,7 +132,7 @@ def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
 
 
 def _links(axes: Axes, candidates: Sequence[Candidate], place: Callable[[Candidate], tuple[float, float]]) -> None:
-    """Add invisible links over the candidates' dots, which lead to the candidates' rows in the table."""
+    """Add invisible links over the candidates' dots; each link leads to the candidate's row in the table."""
     good = [candidate for candidate in candidates if succeeded(candidate)]
     x, y = np.transpose([place(candidate) for candidate in good])
     dots = axes.scatter(x, y, s=90, color=ACCENT, alpha=0.0)

@@ -102,12 +102,12 @@ class Drift:
 
 
 def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
-    """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
+    """Compare runs, which may differ only in their seeds, with searches with random fitness.
 
     The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical acuity
     unless `eye.vertical_fov` is "receptors", and the number of receptor positions in all eyes. Quantities that do not
     vary between the searches, or that a run lacks, are omitted. Means are over the last generations that all runs have
-    completed.
+    completed. The searches are those of `evolve.search.null_model`.
 
     searches: number of searches
     done: function that is called with the completed fraction of the searches

@@ -103,7 +103,8 @@ def key(kind: str) -> Html:
 def rounded(value: float, digits: int = 3) -> str:
     """Return a number with `digits` significant digits, a typographic minus sign and no exponent.
 
-    For NaN and infinity, the result is an en dash.
+    A number with more digits before the decimal point is rounded to an integer. For NaN and infinity, the result is an
+    en dash.
     """
     if not math.isfinite(value):
         return "–"

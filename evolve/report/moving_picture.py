@@ -33,7 +33,7 @@ SAMPLES = 8  # frames from which the palette's colours are chosen
 
 
 def write_gif(episode: Episode, path: Path) -> Path:
-    """Write an episode as a GIF that repeats, completely or not at all, and return its path.
+    """Write an episode as a repeating GIF, and return its path. The file is written completely or not at all.
 
     Raises:
         OSError: the file cannot be written.
@@ -65,7 +65,9 @@ def require_ffmpeg() -> Any:
 
 
 def write_mp4(episode: Episode, path: Path) -> Path:
-    """Write an episode as an H.264 video with a frame for each action, completely or not at all; return its path.
+    """Write an episode as an H.264 video with a frame for each action, and return its path.
+
+    The file is written completely or not at all.
 
     Raises:
         ConfigError: ffmpeg is not installed.

@@ -154,7 +154,7 @@ def _relief(run: Run, genes: list[Gene]) -> Html:
 
 
 def vision_section(run: Run, doing: Doing) -> Html:
-    """Return the section with four measures of image quality (`VISION`) of the best eyes so far in each generation."""
+    """Return the section with four measures of the image quality (`VISION`) of the best eye over the generations."""
     best = champions(run.candidates)
     if not best:
         return Html()

@@ -24,7 +24,7 @@ TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # player.js uses the
 
 
 def write_player(episode: Episode, path: Path) -> Path:
-    """Write a page that plays the episode, completely or not at all, and return its path.
+    """Write a page that plays the episode, and return its path. The file is written completely or not at all.
 
     Raises:
         OSError: the file cannot be written.

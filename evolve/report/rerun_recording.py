@@ -1,4 +1,4 @@
-"""Recording of an episode for the viewer Rerun, which opens it with `rerun FILE.rrd`. It needs the extra `rerun`.
+"""Recording of an episode for the viewer Rerun. `rerun FILE.rrd` opens it. The extra `rerun` must be installed.
 
 A recording has two timelines: `action` is the number of the action, and `time` is the time in the world [s]. The
 recording has the following entities.
@@ -34,7 +34,7 @@ COLORS = ((235, 235, 235), (230, 159, 0), (86, 180, 233), (213, 94, 0), (0, 158,
 
 
 def write_recording(episode: Episode, path: Path) -> Path:
-    """Write an episode as a recording, completely or not at all, and return the path.
+    """Write a recording of an episode, and return the path. The file is written completely or not at all.
 
     Raises:
         ConfigError: the package `rerun` is not installed.

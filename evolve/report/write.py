@@ -21,7 +21,7 @@ def write(run: Run, episode: Episode | None = None, out: Path | None = None, doi
 
     With the same versions of the libraries, the same run gives the same bytes.
 
-    episode: an episode of the best candidate; None: an episode is played now
+    episode: an episode of the best candidate; None: an episode is played now, if a candidate has succeeded
     out: path of the file; None: `report.html` in the run directory
     doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
 

@@ -41,9 +41,9 @@ def carry_on(
 
     After an exception, the record is intact, and the run can be resumed.
 
-    watched: function of the run and the number of workers that returns the watcher; it is called after the executor has
+    watched: function that returns the watcher for a run and a number of workers; it is called after the executor has
         started
-    workers: function of the run's settings that returns the executor
+    workers: function that returns the executor for the settings of a run
 
     Raises:
         RunError: the record cannot be written, or the search proposes candidates that differ from those on record.

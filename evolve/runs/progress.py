@@ -1,4 +1,4 @@
-"""Display of a run's progress: a bar on a terminal, one line per candidate in other outputs, or lines of JSON."""
+"""Display of a run's progress: a bar on a terminal, one line per evaluation in other outputs, or lines of JSON."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ class Silent(_Watcher):
 
 
 class Lines(_Watcher):
-    """Watcher that writes one plain line per candidate."""
+    """Watcher that writes one plain line per evaluation of a candidate."""
 
     def evaluated(self, candidate: Candidate) -> None:
         super().evaluated(candidate)

@@ -128,7 +128,7 @@ class Connection:
             answer.cancel()
 
     def remove_lost_workers(self) -> None:
-        """Make the scheduler remove workers that were silent for `patience_s`; others receive their candidates.
+        """Make the scheduler remove workers that were silent for `patience_s`; other workers receive their candidates.
 
         Raises:
             ConnectionLost: the connection was lost.

@@ -162,7 +162,9 @@ def _content(path: Path) -> bytes:
 
 
 def _prepare(order: Order) -> None:
-    """Check that the software has the sender's versions, and prepare Dr.Jit at the first call in this process.
+    """Compare the versions of the software with the sender's, and prepare Dr.Jit at the first call in this process.
+
+    A version that is unknown here or there, such as a commit, is not compared.
 
     Raises:
         UnfitWorker: a version differs, or Dr.Jit cannot be prepared.

@@ -91,7 +91,7 @@ def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watch
 
 
 def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Evaluate one population of candidates at a time, and replace each finished candidate by a new proposal."""
+    """Keep as many candidates under evaluation as a population has; a new proposal replaces each finished candidate."""
     under_way: dict[int, Proposal] = {}
 
     def refill() -> list[Proposal]:

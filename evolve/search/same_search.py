@@ -1,9 +1,10 @@
 """Check that a rebuilt search proposes the candidates on record. Only such a search can continue a run.
 
 To continue a run, its search is rebuilt: all proposals are repeated, and the recorded fitness is reported again. On the
-processor that started the run, the proposed genomes equal those on record bit for bit. Another processor rounds
-differently, and the difference can grow, because pycma recognises its own solutions by their bits. If the last bit of a
-solution differs, pycma treats the solution as injected from outside, and shortens its step if the step is long.
+processor and with the libraries that started the run, the proposed genomes equal those on record bit for bit. Another
+processor rounds differently, and the difference can grow, because pycma recognises its own solutions by their bits. If
+the last bit of a solution differs, pycma treats the solution as injected from outside, and shortens its step if the
+step is long.
 """
 
 from __future__ import annotations

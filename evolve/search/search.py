@@ -1,9 +1,9 @@
 """The search, which proposes candidates and receives their fitness.
 
 A gene may begin to vary only in a later generation (its setting `opens_at`). A phase lasts from one generation in which
-genes begin to vary to the next. The state of the search follows from the settings, the seed and the fitness values
-received so far. A run is continued by repeating all proposals and reporting all recorded fitness values again; no state
-is stored.
+genes begin to vary to the next such generation. The state of the search follows from the settings, the seed and the
+fitness values received so far. A run is continued by repeating all proposals and reporting all recorded fitness values
+again; no state is stored.
 """
 
 from __future__ import annotations

@@ -220,7 +220,7 @@ class Run:
 
     @property
     def best(self) -> Candidate | None:
-        """Candidate with the highest fitness, the earliest if several have it; None before one has succeeded."""
+        """Candidate with the highest fitness (the earliest of several); None before a candidate has succeeded."""
         done = [candidate for candidate in self.candidates if candidate.failure is None]
         return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
 

@@ -18,7 +18,7 @@ LONGEST = 400  # [bytes] maximum length of the text in a lock file, which names 
 
 
 class LockedError(ValueError):
-    """A run cannot be locked, because another process works on it or it cannot be written. The message is one line."""
+    """A run cannot be locked: another process works on it, or its lock cannot be written. The message is one line."""
 
 
 class RunLock:

@@ -1,7 +1,7 @@
-"""Eyes with one lens, of vertebrates and a spider, as a patch of the retina. `goldfish_lens` returns a lens alone.
+"""Camera eyes of vertebrates and a spider. Each covers a patch of the retina; `goldfish_lens` returns a lens alone.
 
-The receptors of an `optics.Eye` form a square lattice. Its pitch is chosen so that the finest grating that it resolves
-is the finest grating that the animal's retina resolves.
+The receptors of an `optics.Eye` form a square lattice. Its pitch is chosen so that it resolves the same finest grating
+as the animal or its retina, according to the source.
 """
 
 from __future__ import annotations

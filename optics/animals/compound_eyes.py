@@ -1,7 +1,7 @@
 """Compound eyes of insects and of a crustacean.
 
 All rhabdoms and rhabdomeres have the refractive index 1.363 in a medium of index 1.340. These are values for flies
-(Stavenga, J. Comp. Physiol. A 190, 115, 2004). The indices of the other animals have not been measured.
+(Stavenga, J. Comp. Physiol. A 190, 115, 2004). Measured indices of the other animals are not used.
 """
 
 from __future__ import annotations

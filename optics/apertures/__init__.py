@@ -7,8 +7,8 @@ polygonal      Polygon, Slit
 shapes         Disk, Oblong, Spider: parts of combined openings
 bitmap         Bitmap: openings drawn as images
 combined       union, difference, intersection; hexagonal segments
-boundary       edge of a combination
-pixelated      any shape tiled by square pixels
+boundary       edge of a combined opening
+pixelated      any shape, divided into pixels
 outline        edges and their crossings with lines
 strips         quadrature over the area inside an outline
 soft_edge      kernel that softens an edge

@@ -97,7 +97,7 @@ def boundary(pieces: Outline, contains: Contains) -> Boundary:
 
 
 def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
-    """Compare the outline with `contains` along lines through all pieces.
+    """Compare the outline with `contains` along horizontal lines through the pieces, at most 400 lines.
 
     Area and quadrature use the outline alone, so they would not reveal a missing shape.
 

@@ -1,8 +1,8 @@
 """Converging and diverging waves behind disks and rings, convolved with the kernel of a soft edge.
 
-A curved wave contains all directions from that of its centre to that of its rim. After the convolution, it contains
-only directions up to the stopband of the kernel. Light that leaves in other directions is removed, and light up to the
-passband, including the light that the hard edge diffracts, stays unchanged.
+A curved wave contains all directions from the direction at its centre to the direction at its rim. After the
+convolution, it contains only directions up to the stopband of the kernel. Light that leaves in other directions is
+removed, and light up to the passband, including the light that the hard edge diffracts, stays unchanged.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ BESSEL_STEP = 0.02  # choice: step of the table of J₀
 
 
 def curved_ring(edge: SoftEdge, inner: float, curvature: float, levels: int) -> np.ndarray:
-    """Return a smoothed wave behind a ring, divided by the wave itself, at `levels` values of r², (levels,), complex.
+    """Return a smoothed wave behind a ring, divided by the unsmoothed wave, at values of r², (levels,), complex.
 
     The wave e^{iπ c r²} passes the opening between the radii `inner` and 1, and is convolved with the kernel of the
     soft edge. The result is 1 where the kernel changes nothing. The values of r² lie in the middle of equal steps from

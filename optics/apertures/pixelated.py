@@ -77,9 +77,9 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Return the number of nodes along a pixel with which rows and columns of nodes are as accurate as `nodes`.
+        """Return `fixed`, or how many nodes along a pixel make rows and columns of nodes as accurate as `nodes`.
 
-        None: the number would be too large.
+        None: more than 32 nodes would be necessary.
         """
         if self.fixed is not None:
             return self.fixed

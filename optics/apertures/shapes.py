@@ -1,4 +1,4 @@
-"""Shapes for combined openings. They may lie anywhere and extend beyond the pupil."""
+"""Shapes for combined openings. All may extend beyond the pupil, and disks and rectangles may lie off the axis."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Shape(Protocol):
 
     @property
     def outline(self) -> Outline:
-        """Edge of the shape. It may contain further pieces that do not belong to the edge."""
+        """Edge of the shape. For some shapes, the outline contains further pieces that do not belong to the edge."""
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return a mask of the points (x, y) [pupil radii] within the shape; ValueError unless they are real."""

@@ -122,7 +122,7 @@ def _beta(ripple: float) -> float:
 
 
 def kaiser_beta(ripple: float) -> float:
-    """Return the parameter β of a Kaiser window for a ripple in one dimension, by Kaiser's rule.
+    """Return the parameter β of a Kaiser window for a ripple in one dimension, by Kaiser's rule, but at least 1.
 
     Source: Oppenheim & Schafer, Discrete-Time Signal Processing, §7.5.
     """

@@ -17,7 +17,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
-    """Return the indices of the first two edges that intersect elsewhere than at a shared end; None if none do."""
+    """Return the indices of the first two edges that intersect elsewhere than at a shared end; None without any."""
     n = len(vertices)
     along = np.roll(vertices, -1, axis=0) - vertices
     following = np.roll(along, -1, axis=0)
@@ -84,7 +84,7 @@ def triangles(vertices: np.ndarray) -> np.ndarray:
 
 
 def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bool:
-    """Return whether the corner a, b, c turns left and its triangle contains no other corner.
+    """Return whether the corner a, b, c turns left or is straight, and its triangle contains no other corner.
 
     left: indices of the corners of the remaining polygon.
     """

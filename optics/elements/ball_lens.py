@@ -157,9 +157,8 @@ class BallLens:
     def pupil(self, aperture_radius: float, wavelength: float = MIDDLE) -> Pupil:
         """Return the pupil through the centre of the lens, with the wavefront of parallel light behind the lens.
 
-        The wavefront refers to a sphere about the paraxial focus, which is the default distance of a sensor. The
-        pupil's amplitude is uniform over its plane, although rays are denser or sparser towards the rim of a thick
-        lens.
+        The wavefront refers to a sphere about the paraxial focus, where sensors are by default. The pupil's amplitude
+        is uniform over its plane, although rays are denser or sparser towards the rim of a thick lens.
 
         aperture_radius: largest distance [m] of parallel rays from the axis, below the lens's radius R.
         wavelength: vacuum wavelength [m]. The focal length and `medium_n` of the pupil are those for this wavelength.

@@ -29,7 +29,7 @@ ON_Z = (0.0, 0.0, 1.0)
 class ConvergingWave:
     """Samples of a wave near a sphere around a point of the image plane.
 
-    sines: components along the image plane's axes x and y of the unit vectors from this point to the samples, (2, n).
+    sines: unit vectors from this point to the samples, as components along the image plane's axes x and y, (2, n).
     ahead: distance [m] by which the wavefront is ahead of the sphere, times the refractive index, (n,).
     rim: rim of the pupil, in sines.
     on_plane: rim [m] of the pupil on its plane, which lies `distance` in front of the image.
@@ -216,7 +216,7 @@ def _flat(name: str, values: Any) -> np.ndarray:
 
 
 def _one(name: str, value: Any) -> float:
-    """Return a number, or the first of an array, in its own unit; ValueError about `name` if it is 0 or not finite."""
+    """Return a number, or the first number of an array; ValueError about `name` if it is 0 or not finite."""
     found = _flat(name, value)
     if value is None or found.size == 0 or not abs(found[0]) > 0 or not np.isfinite(found[0]):
         raise ValueError(f"{name} = {shown(value)}: must be a finite number that is not 0")

@@ -82,7 +82,7 @@ class ExitPupil:
     def image_height(self) -> float:
         """Position [m] of the image plane relative to the origin of the object's coordinates.
 
-        It is measured along the light and perpendicular to the plane.
+        It is measured perpendicular to the plane, and is positive in the direction of the light.
 
         Raises:
             ValueError: the object does not contain it (prysm).
@@ -123,7 +123,8 @@ def read_exit_pupil(
 
     The pupil is a circle, an ellipse or, if a lens mount cuts off part of the light, a convex polygon. The light may
     reach the image plane at an angle. The PSF then refers to this plane. For this purpose, a position in the pupil is
-    given by the sines of its ray along the plane, minus those of the ray through the pupil's centre.
+    given by the unit vector of its ray: by the components parallel to the plane, minus those of the ray through the
+    pupil's centre.
 
     system: an object of one of two kinds. The first has pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like
         optiland's WavefrontData with any distribution of rays. The second has data (complex), dx [mm] and wavelength

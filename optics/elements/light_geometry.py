@@ -1,6 +1,6 @@
 """Sources, ideal lenses and media of several beams: the part of the light that reliefs and wavefronts do not change.
 
-Users often compute many PSFs that differ in the relief or wavefront only. Their geometry is then kept, together with
+Users often compute many PSFs that differ in the relief or wavefront only. Their geometry is then cached, together with
 the results of planning that depend on nothing else.
 """
 
@@ -22,10 +22,10 @@ RIM, ANGLES = 0, 48  # stands for points on the rim, see `disk_points`; choice: 
 
 @dataclass(frozen=True)
 class LightGeometry:
-    """Numbers of several beams, (beam,).
+    """Geometry of several beams. Each field contains one number per beam.
 
     radius: radii of the pupils [m].
-    distance: distances of the window behind the pupils [m].
+    distance: distances of the sensor planes behind the pupils [m].
     vacuum_wavelength: wavelengths in vacuum [m].
     behind, before: refractive indices behind and before the pupils.
     focal: focal lengths of ideal lenses [m]; infinite without a lens.
@@ -53,7 +53,7 @@ class LightGeometry:
 
     @cached_property
     def spheres(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Spherical waves of the lenses and of the sources: index and distance [m] of the centre, (beam,) each.
+        """Spherical waves of lenses and sources: refractive index and distance [m] of the wave's centre, (beam,) each.
 
         The index of a wave that converges is negative.
         """
@@ -62,7 +62,9 @@ class LightGeometry:
         return [(read_only(index), read_only(r)) for index, r in known if np.isfinite(r).any()]
 
     def waves(self, x: np.ndarray, y: np.ndarray) -> np.ndarray | float:
-        """Return the paths of all spherical waves at points (x, y) [m], in waves, up to a constant, (beam, y, x).
+        """Return the sum of the spherical waves' paths at points (x, y) [m], in wavelengths, up to a constant.
+
+        The shape is (beam, y, x).
 
         x, y: points, (beam, y, x).
         """
@@ -74,7 +76,7 @@ class LightGeometry:
         return total
 
     def slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the gradients of the paths of all spherical waves along x and y at `disk_points`, (beam, point)."""
+        """Return the slopes of the spherical waves' total path along x and along y at `disk_points`, (beam, point)."""
         if across not in self._slopes:
             _, x, y = disk_points(across)
             radius = self.arrays[0][:, None]
@@ -86,12 +88,12 @@ class LightGeometry:
 
     @cached_property
     def _slopes(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Slopes for FEW and MANY points across the pupil."""
+        """Cached results of `slopes`, by the number of points across the pupil."""
         return {}
 
 
 def light_geometry(beams: Sequence[tuple[float, ...]]) -> LightGeometry:
-    """Return the geometry of beams, each given by the fields of `LightGeometry`. That of a single beam is kept."""
+    """Return the geometry of beams, each given by the fields of `LightGeometry`. The geometry of one beam is cached."""
     return _kept(beams[0]) if len(beams) == 1 else LightGeometry(*zip(*beams, strict=True))
 
 

@@ -90,7 +90,7 @@ class LightStack:
 
     @property
     def distance(self) -> np.ndarray:
-        """Distances of the window behind the pupils [m], (beam,)."""
+        """Distances of the sensor planes behind the pupils [m], (beam,)."""
         return self.geometry.arrays[1]
 
     @property
@@ -105,7 +105,7 @@ class LightStack:
 
     @cached_property
     def _indices(self) -> list[tuple[float, float, float]]:
-        """Refractive indices behind and before the pupils, and the steps of the reliefs, for each beam.
+        """Refractive indices behind and before the pupils, and the index step of the relief, for each beam.
 
         Pupils of a population often have the same media, whose curves are then evaluated once.
         """
@@ -127,7 +127,7 @@ class LightStack:
 
     @cached_property
     def _polynomials(self) -> tuple[np.ndarray, list[int]]:
-        """Coefficients of `powers_of` for each beam, and the beams whose reliefs or wavefronts are not polynomials."""
+        """Coefficients of `powers_of` for each beam, and the beams whose relief or wavefront is not a polynomial."""
         known = [
             powers_of(beam.pupil, beam.wavelength, step)
             for beam, (_, _, step) in zip(self.beams, self._indices, strict=True)
@@ -146,7 +146,7 @@ class LightStack:
 
     @cached_property
     def smooth_points(self) -> int | None:
-        """Number of Chebyshev points across the pupils that determine the paths; None for maps and oblique light."""
+        """Number of Chebyshev points across the pupils that determine the paths; None with maps or oblique light."""
         coefficients, others = self._polynomials
         if others or any(self._tilted):
             return None

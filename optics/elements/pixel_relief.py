@@ -51,7 +51,7 @@ class PixelRelief(Relief):
         return float(np.ptp(self._heights))
 
     def bandwidth(self, level: float) -> float:
-        """Return infinity, because jumps have no band limit; 0 if all heights are equal."""
+        """Return infinity, because jumps have no band limit; 0 if heights are equal and carry no derivatives."""
         return 0.0 if self._level else math.inf
 
     def detail(self, level: float) -> float:

@@ -252,7 +252,7 @@ class Pupil:
         return all_slopes(level, same, number(source.distance), source.plain.angle, self.pieces(same))
 
     def pieces(self, wavelength: float) -> int:
-        """Return the larger number of polynomial pieces across the pupil, of the relief or of the wavefront.
+        """Return the number of polynomial pieces across the relief or across the wavefront, whichever number is larger.
 
         An absent wavefront counts 0, and so does a relief that does not bend light of this wavelength.
         """
@@ -262,14 +262,14 @@ class Pupil:
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
-        """First requested wavelength for each set of refractive indices."""
+        """First requested wavelength for each set of refractive indices; equal indices give equal slopes."""
         return {}
 
     def scatter(self, wavelength: float, share: float) -> float:
         """Return the frequency [1/m] along x and y beyond which at most a fraction `share` of the light is scattered.
 
-        Jumps of a relief, masks and ripples scatter light away from geometrical rays. The result contains the frequency
-        of the ripples. Callers add the frequency that corresponds to the slopes of the rays (Carson's rule).
+        Square pixels, masks and fine detail of maps scatter light away from geometrical rays. The result is the sum of
+        their frequencies. Callers add the frequency that corresponds to the slopes of the rays (Carson's rule).
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))

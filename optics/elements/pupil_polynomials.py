@@ -80,7 +80,7 @@ def power_sum(coefficients: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndar
 
 
 def _next(line: np.ndarray | None, x: np.ndarray, c: np.ndarray | None) -> np.ndarray | None:
-    """Return line · x + c."""
+    """Return line · x + c, where None counts as 0."""
     if line is None:
         return None if c is None else np.broadcast_to(c, x.shape).copy()
     np.multiply(line, x, out=line)

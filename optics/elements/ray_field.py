@@ -100,7 +100,10 @@ class RayField(Mask):
         return found if own is None else found * own.amplitude(x, y, radius)
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return the bandwidth of the path plus that of ray directions, which have poles at a lens' focal distance."""
+        """Return a bandwidth that includes the path, the pupil's own mask and, behind a lens, the rays' directions.
+
+        These directions have singularities at the distances ±if from the axis, with the focal length f.
+        """
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)
         found += 0.0 if own is None else own.bandwidth(level, radius)

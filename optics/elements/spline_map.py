@@ -30,7 +30,7 @@ FEW = 128  # choice: number of samples up to which a product with `spline_matrix
 
 
 def is_open_grid(x: Array, y: Array) -> bool:
-    """Return whether x is a NumPy row and y a NumPy column. The heights are then a product of matrices."""
+    """Return whether x is a NumPy row and y a NumPy column. The map's values are then a product of matrices."""
     return library(x) is np and x.ndim == y.ndim == 2 and len(x) == 1 and y.shape[1] == 1
 
 
@@ -84,7 +84,7 @@ def spline_coefficients(samples: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def spline_matrix(n: int) -> np.ndarray:
-    """Return the matrix between n samples along an axis and the coefficients, (coefficient, sample)."""
+    """Return the matrix that maps n samples along an axis to spline coefficients, (coefficient, sample)."""
     return _coefficients(np.eye(n))
 
 

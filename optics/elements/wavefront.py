@@ -138,8 +138,8 @@ class Zernike(Aberration):
         radius: radius [m] of the circle. None: the pupil's radius.
 
         Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. Their
-        coefficients are therefore divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use
-        Fringe polynomials. A row that is a Dr.Jit array is not accepted.
+        coefficients are therefore divided by √((2 - δ_m0)(n + 1)). Many interferometers and programs for lens design
+        use Fringe polynomials. A row that is a Dr.Jit array is not accepted.
 
         Raises:
             ValueError: a number is outside 1 to 36, or a coefficient is invalid, see `Zernike`.

@@ -1,6 +1,7 @@
 """Local slopes of the wavefront behind a pupil.
 
-They give the directions of rays, and the combined gradient of the pupil's phase and of the path to the window.
+They give the directions of rays, and the combined gradient of the pupil's phase and of the path to a point of the
+window. The window is the part of the sensor plane in which light is computed.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ def derivative(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) -> np.ndarray:
-    """Return |∇L + n (ξ - x) / D| for points ξ of the pupil and x of a plane at the distance D from ξ, (target, point).
+    """Return |∇L + n (ξ - x) / D| for points ξ of the pupil and x of a plane, D = |ξ - x| apart, (target, point).
 
     points: x, y, ∂L/∂x and ∂L/∂y of points of the pupil, where L is the optical path to the point.
     to: x and y of the target points.

@@ -31,7 +31,7 @@ def osa_mode(j: int) -> Mode:
 def noll_mode(j: int) -> Mode:
     """Return the mode with the number j of Noll, from 1 on (J. Opt. Soc. Am. 66, 207, 1976, table I).
 
-    Within an order n, |m| increases. Even numbers are cosine modes, and odd numbers are sine modes.
+    Within an order n, |m| increases. For m ≠ 0, even numbers are cosine modes, and odd numbers are sine modes.
 
     Raises:
         ValueError: j is not a whole number from 1 to 496.

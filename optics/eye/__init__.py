@@ -23,7 +23,7 @@ polarization          microvilli over a retina and polarised scenes
 signals               signals of a scene
 photoreceptor         throughput, spectral weighting, noise
 camera                image of a scene on the sensor of a camera
-patch                 the receptor in one direction as an eye of its own
+patch                 an eye with only the receptor that faces a given direction
 summary               table of an eye's limits
 acuity                limits by the spacing of receptors, diffraction and photons
 """

@@ -26,8 +26,8 @@ DETECTED = 0.954  # d' for 75 % correct choices between two intervals
 def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
     """Return the eye parameter p = D Δφ [m] of a compound eye (Snyder, J. Comp. Physiol. 116, 161, 1977).
 
-    Eyes that work in bright light are limited by diffraction and have values near `least_eye_parameter`. Eyes that are
-    limited by photon noise have larger values.
+    Eyes that are limited by diffraction, in bright light, have values near `least_eye_parameter`. Eyes that are limited
+    by photon noise have larger values.
 
     diameter: diameter D [m] of a facet.
     interommatidial_deg: interommatidial angle Δφ [degrees].

@@ -84,9 +84,9 @@ def camera_image(
 ) -> np.ndarray | Array:
     """Return the image (channel, y, x) of a scene behind a pupil on a sensor, or the signals of an eye.
 
-    Light is blurred by the PSF of its distance and wavelength, and near surfaces hide far ones (see `Eye.see`). It is
-    integrated over pixels and weighted by the filters. Electrons are counted with shot noise, up to the full well. Read
-    noise is added, and the sum is rounded to digital numbers.
+    Light is blurred by the PSF of its distance and wavelength, and near surfaces hide far ones (see `Eye.see`). The
+    blurred light is integrated over pixels and weighted by the filters. Electrons are counted with shot noise, up to
+    the full well. Read noise is added, and the sum is rounded to digital numbers.
 
     scene: sRGB image (Y, X, 3) with values in [0, 1], as in image files, or radiance (band, Y, X). The radiance is
         relative to a white surface, in the bands of `camera_eye(lens, sensor).spectral_bands`. An sRGB image becomes

@@ -50,9 +50,9 @@ class Eye(EyeSpec):
     sensor_width: L, width [m] of the retina or of the modelled patch of it.
     full_aperture: diameter [m] of a pupil with a throughput of 1 (None: L).
     eccentricity_deg: (right, up), viewing direction of the middle of the patch in the visual field.
-    bands: number of spectral bands, 1 to 64. "auto": the smallest number for which the predicted error of a receptor's
-        signal is within the tolerance. It requires PSFs at many wavelengths, which is worthwhile for an eye that is
-        used often. This field then contains the chosen number.
+    bands: number of spectral bands, 1 to 64. "auto": the smallest power of two, up to 32, for which the predicted error
+        of a receptor's signal is within the tolerance. It requires PSFs at many wavelengths, which is worthwhile for an
+        eye that is used often. This field then contains the chosen number.
     noise_sigma: standard deviation of a receptor's Gaussian noise, in units of the signal.
     photon_budget: light level. Shot noise is added before the Gaussian noise (None: no shot noise).
     receptors: types of receptor: "rgb" (three channels: red, green, blue), "lms" (human cones), "honeybee", "goldfish",
@@ -156,7 +156,7 @@ class Eye(EyeSpec):
         return Retina(self.retina_distance, wavelengths, cell, self.tolerance, *settings)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the fewest bands that keep a receptor's predicted error within the tolerance. Errors: see `psf`."""
+        """Return the fewest bands that meet the tolerance, see `choose_bands`. Errors: see `psf`."""
         retina = self._retina_of(np.empty(0), self.smallest_receptor, CELLS_FOR_BANDS)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
 
@@ -176,10 +176,10 @@ class Eye(EyeSpec):
         z: distances [m] in the scene, a number or an array. Only the nearest and the farthest distance matter, except
             for "distinct" layers.
         depth_layers: number of kernels between the nearest and the farthest distance, evenly spaced in 1/z. "auto": the
-            smallest number that meets the tolerance. "distinct": one kernel for each different distance in z, at most
-            64.
-        field_zones: number of kernels along the longer side of the field; or "auto". With 1, the kernel in the middle
-            of the field is used for the whole retina.
+            first of 1, 3, 5, 9, 17 and 33 that meets the tolerance. "distinct": one kernel for each different distance
+            in z, at most 64.
+        field_zones: number of kernels along the longer side of the field, or "auto" for the first of 1, 3, 5 and 9 that
+            meets the tolerance. With 1, the kernel in the middle of the field is used for the whole retina.
         tolerance: largest error of a receptor's signal, relative to the signal of a white surface, for any scene at
             most as bright as white (None: the eye's tolerance).
         light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" treats all light
@@ -233,7 +233,7 @@ class Eye(EyeSpec):
             kernels within the tolerance.
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside their
             range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
-            last call are kept. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
+            last call are cached. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
         polarization: (degree, angle_deg) of the light, for an eye with microvilli. These are the degree of linear
             polarisation in [0, 1], and the angle of the electric field, from right towards up. Each is a number or an
             array (band,), (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do

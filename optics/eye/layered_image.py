@@ -101,6 +101,6 @@ class _Scene:
         return [share * cells for share in self.bank.shares(self.inverse_distance.ravel()[source])]
 
     def _blurred(self, scenes: list[np.ndarray], kernels: list[Array]) -> Array:
-        """Return the sum over kernels of the scenes, blurred by one kernel each; dark scenes are omitted."""
+        """Return the sum of the scenes, each blurred by its own kernel; dark scenes are omitted."""
         bright = [i for i, scene in enumerate(scenes) if scene.any()] or [0]
         return blur([scenes[i] for i in bright], [kernels[i] for i in bright], self.shape, self.types)

@@ -85,7 +85,7 @@ def _least_jump(inverse_distance: np.ndarray, parallax: float) -> float:
 
 
 def _highest_neighbour(values: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return the highest value of the selected cells among the neighbours of each cell; -inf without such cells."""
+    """Return the highest value of the selected cells among each cell and its neighbours; -inf without such cells."""
     from scipy.ndimage import maximum_filter
 
     selected = np.where(cells, values, -math.inf)

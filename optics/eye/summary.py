@@ -29,7 +29,7 @@ Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (b
 
 @dataclass(frozen=True)
 class Description:
-    """Limits of an eye in white daylight, near its axis. Frequencies [cycles/degree] are in the visual field.
+    """Limits of an eye in white daylight, in the middle of its field. Frequencies [cycles/degree] are visual angles.
 
     relative_aperture: a, the pupil's diameter relative to that of a pupil with a throughput of 1.
     throughput: a², times the open fraction of the aperture's disk, times the mask's transmission.
@@ -124,7 +124,7 @@ class Description:
         return "\n".join(f"{name:<20}{value}" for name, value in rows.items())
 
     def _vertical_rows(self, bound: str) -> dict[str, str]:
-        """Return rows on the vertical direction, unless receptors are square."""
+        """Return table rows on the vertical direction; none if receptors are square."""
         if math.isclose(self.interommatidial_vertical_deg, self.interommatidial_angle_deg, rel_tol=1e-9):
             return {}
         apart = f"rows of receptors {self.interommatidial_vertical_deg:.3g}° apart"

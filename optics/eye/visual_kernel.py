@@ -42,7 +42,7 @@ class _WindowNeeds:
 
     half_window: half side [m] of the window around the geometric image.
     pitch: pitch [m] that resolves the PSF.
-    band: frequency [1/m] above which the spectrum of the PSF is below the tolerance.
+    band: frequency [1/m] beyond which light behind the pupil may be omitted, within the tolerance.
     half_of_rays: half side [m] of a window that contains the hit points of rays, without diffraction.
     """
 
@@ -145,6 +145,9 @@ def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retin
     """Return the result of `compute` for the area that the light reaches.
 
     If `compute` refuses a steep relief, the area is limited to the longer or else to the shorter side of the retina.
+
+    Raises:
+        AccuracyError: `compute` fails for each area. The error is that for the first one.
     """
     errors: list[AccuracyError] = []
     for most in (math.inf, max(retina.size), min(retina.size)):
@@ -168,6 +171,9 @@ def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
 
     most: largest half side [m]. If it is the longer side of the retina, the area contains the light that arrives at any
         receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
+
+    Raises:
+        CellsError: the area has too many cells.
     """
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)

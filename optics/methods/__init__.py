@@ -1,7 +1,8 @@
 """Methods that evaluate one diffraction integral, the first Rayleigh-Sommerfeld integral, exactly or approximately.
 
 Every method except the textbook's takes a `Problem` and returns `Sampling`s. A sampling predicts its time and error and
-computes the PSF on request. `optics.point_spread.planner` chooses between them.
+computes the PSF on request. `optics.point_spread.planner` chooses between them. The window is the part of the sensor
+plane in which the PSF is computed.
 
 textbook             the angular spectrum in plain NumPy: start here
 carrier              the phase of a spherical wave, which methods remove from fields and restore
@@ -23,9 +24,9 @@ slow_factor          the slow factor of `low_rank`, and the points of the window
 axis_kernel          the diffraction kernel along one axis of the window
 remaining_factor     the slow factor, divided by its values along both axes
 window_sampling      `low_rank` at coarse tolerances, for one PSF
-window_plan          samples of several pupils that the light in a window needs, at coarse tolerances
-window_geometry      the part of these plans that does not depend on reliefs and wavefronts
-window_edges         soft edges and densities of these samples, smoothed waves of wide pupils without a lens
+window_plan          as few samples of several pupils as the light in a window needs, at coarse tolerances
+window_geometry      the part of a `window_plan` that does not depend on reliefs and wavefronts
+window_edges         soft edges and densities of the samples of `window_plan`; smoothed waves of wide pupils
 window_bands         frequencies of the light and of these soft edges
 window_rank          rank of the slow factor for the samples of `window_plan`
 window_images        PSFs of several pupils from the samples of `window_plan`
@@ -33,7 +34,7 @@ window_stack         several sources and wavelengths through one pupil, from the
 stack_operation      these PSFs as one operation of PyTorch, with the derivatives by the phase of the pupil
 pixel_nodes          nodes of pupils of pixels, for `low_rank` at coarse tolerances
 sampled_path         reliefs and wavefronts at samples of the pupil, from arrays that many pupils share
-window_check         error of such PSFs, by a sum over other samples in a few places
+window_check         error of PSFs from the samples of `window_plan`, by a sum over other samples
 mirrored_matrix      products with matrices that do not change if rows and columns are mirrored
 window_sums          sums over the pupil for `window_sampling` and `window_stack`, and their adjoint
 far_field            one Fourier transform onto directions for each of a few nodes of the window

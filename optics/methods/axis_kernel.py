@@ -29,7 +29,7 @@ class HasDirections(Protocol):
 
     @property
     def elsewhere(self) -> float | np.ndarray:
-        """Sines at which the factors along the other axis are evaluated."""
+        """Sines along the other axis at which the factor of one axis is evaluated."""
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return points (x, y) [m] of the pupils."""

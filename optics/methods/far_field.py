@@ -1,4 +1,8 @@
-"""The Rayleigh-Sommerfeld integral by Fourier transforms onto directions, one for each of a few nodes of the window."""
+"""The Rayleigh-Sommerfeld integral by Fourier transforms onto directions.
+
+One transform is computed for each of a few points of the window (nodes). Between the nodes, a slow factor is
+interpolated.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The angular spectrum of a rotationally symmetric pupil by two Hankel transforms. This is the cheapest exact method.
+"""The angular spectrum of a rotationally symmetric pupil by two Hankel transforms, usually the fastest exact method.
 
     S(f) = 2π ∫ P(r) J₀(2πfr) r dr,   U(x) = 2π ∫ S(f) e^{ikz (cos θ - 1)} J₀(2πfx) f df,   f = sin θ / λ
 

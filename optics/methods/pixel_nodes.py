@@ -155,7 +155,12 @@ WindowSamples = SineSamples | PixelNodes
 
 
 class PixelPlan(NamedTuple):
-    """Nodes, finer nodes of the check, rank of the slow factor, half width [m] of its points, time [s] and memory."""
+    """Nodes for a pupil of pixels, and what follows from them.
+
+    finer: finer nodes for `window_check`.
+    rank, half: rank of the slow factor, and half width [m] of the square of its interpolation points.
+    seconds, bytes: predicted time and memory.
+    """
 
     pupil: PixelNodes
     finer: PixelNodes
@@ -185,7 +190,8 @@ def pixel_plan(problem: Problem) -> PixelPlan | None:
 def _across(problem: Problem) -> int | None:
     """Return the number of nodes along a pixel with which the mean error of integrals over pixels is small enough.
 
-    Pixels that the edge of the aperture cuts have larger errors. See `_squared_errors`.
+    Pixels that the edge of the aperture cuts have larger errors, see `_squared_errors`. The result is None if
+    MOST_NODES or more nodes would be necessary.
     """
     assert problem.pixelated is not None
     level = problem.stack.level

@@ -1,6 +1,6 @@
 """The slow factor, relative to the middle of the window, divided by its values along both axes.
 
-It varies even more slowly over the window than the slow factor.
+This quotient varies even more slowly over the window than the slow factor.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""The error of a PSF from few samples of the pupil, by a sum over other samples in a few rows and columns.
+"""The error of a PSF that was computed from few samples of the pupil.
 
-The other samples are finer, and their edge is sharper. Their grid is shifted by a fraction of the pitch that is not a
-simple ratio. The comparison therefore shows the errors due to aliased light, to detail between the samples, and to the
-soft edge. It also shows the error due to the rank, because the check interpolates the slow factor over the pupil
-instead of the window. Both sums use the slow factor, so the check also compares this factor with the diffraction kernel
-itself. The error of the check's own sum is at most half of the error that the check finds.
+The check compares the PSF with a sum over other samples, in a few rows and columns of the window. The other samples are
+finer, and their edge is sharper. Their grid is shifted by a fraction of the pitch that is not a simple ratio. The
+comparison therefore shows the errors due to aliased light, to detail between the samples, and to the soft edge. It also
+shows the error of interpolating the slow factor over the window, because the check interpolates it over the pupil
+instead. Both sums use the slow factor, so the check also compares this factor with the diffraction kernel itself. The
+error of the check's own sum is at most half of the error that the check finds.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ def window_errors(
 
 @dataclass(frozen=True, eq=False)
 class _CheckSums:
-    """Sums over samples of pupils in rows and columns of a window. Parts that do not depend on the light are kept.
+    """Sums over samples of pupils in rows and columns of a window. Parts independent of the light are cached.
 
     The slow factor, divided by its values A along both axes, is interpolated from a few points (ξ_a, η_b) of the pupil
     with weights L_a and L_b:
@@ -225,10 +226,10 @@ def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _along_axis(root: np.ndarray, bright: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the indices of a few rows, or columns, and the probability with which each is drawn, (stack, row).
 
-    Rows are drawn at even steps of their cumulative probability. This is a mixture of four distributions. The first is
-    uniform. The second is proportional to the square root of the intensity, like the error of the intensity if the
-    error of the amplitude is the same everywhere. The third favours the brightest samples and their neighbours, and the
-    last the sides of the window, where phases change fastest.
+    Rows are drawn at even steps of their cumulative probability. The probability is a mixture of four distributions.
+    The first is uniform. The second is proportional to the square root of the intensity, like the error of the
+    intensity if the error of the amplitude is the same everywhere. The third favours the brightest samples and their
+    neighbours, and the last the sides of the window, where phases change fastest.
 
     root, bright: sums over each row of the square root of the intensity, and of its square, (stack, row).
     """

@@ -96,7 +96,7 @@ class WindowEdges:
 
     @cached_property
     def finer_edges(self) -> list[SoftAperture]:
-        """Soft apertures that are as sharp as the finer samples allow, (beam,)."""
+        """Soft apertures that are as sharp as the finer samples of `window_check` allow, (beam,)."""
         return self._unless_mapped(self._finer_wide, partial(self._narrow, FINER * self.density, CARRIED_RIPPLES[1]))
 
     def _finer_wide(self) -> list[SoftAperture]:
@@ -109,7 +109,7 @@ class WindowEdges:
     ) -> list[SoftAperture]:
         """Return wide soft edges, and narrow ones for derivatives and for maps.
 
-        The fine detail of maps sends light from the edge anywhere.
+        The fine detail of maps sends light from the edge in all directions.
         """
         mapped = self.stack.mapped
         if self.derivatives is not None or mapped.all():
@@ -135,7 +135,7 @@ class WindowEdges:
 
     @cached_property
     def _rim_curvature(self) -> np.ndarray:
-        """Mean cycles per radius of the rays at the rim, away from the axis, in steps, (beam,)."""
+        """Mean cycles per radius of the rays at the rim, in the direction away from the axis, (beam,), in steps."""
         slopes, (along_x, along_y) = self.stack.slopes, self._to_middle
         r2 = np.square(slopes.x) + np.square(slopes.y)
         rim = self.geometry.to_middle(slopes.across).rim

@@ -1,6 +1,6 @@
 """The part of a plan for a window that depends neither on reliefs, wavefronts and masks nor on the tolerance.
 
-Users often compute many PSFs of one window whose wavefronts differ. The geometry of a single beam is therefore kept.
+Users often compute many PSFs of one window whose wavefronts differ. The geometry of a single beam is therefore cached.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ class PathSlopes(NamedTuple):
 
 
 class PlannedRays(NamedTuple):
-    """Points of the pupils whose rays determine the rank.
+    """Points of the pupils whose rays determine the rank of the slow factor.
 
-    some: which of the `disk_points` they are.
+    some: their indices in `disk_points`.
     at: points (x, y) [m] relative to the middle of the window, (beam, ray).
-    scale: distance to the window [m] for a slope of 1, (beam, ray).
+    scale: displacement [m] of a ray on its way to the window for a slope of 1, (beam, ray).
     blur: distance [m] by which diffraction spreads the light, (beam, 1).
     directions: sines of the lines from the middle of the window, relative to those of the pupil's centre, (beam, ray).
-    sine2: sum of their squares.
+    sine2: sum of the squares of both sines, (beam, ray).
     """
 
     some: slice
@@ -138,7 +138,7 @@ class WindowGeometry:
 
     @cached_property
     def known(self) -> KeptValues:
-        """Values that depend on the geometry and on their key."""
+        """Cached values that depend on the geometry and on their key."""
         return KeptValues(KEPT)
 
 
@@ -148,7 +148,7 @@ def half_window(window: Grid) -> float:
 
 
 def window_geometry(stack: LightStack, window: Grid) -> WindowGeometry:
-    """Return the geometry of light and a window. That of a single beam is kept."""
+    """Return the geometry of light and a window. The geometry of a single beam is cached."""
     light = stack.geometry
     return _kept(light, window) if len(stack.beams) == 1 else WindowGeometry(light, window)
 

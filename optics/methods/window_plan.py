@@ -75,7 +75,7 @@ class WindowPlan:
 
     @staticmethod
     def finer_count(count: np.ndarray) -> np.ndarray:
-        """Return the number of samples of the check between the middle and an end."""
+        """Return how many samples the finer set for `window_check` has between the middle and either end."""
         return np.ceil(FINER * count + SHIFT).astype(int)
 
     @property

@@ -1,4 +1,7 @@
-"""The rank of the slow factor for samples that follow from the light in a window, at coarse tolerances."""
+"""The rank of the slow factor at coarse tolerances, if samples are chosen for the light that arrives in a window.
+
+The rank is the number of points per axis of the window between which the slow factor is interpolated.
+"""
 
 from __future__ import annotations
 

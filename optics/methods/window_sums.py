@@ -99,7 +99,7 @@ def recorded_field(pupil: Field, distance: Scalar, sums: WindowSums, window: Gri
     moves = carries_derivative(distance)
 
     class WindowField(dr.CustomOp):
-        """`sums.field` as one operation of Dr.Jit. The pupil's light is kept for derivatives by the distance."""
+        """`sums.field` as one operation of Dr.Jit. The pupil's light is kept for the derivative by distance."""
 
         def eval(self, re: Array, im: Array, distance: Array) -> tuple[Array, Array]:
             self.pupil = _complex(re, im, shape)

@@ -1,4 +1,4 @@
-"""Numbers, arrays and sums over them. Nothing in this package is specific to light.
+"""Numbers, arrays and sums over them. Little in this package is specific to light.
 
 accuracy        Plan and AccuracyError: predicted errors of results
 arguments       checks of user input

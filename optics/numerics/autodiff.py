@@ -1,4 +1,4 @@
-"""Parameters that may carry derivatives. The planner uses them as plain numbers, the physics as Dr.Jit arrays."""
+"""Parameters that may carry derivatives. The planner uses them as numbers, the computation as arrays."""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 
 Dr.Jit loads LLVM as a shared library. If the library is too old, Dr.Jit raises an exception. Some versions (15 and 16
 with Dr.Jit 1.5) abort the whole process at the first ``maximum``, which exception handlers cannot prevent. A child
-process therefore tests the library. The verdict is cached by path, size and modification time.
+process therefore tests the library. The verdicts "good" and "aborts" are cached for the file and the versions of Dr.Jit
+and Python.
 """
 
 from __future__ import annotations
@@ -131,7 +132,7 @@ def _cache_file() -> Path:
 
 
 def _cache_key(path: str) -> str:
-    """Return a cache key for this file and this version of Dr.Jit. A verdict is valid for this combination only."""
+    """Return a cache key for this file and the versions of Dr.Jit and Python, for which alone a verdict is valid."""
     stat = os.stat(path) if os.path.exists(path) else None
     size, modified = (stat.st_size, stat.st_mtime_ns) if stat else (0, 0)
     return f"{path}|{size}|{modified}|drjit {_drjit_version()}|python {sys.version_info[:2]}"
@@ -188,6 +189,8 @@ def _write_cache(content: dict[str, Any]) -> None:
 
 def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm | None, list[Llvm]]:
     """Return the first usable LLVM library among `paths` (default: `candidates()`), and all test results up to it.
+
+    The library is None if none is usable.
 
     cached: True to use test results of former processes.
     """

@@ -7,7 +7,7 @@
 The period may have any value, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT
 can be used instead. `dft2` selects the faster of both by their predicted times (optics.numerics.cost). Dr.Jit's matrix
 product executes more operations per second, but SciPy's FFT needs fewer operations. Matrices are therefore faster for
-small windows, and the FFT is faster for large windows. Both are differentiable.
+small windows, and the FFT is faster for large windows. In `dft2`, both are differentiable.
 """
 
 from __future__ import annotations
@@ -44,7 +44,10 @@ AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a me
 
 
 def fast_length(least: float) -> int:
-    """Return a length of at least `least` for which the FFT is fast: the smallest integer of the form 2^a 3^b 5^c."""
+    """Return a length of at least `least` for which the FFT is fast: the smallest integer of the form 2^a 3^b 5^c.
+
+    Beyond LONGEST_FFT, the result is `least`, rounded up, because no FFT is used there.
+    """
     if least > LONGEST_FFT:
         return ceil(least)  # no FFT is used for such lengths
     lengths = _smooth_numbers()

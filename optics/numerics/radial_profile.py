@@ -117,7 +117,7 @@ class DistinctRadii:
 
     They are used if a window has few samples for the structure that it contains.
 
-    A square of 33 x 33 or more samples about the axis has fewer distinct radii than an eighth of that number.
+    A square of 33 x 33 or more samples about the axis has fewer distinct radii than an eighth of its samples.
     """
 
     window: Grid

@@ -55,7 +55,7 @@ class AcceptanceFunction(ReadOnlyArrays):
 def acceptance_function(ommatidium: Ommatidium, wavelengths: np.ndarray, loss: float = 5e-3) -> AcceptanceFunction:
     """Return the acceptance function of an ommatidium. Calls with equal arguments return the same object.
 
-    The window is widened until it contains all but the fraction `loss` of the light that the modes accept from all
+    The grid is widened until it contains all but the fraction `loss` of the light that the modes accept from all
     directions, at each wavelength. Its half width is at most a sine of 0.5, so wider fields lose more.
 
     wavelengths: vacuum wavelengths [m], (band,).

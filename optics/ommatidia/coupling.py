@@ -35,7 +35,7 @@ PAIRS = 4_000_000  # choice, limited by memory: pairs of node and direction that
 
 @dataclass(frozen=True, eq=False)
 class ModesAtPupil:
-    """Modes of a waveguide, propagated back to the nodes of a pupil.
+    """Modes of a waveguide, propagated back to the quadrature nodes of a pupil.
 
     x, y: positions of the nodes [m].
     weights: amplitude P of the pupil, times the mode's field Ψ at the node, times the node's area dξ, (mode, node).

@@ -109,8 +109,8 @@ class AppositionEye:
     def contrast(self, cycles_per_degree: float, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
         """Return the contrast of a sine grating in an ommatidium's signal, for a grating of contrast 1.
 
-        It is the modulus of the Fourier transform of the normalised angular sensitivity. The contrast falls as the
-        grating becomes finer. It is 0 beyond 2R n/λ cycles per radian, where R is the radius of the pupil and n the
+        It is the modulus of the Fourier transform of the normalised angular sensitivity. The contrast usually falls as
+        the grating becomes finer. It is 0 beyond 2R n/λ cycles per radian, where R is the radius of the pupil and n the
         index in front of it. The spacing of the ommatidia is a separate limit: their array resolves gratings up to
         1/(√3 Δφ), with the interommatidial angle Δφ.
 

@@ -154,8 +154,8 @@ class Waveguide:
     def modes(self, wavelength: float) -> tuple[Mode, ...]:
         """Return the modes that the tip guides at a vacuum wavelength [m], the best confined first.
 
-        Modes with l >= 1 come in pairs. There is none if V is very small, such as 0.3: light then travels almost only
-        outside the core.
+        Modes with l >= 1 come in pairs. The result is empty if V is very small, such as 0.3: light then travels almost
+        only outside the core.
 
         Raises:
             ValueError: see `v_number`, or the guide tapers too fast for light to stay in its mode.

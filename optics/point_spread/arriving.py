@@ -1,4 +1,4 @@
-"""Fraction of the pupil's light that arrives on an unbounded plane. The rest is evanescent."""
+"""Fraction of the pupil's light that arrives on an unbounded plane. A mask absorbs the rest, or it is evanescent."""
 
 from __future__ import annotations
 
@@ -183,10 +183,10 @@ class _Sum:
     seen: Nodes
 
     def fraction(self, beam: Beam, wavelength: float) -> Array:
-        """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ, the pupil's radius R and the waves W.
+        """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ and the pupil's radius R.
 
-        The outer sum is over the frequencies (sx, sy) of weight w, the inner sum over the pupil's nodes with amplitudes
-        u.
+        W is the optical path in waves. The outer sum is over the frequencies (sx, sy) of weight w, the inner sum over
+        the pupil's nodes with amplitudes u.
 
         Derivatives come from the adjoint of the sum, which consists of three sums of the same size. It is computed only
         if a number of the beam carries a derivative.

@@ -35,7 +35,8 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
     Fourier Optics, §6.3.2.
 
     arriving: fraction of the pupil's power that arrives on the unbounded plane, a number or (wavelength,), in (0, 1].
-        None: all light except the evanescent part, which the pupil's edge and steep slopes of its relief cause.
+        None: all transmitted light except the evanescent part, which the pupil's edge and steep slopes of its relief
+            cause.
     tolerance: largest error of any contrast. Light outside the window causes errors at any frequency, and samples more
         than 1/(2 cutoff) apart alias frequencies. If necessary, the PSF is recomputed over a wider or finer window.
 

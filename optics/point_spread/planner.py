@@ -8,9 +8,9 @@ angular spectrum. They differ in where they place samples:
 - "low_rank": one matrix product. The kernel is a Fourier kernel times a factor that varies slowly over the window and
     therefore has a low rank. The method is best near the focus of lenses and for small pupils: samples must resolve
     only the combined phase of lens and path, which varies far less than either alone.
-- "far_field": Fourier transforms onto direction cosines, one for each of a few nodes of the window. Between the nodes,
-    the kernel's slow factor is interpolated. The method is best for small pupils and wide windows. It computes the
-    intensity but not the complex field.
+- "far_field": Fourier transforms onto direction cosines. Each of a few nodes of the window has its own transform, and
+    the kernel's slow factor is interpolated between the nodes. The method is best for small pupils and wide windows. It
+    computes the intensity but not the complex field.
 - "angular_spectrum": two transforms, from the pupil to its spectrum and from there to the sensor's plane, on grids with
     the same period. It is best at short distances, and the only method for eyes with steep reliefs.
 - "split_angular_spectrum": the same with a transfer function exp(ikz cos θ) that is split into two factors. The Fourier

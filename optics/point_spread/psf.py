@@ -38,7 +38,7 @@ def psf(
     """Return the PSF |U|² / (pupil area) of a pupil. U is the field on the sensor for incident light of amplitude 1.
 
     wavelengths: one or several wavelengths [m] in vacuum. With eight or more, each wavelength uses the method of the
-        preceding one, unless this method is then too inaccurate or much slower.
+        preceding one, unless this method is an approximation, too inaccurate or much slower.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         images the source, or 240 µm without such a lens.
     source_distance, source_angle: distance [m] of the source, and direction (x, y) [rad] of its light, see PointSource.

@@ -38,7 +38,8 @@ class Effort:
     points: number of points of a PSF that is not rotationally symmetric.
     points_along_radius: number of points of a rotationally symmetric PSF.
     fewest: number of points below which the estimate is useless.
-    spare_digits: digits of the direct sum in addition to the requested accuracy. The first affordable value is used.
+    spare_digits: numbers of digits that the direct sum may have in addition to the requested accuracy. The first
+        affordable one is used.
     share: time limit of the check, relative to the time of the PSF.
     share_of_few: the same for windows with fewer than `few` samples. In windows of so few samples, a direct sum at
         `fewest` points takes longer than `share` permits. Without a check, the error may be as large as its bound.
@@ -123,7 +124,7 @@ def path_rounding(problem: Problem, darkness: float) -> float:
 
 
 def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
-    """Return the number of digits by which the amplitude in the window is below that of all light in phase.
+    """Return by how many digits the window's amplitude is below the amplitude that all light in phase would have.
 
     If the light of the whole aperture (area A) arrived in phase, its amplitude would be U = A/(λz), and the PSF U²/A =
     A/(λz)². The error of the direct sum is proportional to this U. The digits are those of the amplitude, half of those

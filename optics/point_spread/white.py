@@ -168,8 +168,8 @@ def white_psf(
 
     light: name of an illuminant, a Spectrum, or spectral power as a function of wavelengths [m].
     receptors: receptor types, see `optics.receptors_of`. Results are in the order of the types.
-    waves: number of wavelengths over the receptors' range: odd, 5 to 513, or "auto" for the fewest that meet the
-        tolerance. Cubic splines interpolate PSFs between the wavelengths.
+    waves: number of wavelengths over the receptors' range: odd, 5 to 513, or "auto" for the first of 9, 17, 33, ...,
+        513 that meets the tolerance. Cubic splines interpolate PSFs between the wavelengths.
     tolerance: relative L2 error over the window, for PSFs and spectrum together.
     asked: further arguments of `optics.psf`, apart from wavelengths.
 

@@ -117,7 +117,8 @@ def propagate(
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
-        AccuracyError: no sampling meets the tolerance. The message states which tolerance is possible.
+        AccuracyError: no sampling meets the tolerance. The message states the error, or the number of samples that
+            would be necessary.
         BackendError: see `optics.psf`.
     """
     if not isinstance(method, str) or method not in ("auto", *PROPAGATION_METHODS):

@@ -123,6 +123,10 @@ class _Light:
         """Return the field behind a system, and the smallest margin with which a similar system should begin.
 
         margin: smallest margin to try.
+
+        Raises:
+            ValueError: see `propagate_through`.
+            AccuracyError: see `propagate_through`.
         """
         if isinstance(elements, str) or not isinstance(elements, Sequence):
             raise ValueError(f"elements = {shown(elements)}: must be a list of Pupil, Misaligned and FreeSpace")

@@ -34,8 +34,9 @@ class PhotonBudget:
 
     illuminance: illuminance E_v [lx] of the scene by daylight (CIE D65): 1e5 in the sun, 1e4 under an overcast sky, 10
         at dusk.
-    integration_time: integration time Δt [s] of a receptor. It is 10 to 50 ms in insects and vertebrates.
-    quantum_efficiency: η, the fraction of photons at the peak wavelength of its pigment that a receptor absorbs. It
+    integration_time: integration time Δt [s] of a receptor. It is typically 10 to 50 ms in insects and vertebrates in
+        bright light.
+    quantum_efficiency: η. Of the photons at the peak wavelength of a receptor's pigment, this fraction is absorbed. It
         includes losses in front of the receptor.
 
     Raises:
@@ -62,7 +63,7 @@ class PhotonBudget:
         return self.illuminance / (LUMENS_PER_WATT * float(visible.sum()) * 5e-9)
 
     def photons(self, bands: SpectralBands, etendue: float) -> np.ndarray:
-        """Return the number of photons from a white Lambertian surface absorbed per integration time, (channel,):
+        """Return the number of absorbed photons per integration time for a white Lambertian surface, (channel,):
 
             N_c = η Δt G ∫ E_λ/π · λ/(hc) · S_c(λ) dλ
 

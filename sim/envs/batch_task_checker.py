@@ -29,8 +29,8 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 
     - The task's settings are valid.
     - All arrays that its methods return have the right shapes, and `rewards`, `proprioception` and the outcome of an
-      overridden `judge` contain finite numbers. (In an environment, NaN in `rewards` ends the episode of this world.)
-    - Worlds that `act` and `judge` name exist.
+      overridden `judge` contain finite numbers. (In an environment, NaN in `rewards` ends the episode of the world.)
+    - `act` and `judge` name only worlds that exist.
     - `reset` changes only the worlds that it was given.
     - A world's episode depends neither on other worlds nor on their number.
     - The same seed leads to the same episode.
@@ -38,7 +38,7 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     - After a stored state has been restored, the same actions have the same results.
 
     Raises:
-        ValueError: the task does not behave as described, is no `sim.BatchTask`, or a number is out of range. The
+        ValueError: the task does not behave as described, is not a `sim.BatchTask`, or a number is out of range. The
             message states the method, the array, the world, and the correct behaviour.
         RuntimeError: the task changes the model of all worlds, or the model enables MuJoCo's "sleep".
 

@@ -1,4 +1,4 @@
-"""Checks of the calls of an environment: their order, their seeds and their actions. All environments share them.
+"""Checks of the calls of an environment: their order, their seeds and their actions. All environments use these checks.
 
 A batch accepts an action that is not finite: the action ends the episode of its world, and the other worlds continue
 (`sim.tasks.simulation`). An environment of one world refuses such an action with a ValueError.

@@ -34,7 +34,7 @@ Nearness = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class _Level:
-    """Points of the horizontal plane at eye height, one for each pixel that shows this plane, in the agent's frame.
+    """The points of the horizontal plane at eye height that an image shows, one per pixel, in the agent's frame.
 
     pixels: indices of these pixels, counted row by row, (n,)
     depth: depth of each point along the camera's axis [m], (n,)

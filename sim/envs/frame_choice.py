@@ -1,7 +1,7 @@
 """Choice of the number of frames per action that receptors with dynamics need for correct motion blur.
 
 A few random actions are simulated. For each number of frames, the responses at the end of each action are compared with
-the responses to the largest number that is tried: at most FINEST, and at most one frame per physics step.
+the responses to the largest number that is tried: at most 20 (FINEST), and at most one frame per physics step.
 """
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ def with_frames(
     """Return the fidelities with the number of frames per action (`frames`) that receptors with dynamics need.
 
     The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify the number.
-    Otherwise it is the smallest number for which the errors of all signals are acceptable. If no eyes have receptors
-    with dynamics, or the fidelities of all such eyes specify the number, the fidelities are returned unchanged.
+    Otherwise it is the smallest number for which each kind of eyes has an acceptable root mean square error of its
+    signals. If no eyes have receptors with dynamics, or the fidelities of all such eyes specify the number, the
+    fidelities are returned unchanged.
 
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
     scenes: see `renderers_for`

@@ -30,7 +30,7 @@ class PreparedTask:
     """A task, its scenes, and the fidelity of all eyes.
 
     task: the task
-    fidelity: fidelity of the learners' eyes, used instead of the fidelity that the task defines
+    fidelity: fidelity of the learners' eyes; None: the fidelities that the task defines
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
 
     Raises:
@@ -107,7 +107,7 @@ class PreparedTask:
         return EyesVecEnv(simulation, renderers, memory, render_mode)
 
     def renderer(self, simulation: Simulation) -> EyeRenderer:
-        """Return a renderer of the first kind of the first agent's eyes, for the worlds of a simulation.
+        """Return a renderer of the first agent's first kind of eyes, for the worlds of a simulation.
 
         The renderer has the eyes of this prepared task. The simulation may run the same task with other eyes.
         """

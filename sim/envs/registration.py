@@ -36,7 +36,7 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
     options: arguments of `sim.make_vec_env`, such as memory. They are checked when an environment is made
 
     Raises:
-        ValueError: `id_` is no text, `task` is no `sim.Task`, or its `episode_steps` is invalid.
+        ValueError: `id_` is not text, `task` is not a `sim.Task`, or its `episode_steps` is invalid.
         Error: the id has an invalid form. The class is `gymnasium.error.Error`.
     """
     from optics.numerics.arguments import of_kind, shown, whole

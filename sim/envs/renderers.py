@@ -34,7 +34,7 @@ class AgentRenderers:
 
 
 def scenes_for(task: AgentTask) -> dict[str, WorldScene]:
-    """Return the task's world as a scene prepared for each kind of its eyes, by name of the kind."""
+    """Return the task's world as one prepared scene for each kind of its eyes, by name of the kind."""
     kinds = task.eyes if isinstance(task.eyes, Mapping) else {EYES: task.eyes}
     return {name: WorldScene(task.world, eyes) for name, eyes in kinds.items() if eyes is not None}
 

@@ -23,7 +23,8 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
     White in full daylight is shown as white, for any size of the pupil. Receptor types are shown as colours in the
     order of their peak wavelengths: the type with the longest wavelength as red, the type with the shortest as blue,
     and other types as colours in between. A single type is shown as grey. In a mosaic, every receptor has the colour of
-    its type. Receptors with a `density` are drawn with their places and sizes on the retina.
+    its type. Receptors of different sizes (`optics.Eye(density=...)`) are drawn with their places and sizes on the
+    retina.
     """
     linear = np.einsum("ecyx,cyxk->eyxk", signals / eye.white_signal, _palette(eye))
     pixels = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)

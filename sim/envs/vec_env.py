@@ -125,7 +125,7 @@ class EyesVecEnv(OneEnvironment):
         self.animals.seed(tuple(drawn))
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Store the actions, (num_envs, *action_space.shape), for `step_wait`; one that is not finite ends its episode.
+        """Store actions (num_envs, *action_space.shape) for `step_wait`; an action that is not finite ends its episode.
 
         Raises:
             ValueError: the actions are not real numbers, are masked, or do not have this shape.

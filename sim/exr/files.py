@@ -49,7 +49,7 @@ DIRECTIONS = ("direction_ahead", "direction_left", "direction_up")  # channels o
 
 
 class ExrError(ValueError):
-    """A file that is incomplete, damaged, or without the spectral layout."""
+    """A file that is incomplete, damaged, too large, or without the spectral layout."""
 
 
 def file_path(name: str, value: Any) -> Path:
@@ -107,8 +107,8 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     (`T.450,0nm` ...). A view has the name of its part, or of the file if the part has none. An ExrWarning names
     contents that are not read, such as polarisation.
 
-    most_bytes: largest allowed size of the unpacked pixels [bytes], also infinity; the header of a small file can state
-        any size
+    most_bytes: largest allowed size of the unpacked pixels [bytes], which may be infinite; the header of a small file
+        can state any size
 
     Raises:
         ExrError: the file cannot be read, is truncated, damaged, altered or too large, or has no spectral channels.

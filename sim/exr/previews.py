@@ -23,7 +23,7 @@ def preview_of_spectra(radiance: np.ndarray | None, reflectance: np.ndarray | No
 
 
 def preview_of_receptors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
-    """Return an image (y, x, 3) whose red, green and blue show channels in order of decreasing wavelength.
+    """Return an image (y, x, 3) whose red, green and blue show up to three channels, by decreasing wavelength.
 
     A single channel is shown as grey. Of two channels, the second is shown as green and blue.
 

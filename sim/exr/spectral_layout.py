@@ -4,7 +4,7 @@ Source: Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout for Spectral Im
 
 A channel's name consists of its quantity and its wavelength or frequency, with a comma as decimal sign:
 
-S0.450,000000nm   radiance, the first Stokes component; S1 to S3 are the other ones
+S0.450,000000nm   radiance, the first Stokes component; S1 to S3 are the other components
 T.450,000000nm    reflectance or transmittance; files of early versions write M00, a component of a Mueller matrix
 T.400,0nm.500,0nm   reradiation of a fluorescent surface, from the first wavelength to the second
 """

@@ -56,7 +56,7 @@ class View:
         others: further fields of the view, except for `receptors`, `peaks_nm` and `directions`
 
         Raises:
-            ValueError: `eye` is no compound eye, the frame has another shape, or a field of the view is invalid.
+            ValueError: `eye` is not a compound eye, the frame has another shape, or a field of the view is invalid.
         """
         of_kind("eye", eye, CompoundEye, "sim.CompoundEye([[0, 0]], ommatidium)")
         if _shape(frame) != (len(eye), eye.channels):

@@ -1,4 +1,4 @@
-"""Error of a receptor's signal that is small compared with the receptors' noise."""
+"""The largest acceptable error of a signal, which is small compared with the receptors' noise."""
 
 from __future__ import annotations
 

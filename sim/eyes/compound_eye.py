@@ -1,4 +1,4 @@
-"""Compound eyes: ommatidia with any viewing directions, alike or varying over the eye."""
+"""Compound eyes: ommatidia with any viewing directions, all equal or varying over the eye."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class CompoundEye:
     the ommatidia of the first mount come first.
 
     directions: viewing directions in the frame of the mount: unit vectors (ahead, left, up), (n, 3), or (azimuth to the
-        left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The field is always
-        converted to unit vectors.
+        left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The attribute
+        always contains unit vectors.
     ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. If the same object
         occurs several times, its acceptance function is computed once. Distinct objects are computed separately, even
         if they are equal.

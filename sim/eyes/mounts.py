@@ -81,7 +81,7 @@ class Mount:
         """Return the kind and id of the object that carries the eye.
 
         Raises:
-            ValueError: the model has no such object, or is no MjModel.
+            ValueError: the model has no such object, or is not an MjModel.
         """
         of_kind("model", model, mujoco.MjModel, "mujoco.MjModel.from_xml_path('robot.xml')")
         for kind in KINDS if self.kind is None else (self.kind,):

@@ -28,9 +28,9 @@ class OmmatidialSampling:
 
     An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
     weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. With 8
-    rays or more, weights are corrected so that two test scenes are exact in every band. Equal ommatidia share 16
-    arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random choice, so that the errors of
-    neighbours are nearly independent.
+    rays or more, weights are corrected so that the signals of two test scenes are exact in every band. Equal ommatidia
+    share 16 arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random choice, so that the errors
+    of neighbours are nearly independent.
 
     depth: a single layer, because facets have a large depth of field
     """

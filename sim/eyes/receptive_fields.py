@@ -1,7 +1,8 @@
 """Receptive fields of an eye behind a pupil, and low-discrepancy directions drawn from the mixture of all fields.
 
-Fields are tabulated on cells of the visual field's tangent plane, in the coordinates of `sim.eyes.sensor`. The same
-number of cells divides the width and the height of a receptor.
+The mixture is the mean of the fields of all receptors, as a probability density. Fields are tabulated on cells of the
+visual field's tangent plane, in the coordinates of `sim.eyes.sensor`. The same number of cells divides the width and
+the height of a receptor.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ class ReceptiveFields:
 
     @property
     def widths(self) -> tuple[float, float]:
-        """Height and width of the field in the plane in which it is narrowest [receptor heights and widths].
+        """Smallest height and smallest width of the field among its planes [receptor heights and widths].
 
         They are the equivalent widths (sum p)² / sum p² of the field's vertical and horizontal profiles p. A uniform
         field that covers a receptor's area has the width 1.
@@ -179,9 +180,11 @@ def cells_for(eye: optics.Eye) -> int:
 def receptive_fields_of(
     eye: optics.Eye, depth: DepthLayers = ONE_PSF, kind: type[ReceptiveFields] = ReceptiveFields
 ) -> ReceptiveFields:
-    """Return the receptive fields of an eye, tabulated on the finest cells on which its PSF can be computed.
+    """Return the receptive fields of an eye, tabulated on the cells of `cells_for`.
 
-    kind: class of the table; `sim.eyes.varied_fields.VariedFields` for receptors with a `density`
+    If the PSF cannot be computed on these cells, coarser cells are used.
+
+    kind: class of the table; `sim.eyes.varied_fields.VariedFields` for receptors of different sizes
 
     Raises:
         optics.AccuracyError: the pupil spreads light too far even for the coarsest cells.

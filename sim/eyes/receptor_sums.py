@@ -1,8 +1,8 @@
 """Weighted sums over samples for each receptor, as one matrix product per row of receptors.
 
 Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. Narrow
-receptive fields have short ranges. If light has few spectral components (`sim.tracing.closed_form_tracer`), the weights
-of the bands are multiplied into the receptors' weights in advance.
+receptive fields have short ranges. A view is one eye in one world. If light has few spectral components
+(`sim.tracing.closed_form_tracer`), the weights of the bands are multiplied into the receptors' weights in advance.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ONE_THREAD = 2**18
 
 @dataclass(frozen=True)
 class Stretch:
-    """The rays that a row of receptors uses.
+    """The contiguous range of rays that a row of receptors uses.
 
     first: index of the first ray
     weights: weights of the rays, (ray, channel * width) float32
@@ -92,7 +92,7 @@ class RowProduct:
 
 
 def _views_at_once(weights: int) -> int:
-    """Return the largest number of views in a product with this number of weights that one thread computes.
+    """Return the largest number of views for which one thread computes a product with this number of weights.
 
     The result is one of 32, 16, 8 and 4. It is 32 if one thread cannot compute even 4 views, because such products are
     large enough for several threads.
@@ -185,8 +185,9 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
 
-    At each end of a row, rays are omitted until another one would reduce the sum of weights of some receptor by more
-    than the fraction `share` / 2 in some band. The remaining weights are then scaled so that the sums are unchanged.
+    At each end of a row, rays are omitted until one more omission would reduce the sum of some receptor's weights in
+    some band by more than the fraction `share` / 2. The remaining weights are then scaled so that the sums are
+    unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]

@@ -23,7 +23,7 @@ from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_compon
 
 @dataclass(frozen=True)
 class Facets(ReadOnlyArrays):
-    """Values of rays that start at facets.
+    """Weights and starting points of rays that start at facets.
 
     weights: weight of each ray's light in each band, (ray, band) float32
     origins: starting points of the rays in the eye's frame [m], (ray, 3); None: all rays start at the pupil

@@ -13,7 +13,7 @@ def from_receptors(eye: optics.Eye, counted: np.ndarray) -> np.ndarray:
     """Return points of the tangent plane (x right, y down) [average receptor widths and heights], (n, 2).
 
     counted: the same points in coordinates in which every receptor has the size 1. These coordinates differ from those
-        of the result only if the eye's receptors have a `density`.
+        of the result only if the eye's receptors differ in size (`optics.Eye(density=...)`).
     """
     return counted if eye.lattice is None else eye.lattice.places(counted)
 

@@ -20,11 +20,11 @@ NEAR = 0.25, 0.5, 0.25
 
 @dataclass(frozen=True)
 class VariedFields(ReceptiveFields):
-    """Tabulated receptive fields of receptors with a `density`.
+    """Tabulated receptive fields of an eye whose receptors differ in size (`optics.Eye(density=...)`).
 
     field: power per cell of the PSF, rotated by 180°, (plane, y, x)
-    density: see `ReceptiveFields`. The mixture is dense where receptors are dense, because all receptors contribute
-        equally to it
+    density: probability per cell of the mixture of all receptors' fields, see `ReceptiveFields`. It is high where
+        receptors are dense
     resolution: receptors (height, width)
     cells: cells along the side of an average receptor
     lattice: rectangles of the receptors

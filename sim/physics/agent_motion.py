@@ -1,9 +1,9 @@
-"""Batched motion of the built-in agents: all worlds advance by one action, on all threads of this process.
+"""Batched motion of the built-in agents: all worlds advance by one action, on several threads if there are many worlds.
 
 The agent is a heavy body on two slide joints, which velocity actuators drive. Its heading is set directly, without
 simulation. Objects are mocap bodies that collide with nothing, so physics does not need their positions. Agents that
 cannot touch anything during the action move in closed form (`sim.physics.free_motion`). MuJoCo simulates all other
-agents, each in a small model of the geoms that it could touch (`sim.physics.local_contacts`).
+agents, if possible each in a small model of the geoms that it could touch (`sim.physics.local_contacts`).
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ class AgentPhysics:
         return self._motion(agents.position, *self._step_batch(models, *self._start_of(agents, velocity)))
 
     def _start_of(self, agents: Agents | WorldState, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's states (n, ...), and its controls (n, substep, nu).
+        """Return MuJoCo's initial states (n, ...), and its controls (n, substep, nu).
 
         The commanded velocity [m/s] (n, 2) is constant.
         """

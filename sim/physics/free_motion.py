@@ -95,7 +95,8 @@ class FreeMotion:
 def free_motion_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest: float) -> FreeMotion | None:
     """Return the free motion of the body `agent` in `model`.
 
-    The result is None if the motion is not linear, or if an obstacle moves or is infinite.
+    The result is None if the motion is not linear, if an obstacle moves or is infinite, or if the model has contact
+    pairs or flexes.
 
     run: simulation of the model with contacts disabled
     strongest: largest command [m/s]
@@ -119,10 +120,11 @@ def free_motion_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest:
 
 
 def _obstacles(model: mujoco.MjModel, agent: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
-    """Return all geoms that the agent can touch; None if one of them moves or is infinite.
+    """Return all geoms that the agent can touch.
 
     The result contains their ids, the lower and the upper corners (n, 2) [m] of axis-aligned boxes around them, and
-    their largest margin [m].
+    their largest margin [m]. It is None if one of them moves or is infinite, or if the model has contact pairs or
+    flexes.
     """
     mine = model.geom_bodyid == agent
     meets = np.zeros(model.ngeom, bool)

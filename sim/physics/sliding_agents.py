@@ -28,8 +28,9 @@ UNSTABLE = "unstable physics"
 class SlidingAgents:
     """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
 
-    `sim.Physics` describes the methods that have no description in this class. Methods that need the state raise a
-    RuntimeError before the first call of `place`, and so does `step` before the first call of `move_objects`.
+    `sim.Physics` describes the methods that have no description in this class. However, `step` also moves the skipped
+    worlds. Methods that need the state raise a RuntimeError before the first call of `place`, and so does `step` before
+    the first call of `move_objects`.
 
     world: layout, model and starting positions
     n: number of worlds, 1 to 1,000,000
@@ -133,7 +134,7 @@ class SlidingAgents:
         self._state = replace(self.state, objects=objects)
 
     def count(self, goals: np.ndarray, adversaries: np.ndarray) -> None:
-        """Increase the counts of goals and of adversaries that each agent has reached by these numbers, (n,) each."""
+        """Add these numbers, (n,) each, to the counts of goals and adversaries that each agent has reached."""
         state = self.state
         self._state = replace(
             state,

@@ -63,7 +63,7 @@ class RayLight:
 
 @dataclass(frozen=True)
 class CameraInputs:
-    """Inputs of kernels that are the same for every image of a mirror.
+    """Kernel inputs that are the same for every image of a scene.
 
     samples: positions of the samples relative to a pixel's middle [pixels], two floats each
     weights: irradiance from each directional light, four floats each (one per wavelength)
@@ -78,7 +78,7 @@ class CameraInputs:
 
 
 class CameraRays:
-    """A tracer of camera rays through one mirror, in the mirror's current pose."""
+    """A tracer of camera rays through the scene of one `MergedMirror`, in its current pose."""
 
     def __init__(self, mirror: MergedMirror) -> None:
         self.mirror = mirror

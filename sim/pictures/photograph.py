@@ -38,8 +38,8 @@ def read_photograph(path: str | Path) -> np.ndarray:
     """Read an image file as sRGB values (y, x, 3) in [0, 1], rotated according to its EXIF orientation.
 
     Raises:
-        ValueError: `path` is no path; or the file is no image, is damaged or too large, has transparency, or does not
-            have three channels of 8 bits.
+        ValueError: `path` is not a path; or the file is not an image, is damaged or too large, has transparency, or has
+            neither three channels of 8 bits nor a palette.
         OSError: the file cannot be read.
     """
     from PIL import Image, ImageOps, UnidentifiedImageError
@@ -97,8 +97,9 @@ def see_photograph(
     optics of the animal's eye (`optics.animals`) and excites its receptors. If `uv` is 1, a white surface gives a
     signal of 1; a smaller `uv` reduces the signals of receptors that are sensitive to ultraviolet.
 
-    In eyes with a single lens, receptors that are finer than the photograph are replaced by one for each pixel. If
-    more than 40,000 would remain, about 40,000 coarser receptors replace them. Ommatidia are never replaced.
+    In eyes with a single lens, receptors that are finer than the photograph's pixels are replaced by one receptor for
+    each pixel. If more than 40,000 would remain, about 40,000 coarser receptors replace them. Ommatidia are never
+    replaced.
 
     photograph: sRGB values in [0, 1], (y, x, 3), at least 8 x 8 pixels, of a camera that maps straight lines to
         straight lines.

@@ -2,7 +2,7 @@
 
 First, one ray is traced through the middle of every fifth pixel (`Lattice`). The pixels around a traced pixel get its
 colour if all neighbouring pixels of the lattice have this colour, too. Otherwise, one ray is traced through each of
-them. If a pixel then differs from an adjacent pixel, four more rays through it smooth the edge.
+these surrounding pixels. If a pixel then differs from an adjacent pixel, four more rays through it smooth the edge.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class QuickImage:
 
 
 class QuickCamera:
-    """A camera for any MuJoCo model that works without OpenGL. It renders the model's mirror in direct light.
+    """A camera for any MuJoCo model that works without OpenGL. It renders the model's Mitsuba scene in direct light.
 
     model, spectra: see `sim.mirror`
     mirror: attribute, the Mitsuba scene that is a copy of the model (`sim.mirror`)

@@ -66,7 +66,7 @@ class ReceptorMosaic:
         height: height of the image in pixels, 16 to 8192.
 
         Raises:
-            ValueError: the height is no whole number in its range, or the photograph has another shape or
+            ValueError: the height is not a whole number in its range, or the photograph has another shape or
                 values.
         """
         from PIL import Image
@@ -87,7 +87,7 @@ class ReceptorMosaic:
         """Write the return value of `image` to a PNG file; an existing file is replaced.
 
         Raises:
-            ValueError: see `image`; or `path` is no path.
+            ValueError: see `image`; or `path` is not a path.
             OSError: the file cannot be written.
         """
         from PIL import Image

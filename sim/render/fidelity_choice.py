@@ -4,7 +4,8 @@ By default, the allowed error is half of the receptors' noise. A brain could not
 noise. Every stage has levels, ordered by cost. The cheapest level whose predicted error is allowed is chosen, and
 stored with the reason. The available levels and their errors depend on the kind of scene (`world_fidelity`,
 `model_fidelity`). The rule for choosing a level is the same for all scenes (`cheapest`). Environments without a given
-fidelity apply it (`sim.envs.prepared_task`), and so do user tasks with the setting "auto" (`sim.tasks.task_fidelity`).
+fidelity apply this rule (`sim.envs.prepared_task`), and so do user tasks with the setting "auto"
+(`sim.tasks.task_fidelity`).
 """
 
 from __future__ import annotations

@@ -54,9 +54,9 @@ def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = 
 
 
 def own_bands(world: World, eye: optics.Eye) -> Level:
-    """Return the level for the eye's own bands, with the error for measured reflectances and for white in the medium.
+    """Return the level for the eye's own bands, with the error for measured reflectances and for the medium.
 
-    For RGB colours in clear air, the error is unknown.
+    The error for the medium is that for white and black. For RGB colours in clear air, the error is unknown.
     """
     spectra = measured(world.model, world.spectra)
     errors, cases = [], []
@@ -108,7 +108,7 @@ def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Leve
     """Return the level "direct" if a second reflection adds little, otherwise "bounce", with two reflections.
 
     In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
-    further reflection to the one before is assumed to be the ratio of the second reflection to direct light. If the
+    further reflection to the previous one is assumed to be the ratio of the second reflection to direct light. If the
     tracer cannot follow a second reflection, the result is direct light with an unknown error.
     """
     try:

@@ -1,8 +1,9 @@
 """Populations of views and receptors for which the errors of trials are computed.
 
-There are two: random receptors in views from random places, and receptors that see an object, in views with an object
-nearby. The second is separate because objects decide how an episode ends. Most receptors see floor and walls, and would
-hide errors at objects. All draws have fixed seeds, so the same world and eyes give the same populations.
+There are two: random receptors in views from random places and, in worlds with objects, receptors that see an object,
+in views with an object nearby. The second is separate because objects decide how an episode ends. Most receptors see
+floor and walls, and would hide errors at objects. All draws have fixed seeds, so the same world and eyes give the same
+populations.
 """
 
 from __future__ import annotations

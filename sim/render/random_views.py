@@ -24,7 +24,7 @@ class RandomViews:
 
     position: position of the agent [m], (n, 2)
     heading: azimuth to which the agent looks [rad], (n,)
-    objects: centres [m], (n, k, 3)
+    objects: centres of the objects [m], (n, k, 3)
     eye: index of the eye to which the view belongs, (n,)
     """
 

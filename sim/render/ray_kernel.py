@@ -63,7 +63,7 @@ class Frame:
 
 
 class Moving:
-    """Buffers of all worlds that a kernel reads. No other inputs change."""
+    """Buffers of all worlds that a kernel reads, its only inputs that change between calls."""
 
     def __init__(self, eyes: EyeRays, things: Buffers) -> None:
         self._eyes, self._things = eyes, things

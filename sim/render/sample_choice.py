@@ -87,7 +87,8 @@ def _areas(
 
     If no number is accurate enough, return the fewest areas whose error is close to the smallest error.
 
-    shared: numbers of areas per receptor below one, in decreasing order, which are tried if one area is enough
+    shared: fractions of an area per receptor (neighbours then share areas), in decreasing order; they are tried if one
+        area per receptor is accurate enough
     """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None

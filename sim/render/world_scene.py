@@ -55,7 +55,7 @@ class WorldScene(PreparedScene):
         self._turns = self._reference.poses.xmat[:, bodies[:1]]
 
     def camera_sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
-        """Return `sampling` for eyes that are no compound eyes."""
+        """Return `sampling` for eyes that are not compound eyes."""
         found = self.sampling(depth, tolerance)
         assert not isinstance(found, OmmatidialSampling)
         return found

@@ -9,6 +9,7 @@ tessellation     geoms as triangles with MuJoCo's texture coordinates
 cube             triangles under cube textures
 surfaces         colours and textures
 coincident       geoms in the same place
+model_hash       hash of a model, a key of kept values
 linear_textures  textures whose values are linear light
 bsdfs            materials as BSDFs
 spectra          measured spectra that replace colours

@@ -8,13 +8,13 @@ therefore share one kernel, and geoms with a single appearance cost nothing extr
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
 
 from optics.numerics.arguments import did_you_mean, is_sized, shown
-from sim.scene import surfaces
+from sim.scene import bsdfs, shapes, surfaces
 from sim.scene.spectra import Spectra, of_geom
 
 # Names of geoms that differ between worlds, optionally with the names of the materials that an episode may choose.
@@ -43,6 +43,18 @@ class Appearance:
     def alpha(self) -> float:
         """Opacity of the geom, from 0 (invisible) to 1."""
         return float(surfaces.rgba(self.model, self.geom)[3])
+
+    @property
+    def surface(self) -> tuple[Hashable, ...]:
+        """Numbers that determine the geom's BSDF, apart from the model's materials and textures."""
+        to_uv = shapes.uv_transform(self.model, self.geom)
+        return (
+            self.material,
+            tuple(surfaces.rgba(self.model, self.geom)),
+            None if to_uv is None else tuple(to_uv.ravel()),
+            bsdfs.is_open(self.model, self.geom),
+            shapes.is_textured(self.model, self.geom),
+        )
 
 
 def appearances_of(

@@ -1,7 +1,7 @@
-"""Checks before a model is built: it must fit into memory, and all its values must be finite.
+"""Checks of a model: its text must not request too many elements, and its poses, sizes and colours must be finite.
 
-A few lines of MJCF can request a million copies. The elements of the text are counted before MuJoCo compiles it, and
-the elements of a compiled model before Mitsuba receives it. Included files count, too.
+A few lines of MJCF can request a million copies. The elements of the text, including those of included files, are
+counted before MuJoCo compiles it. The values of the compiled model are checked before Mitsuba receives them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ OWNERS = {"geom": "geom", "body": "body", "mat": "material", "light": "light"}
 
 
 def require_modest(text: str, name: str) -> None:
-    """Refuse MJCF with too many elements for a computer's memory. Text that is no XML is ignored; MuJoCo refuses it.
+    """Refuse MJCF with more than 20,000 elements, or with a height field of more than 4096² cells.
+
+    Text that is not XML is ignored; MuJoCo refuses it.
 
     Raises:
         ValueError: there are too many elements, or too many cells in a height field. The message states their number.
@@ -78,7 +80,7 @@ def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset
 
 
 def require_finite(model: mujoco.MjModel, name: str) -> None:
-    """Refuse a model with a position, size or colour that is not finite.
+    """Refuse a model with a position, orientation, size or colour that is not finite.
 
     Raises:
         ValueError: a value is not finite; the message names its element.

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from optics.numerics.kept_values import KeptValues
 from sim.scene import shapes, surfaces
+from sim.scene.model_hash import MOST_MODELS, model_hash
 
 _TYPES = mujoco.mjtGeom
 _CURVED = (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_ELLIPSOID, _TYPES.mjGEOM_CAPSULE, _TYPES.mjGEOM_CYLINDER)
@@ -23,6 +25,7 @@ POINTS = 120  # number of points on each geom that are compared with other geoms
 APART, LIFT = 5e-6, 5e-5
 MOST = 1e-3  # largest lift, relative to the size of a geom
 ALIGNED = 0.999  # smallest cosine between the normals of coincident surfaces
+_KEPT = KeptValues(MOST_MODELS)
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Coincidences:
         return self.lifts.get(geom, 0.0)
 
     def message(self, model: mujoco.MjModel) -> str | None:
-        """Return a warning if geoms of different groups coincide, such as collision and visual geoms, else None."""
+        """Return a warning if geoms of different groups coincide (such as collision and visual ones), or None."""
         found = [pair for pair in self.pairs if len(set(model.geom_group[list(pair)])) > 1]
         if not found:
             return None
@@ -57,6 +60,13 @@ class Coincidences:
 
 def coincidences(data: mujoco.MjData, geoms: Sequence[int]) -> Coincidences:
     """Return which of these geoms have coinciding surfaces in the poses of `data`."""
+    poses = data.geom_xpos.tobytes(), data.geom_xmat.tobytes()
+    key = (model_hash(data.model), *poses, tuple(int(geom) for geom in geoms))
+    found: Coincidences = _KEPT.get(key, lambda: _coincidences(data, geoms))
+    return found
+
+
+def _coincidences(data: mujoco.MjData, geoms: Sequence[int]) -> Coincidences:
     model, pairs, lifts = data.model, [], dict[int, float]()
     near = list(_near(data, sorted(int(geom) for geom in geoms)))
     samples = {geom: _points(data, geom) for geom in {geom for pair in near for geom in pair}}
@@ -115,7 +125,7 @@ def _points(data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom: int, apart: float) -> bool:
-    """Return whether any of the points is closer than `apart` to a geom's surface, and the normals there are equal.
+    """Return whether any of the points is closer than `apart` to a geom's surface, with nearly parallel normals.
 
     points, normals: points of another surface [m], and its normals there, unit vectors, in the world's frame, (n, 3)
     apart: distance [m]

@@ -1,10 +1,10 @@
 """Cube textures: six square images around a geom, mapped to its triangles.
 
-MuJoCo looks up a cube texture by direction. The direction consists of a point's coordinates in the geom's frame. Unless
-the texture is uniform, they are divided by the geom's half sizes. Mitsuba has no such texture. Triangles are therefore
-cut along the seams between faces of the cube. Their texture coordinates refer to one image in which the six faces are
-stacked vertically, in MuJoCo's order R L U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The directions of each face's
-own axes are OpenGL's (table 3.19 of its 2.1 specification).
+MuJoCo looks up a cube texture by direction. The direction consists of a point's coordinates in the geom's frame. On
+primitives, these coordinates are divided by the geom's half sizes, unless the texture is uniform. Mitsuba has no such
+texture. Triangles are therefore cut along the seams between faces of the cube. Their texture coordinates refer to one
+image in which the six faces are stacked vertically, in MuJoCo's order R L U D F B: R/L = +x/-x, U/D = +y/-y, F/B =
++z/-z. The directions of each face's own axes are OpenGL's (table 3.19 of its 2.1 specification).
 """
 
 from __future__ import annotations

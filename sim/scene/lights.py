@@ -37,12 +37,12 @@ _UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 
 
 @dataclass(frozen=True)
 class Emitter:
-    """A light, whose position and direction follow the data.
+    """A light whose position and direction follow mjData.
 
     name: name in Mitsuba's scene
     light: id in the model; -1: not one of the model's lights (the camera's headlight, the sky)
     description: Mitsuba's description of the light, with shadows
-    casts_shadow: False for the headlight, as in MuJoCo
+    casts_shadow: the model's setting; False for the headlight, as in MuJoCo
     """
 
     name: str

@@ -30,7 +30,7 @@ REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
 
 
 def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
-    """Return the name of a geom's primitive; None for meshes and for textures that need triangles."""
+    """Return the name of a geom's primitive; None for other kinds, and for textured geoms other than planes."""
     if surfaces.geom_type(model, geom) == _TYPES.mjGEOM_PLANE:
         return PLANE
     return None if shapes.is_textured(model, geom) else KINDS.get(surfaces.geom_type(model, geom))

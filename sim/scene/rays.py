@@ -83,8 +83,8 @@ class Camera:
             less noise. Multijitter is not available in scalar variants, or for an spp that it would round.
 
         Raises:
-            ValueError: the integrator or the sampler is unknown, Mitsuba would apply it incorrectly, or `spp` or `seed`
-                is not a whole number in its range.
+            ValueError: the integrator or the sampler is unknown, Mitsuba would apply one of them incorrectly, or `spp`
+                or `seed` is not a whole number in its range.
         """
         spp, seed = whole("spp", spp, 1, MOST_SAMPLES), whole("seed", seed, 0, MOST_SEED)
         width, height = self.size
@@ -215,7 +215,7 @@ def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
 
 
 def _loaded(name: str, asked: Any, description: Description, kind: type, example: str) -> MitsubaObject:
-    """Return the object of Mitsuba with this description; ValueError if it is not of this kind.
+    """Return the object of Mitsuba with this description; ValueError if Mitsuba refuses it or it is not of this kind.
 
     name, asked, example: name and value of the user's argument, and a valid value
     """

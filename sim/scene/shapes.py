@@ -1,9 +1,9 @@
 """Geoms as Mitsuba shapes.
 
 Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle, sphere, cylinder, disk). Geoms
-for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated, and so are long planes. Ellipsoids are
-tessellated, too, because Mitsuba intersects its own ellipsoids in float32, with wrong hit points on small, flat or
-distant ellipsoids.
+for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated, and so are long planes and spheres with
+cube textures. Ellipsoids are tessellated, too, because Mitsuba intersects its own ellipsoids in float32, with wrong hit
+points on small, flat or distant ellipsoids.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def has_shape(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def is_textured(model: mujoco.MjModel, geom: int) -> bool:
-    """Return whether a texture is visible on a geom."""
+    """Return whether a geom has a texture that is visible on it."""
     texture = surfaces.texture_id(model, geom)
     return texture >= 0 and surfaces.is_mirrored(model, geom, texture)
 

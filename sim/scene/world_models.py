@@ -106,7 +106,7 @@ class WorldModels:
             )
 
     def start_episode(self, world: int, drawn: Drawn) -> None:
-        """Set a world's sizes, colours and materials, and reset all other fields of its model to the compiled values.
+        """Set a world's sizes, colours and materials, and reset all other fields of its own model to compiled values.
 
         Raises:
             ValueError: a material in `drawn` is not one of the materials that `variation` lists for the geom.

@@ -73,7 +73,7 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
     """Check that the arrays of an outcome fit the number of worlds `n` and the number of learning agents.
 
     Raises:
-        ValueError: it is no Outcome, an array has another shape or masked elements, a term is not finite, or the
+        ValueError: it is not an Outcome, an array has another shape or masked elements, a term is not finite, or the
             outcome names worlds that do not exist.
     """
     if not isinstance(outcome, Outcome) or not isinstance(outcome.terms, RewardTerms):

@@ -28,8 +28,8 @@ SHARED = ("substeps", "episode_steps")  # settings of the world that must be equ
 class Frozen:
     """An animal that does not learn. The task of a learning animal in the same world lists it in `others`.
 
-    task: task that defines the animal's eyes and actions, and the condition on which it ends an episode; the rewards
-        and the `others` of this task are not used
+    task: task that defines the animal's eyes and actions, and the condition on which the animal ends an episode; the
+        rewards and the `others` of this task are not used
     policy: an object with the method `predict` of stable-baselines3 (a learner, or the return value of
         `evolve.load_policy`), or a function. The function receives the observations of all worlds, as in
         `make_vec_env`, and returns the actions (world, value). None: the actions are zeros, and the animal's eyes are
@@ -50,7 +50,7 @@ class Frozen:
 
     @property
     def memory(self) -> int:
-        """Number of frames in the observations that the policy expects; 1 if it has no `observation_space`."""
+        """Number of frames in the observations that the policy expects; 1 if it states no number."""
         known = getattr(getattr(self.policy, "observation_space", None), "spaces", {})
         eyes = [one for one in known.values() if len(one.shape) == FRAMES_AXES or hasattr(one, "directions")]
         return max((one.shape[0] for one in eyes), default=1)
@@ -110,8 +110,8 @@ class Encounter:
             policy are zeros
 
         Raises:
-            ValueError: no animal has this name or a name in `policies`, `policies` contains the learning animal, or a
-                policy is neither a function nor an object with `predict`.
+            ValueError: `name` or a key of `policies` is not an animal's name, `policies` contains the learning animal,
+                or a policy is neither a function nor an object with `predict`.
         """
         of_kind("policies", policies, Mapping, "{'Predator': policy}, or {}")
         for asked in (name, *policies):

@@ -45,7 +45,7 @@ def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
     """Return the kinds of eyes of a task, in the order of the task's dictionary.
 
     Raises:
-        ValueError: `eye`, `mounts` and `fidelity` have different names, or a name or a value is invalid.
+        ValueError: `eye`, `mounts` and `fidelity` define different kinds, or a name or a value is invalid.
     """
     where, eye, mounts, fidelity = type(task).__name__, task.eye, task.mounts, task.fidelity
     if not isinstance(eye, Mapping) and not isinstance(mounts, Mapping):

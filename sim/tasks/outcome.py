@@ -20,8 +20,8 @@ class RewardTerms:
     """The named terms of the reward for each row.
 
     If one agent learns, the rows are the worlds. If several agents learn, the rows of the first agent in all worlds
-    come first, then those of the second agent. Terms are stored in one array (term, row), and, if the rows have
-    different terms (`of_rows`), also in a dictionary for each row.
+    come first, then those of the second agent. Terms are stored in one array (term, row). `of_rows`, where rows may
+    have different terms, also stores a dictionary for each row.
 
     names: names of the terms
     terms: values of the terms, (term, row)

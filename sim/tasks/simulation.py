@@ -276,7 +276,8 @@ class Simulation:
 def check_least_return(least_return: float | None, mode: str) -> None:
     """Check that `least_return` is None, or is negative and used in training.
 
-    With a value of 0 or more, episodes would end at once. In evaluation, the truncation would change the fitness.
+    With a value of 0 or more, an episode could end at its first action. In evaluation, the truncation would change the
+    fitness.
 
     Raises:
         ValueError: `least_return` is not negative, or the mode is not training.

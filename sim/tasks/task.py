@@ -30,8 +30,8 @@ class Task(TaskSettings):
     If eyes evolve for this task (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the mounts that
     `place` returns. The class must then have no required arguments.
 
-    If a method raises an exception or returns an invalid value, the episode of its world ends, and `info["failure"]` is
-    the reason. In contrast, an error in `reset`, or in `proprioception` during a reset, ends the simulation of all
+    If a method raises an exception or returns an invalid value, the episode of this world ends, and `info["failure"]`
+    is the reason. In contrast, an error in `reset`, or in `proprioception` during a reset, ends the simulation of all
     worlds with a RuntimeError, because no episode can start.
 
     Methods are called for one world at a time, with its mjData after mj_forward. One task object is used for

@@ -107,7 +107,7 @@ def resolve_other_fidelities(task: Task) -> Task:
 
 
 def _in_brightest(variation: Variation, eye: WorldEye) -> float:
-    """Return the allowed error of a signal, reduced by the largest factor of the lights.
+    """Return the allowed error of a signal, divided by the largest factor of the lights if this factor is above 1.
 
     Errors are proportional to the light, and some episodes have more light than the model.
     """

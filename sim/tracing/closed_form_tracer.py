@@ -4,7 +4,8 @@ A few walls are intersected one by one. If there are more, a ray walks through a
 cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Light is traced in
 components, which are usually the bands. There are fewer components if all lights share one spectrum and the materials'
 spectra are linear combinations of a few spectra. Each of these few spectra is then a component. After two reflections,
-the spectrum of light is a product of two materials' spectra, so all bands are traced, unless all materials are grey.
+the spectrum of light is a product of two materials' spectra, so all bands are traced, unless all materials are grey and
+all lights share one spectrum.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class ClosedFormTables:
 
 @dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """Spheres and tables for one lane.
+    """Spheres and tables for one lane of the kernel.
 
     centres: centres of the visible spheres in the lane's world (Point3f)
     """
@@ -254,7 +255,7 @@ class ClosedForm:
 
 
 def _check_tops(scene: UprightScene) -> None:
-    """Refuse scenes whose reflected light has no closed form.
+    """Refuse scenes whose reflected light has no closed form, for one of three reasons.
 
     A ray from a wall or body could hit a wall's top, a body may change its height, or the eyes' body has a texture.
     """

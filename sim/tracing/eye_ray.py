@@ -14,7 +14,8 @@ class EyeRay:
     ray: ray from the pupil into the scene (Ray3f)
     axis: axis of the eye (Vector3f)
     cosine: cosine of the angle between the ray and the axis
-    body: position of the body that carries the eyes (Point3f), if they stand upright on one; otherwise the pupil
+    body: position of the body that carries the eyes (Point3f), if the eyes stand upright on one body; otherwise the
+        pupil
     """
 
     ray: Array

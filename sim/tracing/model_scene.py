@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -48,8 +48,9 @@ class ModelScene:
     variant: Mitsuba's variant
     geoms: ids of all visible geoms
     looks: appearances of these geoms
-    moving: appearances that may change their place, size or colour
-    bsdfs: one for every appearance; stored here, because a BSDFPtr does not keep its objects alive
+    moving: appearances that glow, or that may change their place, size or colour
+    bsdfs: the BSDF of every appearance; equal surfaces share one object. They are stored here, because a BSDFPtr does
+        not keep its objects alive
     lights: all lights
     spectra: measured spectra of materials and lights, by name
     has_sky: True if rays without a hit reach a sky
@@ -89,7 +90,7 @@ class ModelScene:
             self.looks = appearances_of(model, self.geoms, drawn)
             glows = ((look, self._glow(look, look.geom in self._painted)) for look in self.looks)
             self.glows = {look: glow for look, glow in glows if glow is not None}
-            self.bsdfs = {look: self._matt(look, look.geom in self._painted) for look in self.looks}
+            self.bsdfs = self._shared_bsdfs()
             found, self._unlit = model_lights(model, in_bands, self.wavelengths)
             self.lights = Lights(found)
             self._heaven = sky.description(model, lights.white())
@@ -148,6 +149,18 @@ class ModelScene:
             if self._heaven is not None:
                 description["sky"] = self._heaven
             return mi.load_dict(description, optimize=False)
+
+    def _shared_bsdfs(self) -> dict[Appearance, MitsubaObject]:
+        """Return the BSDF of every appearance. A maze with a thousand walls of one material has one for all of them."""
+        made: dict[Hashable, MitsubaObject] = {}
+        found = {}
+        for look in self.looks:
+            white = look.geom in self._painted
+            key = (look.surface, white)
+            if key not in made:
+                made[key] = self._matt(look, white)
+            found[look] = made[key]
+        return found
 
     def _matt(self, look: Appearance, white: bool) -> MitsubaObject:
         to_uv = shapes.uv_transform(look.model, look.geom)

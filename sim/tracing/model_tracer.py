@@ -41,7 +41,7 @@ class Scenes:
 class Tables:
     """Arrays that are the same in all worlds.
 
-    bsdfs, ends, painted: of all movers, the BSDFs, the index of the first one of each kind, and the indices in `Paint`
+    bsdfs, painted, ends: BSDF and index in `Paint` of each mover, and index of the first mover of each kind
     sky, glows: the sky's emitter, and the BSDFs of glowing geoms; None if there are none
     glowing: for each mover, its index in `glows`
     """

@@ -37,7 +37,7 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray.
 
-    t: distance [m] (without a hit, the argument `farthest`). which: index of the mover (then, the number of movers)
+    t, which: distance [m] and index of the mover; without a hit, the argument `farthest` and the number of movers
     normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
     """
 
@@ -52,7 +52,7 @@ class _Frame:
     """A mover's frame.
 
     axes, origin: axes (three Vector3f) and origin (Vector3f) of the frame in the world
-    size, reach: half sizes (of a mesh: centre of its cell in the atlas), and largest distance of surface and origin
+    size, reach: half sizes (mesh: centre of its cell in the atlas); largest distance of the surface from the origin
     """
 
     axes: tuple[Array, Array, Array]
@@ -71,7 +71,7 @@ class _Frame:
 
 @dataclass(frozen=True)
 class MoverRows(WorldRows):
-    """Rows of one world: a sphere around all movers, then 4 rows for each (`ends`: first mover of each kind)."""
+    """Rows of one world: one for a sphere around all movers, then 4 per mover (`ends`: first mover of each kind)."""
 
     ends: Array
 
@@ -128,7 +128,7 @@ class Movers:
         return 1 + ROWS * len(self)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return the kernel's rows: a sphere around all movers, then each mover, (world, 4 n_rows) float32."""
+        """Return rows of 4 floats: one for a sphere around all movers, then 4 per mover, (world, 4 n_rows) float32."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
             places, (sizes, reach) = poses.geom_places(self.geoms), self._extents(poses)
@@ -228,7 +228,7 @@ class Movers:
         return blocked
 
     def _kinds(self) -> list[tuple[int, Callable[..., Array]]]:
-        """Return the kinds of movers that occur, as their indices and intersections."""
+        """Return the index and the intersection function of each kind of mover that occurs."""
         hits = [*(_of_primitive(primitive) for primitive in PRIMITIVES.values()), self._mesh_hit]
         return [(i, hit) for i, hit in enumerate(hits) if self._ends[i] < self._ends[i + 1]]
 

@@ -15,7 +15,6 @@ import numpy as np
 from optics import BandMedium
 from sim.eyes.compound_eye import CompoundEye
 from sim.scene import bsdfs, shapes, surfaces
-from sim.scene.appearances import Appearance
 from sim.scene.variant import MitsubaObject
 from sim.tracing.eye_places import LevelStand
 from sim.tracing.lighting import DirectionalLight
@@ -36,7 +35,7 @@ class UprightScene:
     stand: the body that the eyes are fixed to
     walls: all walls and the floor
     lights: all lights
-    spheres: all visible spheres
+    spheres: all moving spheres that the eyes can see
     bodies: these spheres, followed by the body that carries the eyes, if it is a sphere. The eyes do not see this body
     heights: heights of all bodies' centres in the reference pose [m], (body,)
     settled: True for bodies that keep this height, (body,)
@@ -80,7 +79,7 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     for geom, materials in scene.varied.items():
         what = "materials" if materials else "sizes or colours"
         raise NoClosedForm(f"{what} of geom {model.geom(geom).name!r} differ between worlds")
-    same = _alike(scene)
+    same = {look.geom: scene.bsdfs[look] for look in scene.looks}
     for first, last in scene.coincidences.pairs:
         if same[first] is not same[last]:
             raise NoClosedForm(f"geoms {_name(model, first)} and {_name(model, last)} are in the same place")
@@ -172,27 +171,6 @@ def _refuse_what_eyes_would_see(
     outwards = np.einsum("ei,ei->e", ways, stand.rotations[:, :, 2])
     if (distances < model.geom_size[geom, 0] - ALIGNED).any() or (outwards < distances - ALIGNED).any():
         raise NoClosedForm(f"eyes do not look straight out from the skin of geom {_name(model, geom)}")
-
-
-def _alike(scene: ModelScene) -> dict[int, MitsubaObject]:
-    """Return BSDFs by geom. Geoms of equal appearance share one object."""
-    first: dict[tuple[object, ...], Appearance] = {}
-    found = {}
-    for look in scene.looks:
-        found[look.geom] = scene.bsdfs[first.setdefault(_key(look), look)]
-    return found
-
-
-def _key(look: Appearance) -> tuple[object, ...]:
-    model, geom = look.model, look.geom
-    to_uv = shapes.uv_transform(model, geom)
-    return (
-        look.material,
-        tuple(surfaces.rgba(model, geom)),
-        None if to_uv is None else tuple(to_uv.ravel()),
-        bsdfs.is_open(model, geom),
-        shapes.is_textured(model, geom),
-    )
 
 
 def _spheres(data: mujoco.MjData, geoms: Sequence[int], bsdfs_of: dict[int, MitsubaObject]) -> Spheres:

@@ -13,12 +13,15 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from optics.numerics.kept_values import KeptValues
 from sim.scene import shapes, surfaces
+from sim.scene.model_hash import MOST_MODELS, model_hash
 
 SIDES = 4  # sides of a wall, which face -x, +x, -y, +y
 FACES = 6  # faces of a box, with four corners each
 # Largest deviation of a wall's rotation from quarter turns, and of faces from a common height or grid [m].
 ALIGNED = 1e-6
+_KEPT = KeptValues(MOST_MODELS)
 
 
 class NoClosedForm(ValueError):
@@ -61,6 +64,14 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
             the eyes are not above it. Other causes are that a box is not aligned with the axes, does not stand on the
             floor, extends beyond it, ends below the eyes or has a cube texture.
     """
+    lowest, highest = float(eyes.min()), float(eyes.max())
+    key = model_hash(model), tuple(int(geom) for geom in geoms), lowest, highest
+    found: Walls = _KEPT.get(key, lambda: _walls(model, geoms, lowest, highest))
+    return found
+
+
+def _walls(model: mujoco.MjModel, geoms: Sequence[int], lowest: float, highest: float) -> Walls:
+    """Return the walls and the floor for eyes between two heights [m]; see `walls_of`."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     floors = [g for g in geoms if surfaces.geom_type(model, g) == mujoco.mjtGeom.mjGEOM_PLANE]
@@ -74,9 +85,9 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
     height = float(floor[0, 2])
     sides = [_box(model, data, g) for g in boxes]
     corners = np.array([[low, high] for low, high, _ in sides]).reshape(-1, 2, 3)
-    if (np.abs(corners[:, 0, 2] - height) > ALIGNED).any() or (corners[:, 1, 2] <= eyes.max()).any():
+    if (np.abs(corners[:, 0, 2] - height) > ALIGNED).any() or (corners[:, 1, 2] <= highest).any():
         raise NoClosedForm("a wall does not stand on the floor, or ends below the eyes")
-    if eyes.min() <= height:
+    if lowest <= height:
         raise NoClosedForm("the eyes are not above the floor")
     floor_lower, floor_upper = floor[:, :2].min(axis=0), floor[:, :2].max(axis=0)
     if (corners[..., :2] < floor_lower - ALIGNED).any() or (corners[..., :2] > floor_upper + ALIGNED).any():

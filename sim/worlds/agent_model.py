@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 
 import mujoco
-import numpy as np
+
+from optics.numerics.kept_values import KeptValues
+from sim.scene.model_hash import MOST_MODELS, model_hash
 
 ROOM = 4  # number of walls that may be near an agent: two that form a corner, and one or two others within reach
+_KEPT = KeptValues(MOST_MODELS)
 
 
 @dataclass(frozen=True)
@@ -28,12 +30,16 @@ class AgentModel:
 
     @classmethod
     def from_spec(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentModel:
-        """Extract the body "agent" of a spec that has been compiled into `whole`."""
-        return cls(_alone(spec.copy()), _fingerprint(whole))
+        """Extract the body "agent" of a spec that has been compiled into `whole`.
+
+        Equal models share the result, so do not change it. Removing hundreds of walls from a spec takes half a second.
+        """
+        whole_hash = model_hash(whole)
+        return cls(_KEPT.get(whole_hash, lambda: _alone(spec.copy())), whole_hash)
 
     def stands_for(self, model: mujoco.MjModel) -> bool:
         """Return whether the agent was extracted from this model, and the model has not been changed since then."""
-        return self.whole == _fingerprint(model)
+        return self.whole == model_hash(model)
 
 
 def _alone(spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -51,9 +57,3 @@ def _alone(spec: mujoco.MjSpec) -> mujoco.MjModel:
     for _ in range(ROOM):
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[1, 1, 1], contype=0, conaffinity=0)
     return spec.compile()
-
-
-def _fingerprint(model: mujoco.MjModel) -> bytes:
-    saved = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, saved)
-    return hashlib.blake2b(saved.tobytes()).digest()

@@ -1,4 +1,4 @@
-"""Detection: an open walled field with one goal and two adversaries that differ only in stripe orientation."""
+"""Detection: an open walled field with a goal and two adversaries, whose stripes have another orientation."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Starts(ReadOnlyArrays):
 class Layout(ReadOnlyArrays):
     """Objects, starting positions and goal region that a task adds to a world.
 
-    objects: names of mocap sphere bodies
+    objects: names of the objects, which are mocap bodies with one sphere each
     starts: starting positions of the agent
     object_spawn: possible positions of objects, (m, 2) [m]
     goal_region: (x_min, y_min, x_max, y_max) [m]; None: no goal region

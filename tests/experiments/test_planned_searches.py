@@ -36,3 +36,28 @@ def test_the_list_contains_the_settings_of_each_search(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert [f"--set seed={n}" in line for n, line in enumerate(lines)] == [True, True, True]
     assert SEARCHES[2].config.seed == 2
+
+
+def test_stored_records_are_continued_as_copies(tmp_path, monkeypatch):
+    called = []
+    monkeypatch.setattr(planned_searches, "evolve", lambda arguments: called.append(arguments) or 0)
+    records, runs = tmp_path / "records", tmp_path / "runs"
+    for name in ("a", "b"):
+        (records / name).mkdir(parents=True)
+        (records / name / "candidates.jsonl").write_text(f"record {name}")
+    (runs / "b").mkdir(parents=True)
+    (runs / "b" / "candidates.jsonl").write_text("a later state")
+    assert main("", SEARCHES, [str(runs), "--records", str(records)]) == 0
+    assert [arguments[0] for arguments in called] == ["resume", "resume", "run"]
+    assert (runs / "a" / "candidates.jsonl").read_text() == "record a"
+    assert (runs / "b" / "candidates.jsonl").read_text() == "a later state"
+    assert sorted(path.name for path in runs.iterdir()) == ["a", "b"]
+    assert (records / "a" / "candidates.jsonl").read_text() == "record a"
+
+
+def test_without_the_option_a_search_is_started_anew_although_there_is_a_record(tmp_path, monkeypatch):
+    called = []
+    monkeypatch.setattr(planned_searches, "evolve", lambda arguments: called.append(arguments) or 0)
+    (tmp_path / "records" / "a").mkdir(parents=True)
+    assert main("", SEARCHES, [str(tmp_path / "runs")]) == 0
+    assert {arguments[0] for arguments in called} == {"run"}

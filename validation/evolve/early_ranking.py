@@ -55,8 +55,8 @@ from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig, SearchConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.fitness import evaluate
+from evolve.learning.played_episodes import play
 from evolve.learning.policy import load_policy
-from evolve.learning.ppo import play
 from evolve.learning.training_rung import TrainingRung
 from evolve.search.successive_halving import budgets, promoted
 from evolve.search.worker import prepare_device

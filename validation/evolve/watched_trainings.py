@@ -16,8 +16,9 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 
 import sim
 from evolve.config.run_config import LearningConfig
+from evolve.learning.played_episodes import play
 from evolve.learning.policy import Brain
-from evolve.learning.ppo import AdaptingPPO, play
+from evolve.learning.ppo import AdaptingPPO
 from sim.tasks.reward import EVALUATION, TRAINING
 
 __all__ = ["Case", "Row", "read_rows", "steps_to", "watched", "wilson", "write_rows"]

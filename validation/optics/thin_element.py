@@ -12,9 +12,9 @@ the effects that the mask omits. The rays follow Snell's law and come from insid
   deviated by arcsin(n sin α) - α. A mask with the same slope deviates it by arcsin((n - 1) tan α). The deviation by the
   mask is 1 % too small at α = 11° and 10 % too small at 30°. If light enters the prism through its slope ("relief
   first"), the deviation of the prism is different, but that of the mask is the same.
-- **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. The
-  slope of a lens that consists of one relief therefore cannot exceed 41.8°, so its NA is at most 0.45. The mask has no
-  such limit.
+- **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. A
+  relief whose mask is an ideal lens therefore transmits light up to its rim only if its NA is at most 0.45. The mask
+  has no such limit.
 - **Fresnel reflection.** A surface reflects 4 % of the light at normal incidence, 10 % at 36° and 25 % at 40°. PSFs of
   `optics` do not include this loss.
 - **Thickness.** Real rays bend at the surface of the glass and not in the plane of the mask. A relief whose mask is an

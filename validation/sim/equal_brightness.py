@@ -19,9 +19,9 @@ deviation of 0.01), for one receptor that looks straight at the object. Each cel
 bands ("shipped") are stored in `sim.worlds.detection`. The second pair of columns is for adversaries with six bands of
 30°.
 
-**Bounds.** At distances of 2 m or more, the mean difference is below a fifth of the noise. With the shipped edges, the
-mean difference is at most a tenth of the noise larger than with the fitted edges. (The shipped edges differ from the
-fitted ones by up to 3.0°.)
+**Bounds.** The script fails if, at a distance of 2 m or more, the mean difference with the shipped edges exceeds a
+fifth of the noise, or exceeds that with the fitted edges by more than a tenth of the noise. (The shipped edges differ
+from the fitted ones by up to 3.0°.)
 
 **Limits.** At distances below 2 m, an eye does not see the top of an object, and the difference grows to several times
 the noise. At such short distances, the brightness of an object also depends more on whether the eye sees its lit or its

@@ -12,7 +12,7 @@ itself. Five worlds with random poses are rendered at once. For the centre of ev
 fraction for the eye and world in which it is smallest. The last column states steps per CPU second. This rate was
 measured without physics, in 64 worlds with two eyes of 15 x 15 receptors and 4 rays per receptor.
 
-**Bounds.** In every model, at least 99.5 % of the receptors have the same depth to 1e-3, or both see nothing.
+**Bounds.** The script fails if, in any model, the two agree for fewer than 99.5 % of the receptors.
 
 **Limits.** The receptors whose depths differ look at the edge of a curved surface that is approximated by triangles, or
 at the inside of a surface. MuJoCo's rays hit the inside of a surface, but eyes see through it. The back of a plane is

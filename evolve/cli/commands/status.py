@@ -55,7 +55,7 @@ def _read(arguments: Namespace) -> dict[str, Any]:
 def listing(arguments: Namespace) -> int:
     """Print one line (or JSON object) for each run in a directory, with the latest run last.
 
-    For a run that cannot be read, it states the reason.
+    The line of a run that cannot be read states the reason.
     """
     # os.path.exists returns False for an unreadable folder, which cannot be a run of this user. pathlib would raise.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]

@@ -31,7 +31,8 @@ class IlluminatedBodies:
     """Computation and lookup of the light on the moving bodies of all worlds.
 
     A row of the table contains the fractions of the lights at a place, in groups of four ("fours"). The first rows of
-    each body also contain the spherical harmonics of the reflected light around it, one group of four per component.
+    each body also contain the spherical harmonics of the reflected light around the body, one group of four per
+    component.
 
     shadows: shadows of walls
     directions: directions towards the lights

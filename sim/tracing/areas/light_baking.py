@@ -1,7 +1,7 @@
 """Computation of the tables of reflected light by brute force, with many rays from every node.
 
-The tables describe the static scene. They take moving bodies into account in one way only: a body's shadow on the floor
-reduces the light that the floor reflects back to this body.
+The tables describe the static scene. They take moving bodies into account in one way only: a body's shadows on floor
+and walls reduce the light that these reflect back to the body.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class LightNodes:
         """Return the nodes of a world of walls of one height.
 
         Raises:
-            NoClosedForm: there are no walls, or too many nodes.
+            NoClosedForm: there are no walls, they lie on no grid, or there are too many nodes.
         """
         if not len(walls):
             raise NoClosedForm("no walls, between which light would be reflected")

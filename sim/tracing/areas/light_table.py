@@ -40,7 +40,7 @@ class LightTable(NodeLight):
     tables: attribute, the tables in the form in which the kernel receives them
 
     Raises:
-        NoClosedForm: there are no walls, or too many cells for the tables.
+        NoClosedForm: there are no walls, they lie on no grid, or there are too many cells for the tables.
     """
 
     def __init__(self, tracer: ClosedForm, radii: np.ndarray, heights: np.ndarray) -> None:

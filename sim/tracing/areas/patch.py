@@ -63,7 +63,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Patch:
-    """A parallelogram of a surface: point + a along + b across, |a| and |b| up to 1/2. The normal points to the eye."""
+    """A parallelogram of a surface: point + a along + b across, |a|, |b| up to 1/2. The normal is on the eye's side."""
 
     point: Array
     normal: Array

@@ -135,7 +135,7 @@ class _Edge:
     """An edge of a strip.
 
     place: position across the area, from -1/2 to 1/2
-    angle, sine: parameter of the elliptic `_Outline`, and its sine: place = middle[0] + half[0] · sine, with its fields
+    angle, sine: parameter of a closed outline, and its sine: place = middle[0] + half[0] · sine, see `_Outline`
     """
 
     place: Array

@@ -18,6 +18,7 @@ def test_genes_that_cannot_change_anything_are_named():
     inherited = ("eye.receptors=genes", "genome.lambda_max.open=true")
     first, *others = notes(*inherited)
     assert "the world of detection is grey" in first
+    assert not any("grey" in note for note in notes(*inherited, "world.medium=clear_ocean")), "water colours the light"
     assert others == ["genome.lambda_max_3_nm is open but has no effect: genome.receptor_types is at most 3"]
     assert len(notes(*inherited, "genome.receptor_types.open=true")) == 1
 

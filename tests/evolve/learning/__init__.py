@@ -1,7 +1,7 @@
 """Tests of evolve/learning: which test covers which module.
 
 fitness: test_fitness.py
-final_figures: test_final_figures.py
+played_episodes: test_ppo.py, episodes/test_tracks.py
 training_envs: test_fitness.py, test_task_module.py, test_animals_in_turn.py
 task_module: test_task_module.py, test_textures_of_runs.py, test_animals_in_turn.py
 task_trial: test_task_module.py, test_task_settings.py

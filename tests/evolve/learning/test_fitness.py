@@ -10,8 +10,8 @@ import sim
 from evolve.config.run_config import WorldConfig
 from evolve.learning import fitness
 from evolve.learning.fitness import evaluate
+from evolve.learning.played_episodes import play
 from evolve.learning.policy import load_policy
-from evolve.learning.ppo import play
 from evolve.learning.training_rung import TrainingRung
 from evolve.search.successive_halving import trained_steps
 from sim.envs.prepared_task import PreparedTask

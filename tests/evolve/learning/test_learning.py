@@ -13,8 +13,9 @@ from torch import nn
 import sim
 from evolve.config.run_config import LearningConfig
 from evolve.learning.eye_features import EyeFeatures
+from evolve.learning.played_episodes import play
 from evolve.learning.policy import Brain, PolicyConfig, build_policy
-from evolve.learning.ppo import Worlds, play, train
+from evolve.learning.ppo import Worlds, train
 from sim.worlds.state import WorldState
 
 SCENES, TRAINING_SCENES, BATCH = 256, 20, 512

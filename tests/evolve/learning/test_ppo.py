@@ -10,8 +10,9 @@ import pytest
 import torch
 
 from evolve.config.run_config import LearningConfig
+from evolve.learning.played_episodes import play
 from evolve.learning.policy import Brain, TrainingDiverged, learnt
-from evolve.learning.ppo import AdaptingPPO, Worlds, play, stuck, train
+from evolve.learning.ppo import AdaptingPPO, Worlds, stuck, train
 from evolve.learning.training_rewards import ramped_share
 from tests.evolve.learning.bright_spot import BrightSpot
 

@@ -16,6 +16,7 @@ surfaces: test_urdf.py, test_textures.py, test_mirror_light.py, test_texture_col
 linear_textures: test_texture_colors.py
 bsdfs: test_bsdfs.py
 coincident: test_coincident.py
+model_hash: tracing/test_equal_worlds.py
 lights: test_lights.py, test_mirror_light.py
 shadowless: test_shadowless.py
 sky: test_sky.py

@@ -8,7 +8,7 @@ eye_places: test_upright_scene.py, render/test_model_renderer.py
 eye_ray: render/test_batched_renderer.py
 upright_scene: test_upright_scene.py, test_closed_form_tracer.py
 spheres: render/test_batched_renderer.py
-walls: test_closed_form_tracer.py
+walls: test_closed_form_tracer.py, test_equal_worlds.py
 wall_intersection: test_closed_form_tracer.py
 reflectance_atlas: test_closed_form_tracer.py
 areas.area_tracer: test_areas.py, test_areas_behind_pupils.py
@@ -31,7 +31,7 @@ areas.sphere_areas: test_area_integrals.py, test_areas.py
 areas.stripes: test_area_integrals.py, test_areas.py
 lighting: test_lighting.py, render/test_batched_renderer.py, render/test_reference_renderer.py
 paint: envs/test_differing_worlds.py, render/test_glow_colors.py
-model_scene: render/test_model_renderer.py
+model_scene: render/test_model_renderer.py, test_equal_worlds.py
 model_lights: render/test_model_renderer.py, render/test_model_lamps.py
 model_tracer: render/test_model_renderer.py, render/test_model_light.py
 primitives: test_movers.py
