@@ -130,7 +130,7 @@ def test_the_first_plan_suffices_for_polynomials_of_high_order(order, tolerance)
 
 
 def test_slopes_at_the_rim_include_oblique_light():
-    """In the direction of the source, its slope and that of the path to the window cancel."""
+    """The slopes of an oblique source and of the path to its image cancel, so the density is that on the axis."""
     wavefront, angle = optics.Zernike({(5, 1): 0.2}), (0.02, -0.01)
     pupil = optics.Pupil(1e-3, wavefront=wavefront, thin_lens_focal_length=10e-3)
 
