@@ -1,4 +1,4 @@
-"""Wave optics from a light source to the signals of photoreceptors. SI units; arrays are (wavelength, y, x).
+"""Wave optics from a light source to the signals of photoreceptors. SI units; images are (wavelength, y, x).
 
 Start with `optics.psf`, the image of a point behind a `Pupil`, and `optics.Eye`, a pupil in front of receptors. Each
 folder imports only from the folders listed above it:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,8 +33,14 @@ from optics.numerics.autodiff import Array, plain
 from optics.numerics.grid import Grid
 from optics.numerics.number_types import full_precision
 from optics.numerics.renamed import warn_once
-from optics.numerics.torch_graph import DrJitOperation, Once, common_device, torch_place
-from optics.point_spread.coarse_stack import coarse_stack
+from optics.numerics.torch_graph import (
+    DrJitOperation,
+    common_device,
+    computing_device,
+    on_device,
+    once,
+    plain_numbers,
+)
 from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
 from optics.point_spread.psf_result import OF_CELLS
@@ -69,7 +76,8 @@ def psf(
     pixel_means: True for the mean of the PSF over each square pixel of side dx, as a sensor measures it. False for the
         samples of `optics.psf`.
     requires_grad: True to raise a ValueError if no tensor requires a gradient.
-    device: device of the result. None: the device of the tensors that require gradients, or the CPU without any.
+    device: device of the result, and of the computation if no tensor requires a gradient. None: the device of the
+        tensors that require gradients, or the CPU without any.
     view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.
 
     Returns a tensor (pupil, distance, wavelength, y, x) [1/m²], float32 unless dtype="float64". It has an axis of
@@ -77,7 +85,7 @@ def psf(
     has the device and the precision of its tensor. Only first derivatives are available.
 
     At tolerances of 3e-4 or more, the source distances and wavelengths of a pupil share a plan and samples. One call
-    for all of them is then much faster than separate calls.
+    for all of them is then much faster than separate calls. It computes on the device of the tensors.
 
     A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
 
@@ -98,14 +106,16 @@ def psf(
     if flag("requires_grad", requires_grad) and not numbers:
         raise ValueError("no tensor requires a gradient: at least one must have requires_grad=True")
     place = torch.device(device) if device is not None else common_device(numbers)
-    if not torch.is_grad_enabled():
-        light, numbers = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()}), {}
+    values = plain_numbers(numbers)
+    fixed = with_numbers(light, values)
+    numbers = numbers if torch.is_grad_enabled() else {}
+    light = with_numbers(light, once(numbers, values)) if numbers else fixed
     integrated = flag("pixel_means", pixel_means) and view.get("method") not in OF_CELLS
-    pixels = _pixels(light, lambdas, view) if integrated else None
+    pixels = _pixels(fixed, lambdas, view) if integrated else None
     view = _completed(view if pixels is None else {**view, **vars(pixels.samples)})
-    found = _images(light, numbers, lambdas, view).to(place)
+    found = _images(light, fixed, numbers, lambdas, view, computing_device(numbers, place)).to(place)
     if pixels is not None:
-        rows, columns = (torch.tensor(part).to(found) for part in (pixels.rows, pixels.columns))
+        rows, columns = (torch.tensor(part).to(place, found.dtype) for part in (pixels.rows, pixels.columns))
         found = rows @ found @ columns.T
     found = found.unflatten(0, (len(light.pupils), len(light.distances)))
     found = found if is_row(sensor_distance) or is_row(source_distance) else found[:, 0]
@@ -113,17 +123,24 @@ def psf(
 
 
 def _images(
-    light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
+    light: LightBatch,
+    fixed: LightBatch,
+    numbers: Mapping[str, torch.Tensor],
+    wavelengths: np.ndarray,
+    view: Mapping[str, Any],
+    place: torch.device,
 ) -> torch.Tensor:
     """Return the PSFs of all members of a batch, (member, wavelength, y, x).
 
-    On the CPU and at coarse tolerances, PyTorch computes members with the same pupil and sensor distance as one stack.
-    Dr.Jit computes all other members.
+    At coarse tolerances, PyTorch computes members with the same pupil and sensor distance as one stack, on the device
+    `place`. Dr.Jit computes all other members.
+
+    light, fixed: the light with tensors in place of `numbers`, and without derivatives.
     """
-    images: dict[int, torch.Tensor] = {}
-    if torch_place() == "cpu" and all(tensor.device.type == "cpu" for tensor in numbers.values()):
-        images = _stacked(light, numbers, wavelengths, view)
-    rest = [place for place in range(len(light.members)) if place not in images]
+    convert = partial(on_device, place) if numbers or place.type != "cpu" else np.asarray
+    found = light.coarse_images(fixed, wavelengths, view, convert)
+    images = {member: torch.as_tensor(image) for member, image in found.items()}
+    rest = [member for member in range(len(light.members)) if member not in images]
     if rest:
 
         def others(own: Sequence[Array]) -> Array:
@@ -133,27 +150,8 @@ def _images(
         computed = DrJitOperation.apply(others, *numbers.values())
         if len(rest) == len(light.members):
             return computed
-        images |= dict(zip(rest, computed, strict=True))
-    return torch.stack([images[place] for place in range(len(images))])
-
-
-def _stacked(
-    light: LightBatch, numbers: Mapping[str, torch.Tensor], wavelengths: np.ndarray, view: Mapping[str, Any]
-) -> dict[int, torch.Tensor]:
-    """Return {index of a member: its PSFs (wavelength, y, x)} for members that stacks compute within the tolerance."""
-    found: dict[int, torch.Tensor] = {}
-    fixed = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()})
-    asked = wavelengths, Grid(view["shape"], view["dx"], view["centre"]), view["dtype"]
-    without = carrying = fixed.stacks(*asked, np.asarray)
-    if numbers:
-        once = with_numbers(light, {name: Once.apply(tensor) for name, tensor in numbers.items()})
-        carrying = once.stacks(*asked, torch.from_numpy)
-    for (places, own), (_, plain_stack) in zip(carrying, without, strict=True):
-        part = coarse_stack(own, plain_stack, view["tolerance"], view["method"])
-        if part is not None:
-            images, met = torch.as_tensor(part[0]), np.all(part[1], axis=1)
-            found |= {place: image for place, image, right in zip(places, images, met, strict=True) if right}
-    return found
+        images |= dict(zip(rest, computed.to(place), strict=True))
+    return torch.stack([images[member] for member in range(len(images))])
 
 
 def _completed(view: Mapping[str, Any]) -> dict[str, Any]:

@@ -43,7 +43,7 @@ def _lens(diameter: float, nodal_distance: float, index: float = VITREOUS) -> Pu
 
 
 def human(receptors_across: int = 60, pupil_diameter: float = 3e-3) -> Eye:
-    """Return the human foveola behind `HumanEye`, the standard observer.
+    """Return the human foveola behind `HumanEye` with its default wavefront, that of a standard observer.
 
     Source of the density of cones, 199,000 per mm²: Curcio, Sloan, Kalina & Hendrickson, J. Comp. Neurol. 292, 497,
     1990. Individuals have 100,000 to 324,000 per mm².
@@ -80,9 +80,9 @@ def eagle(receptors_across: int = 60) -> Eye:
     """Return the deep fovea of a wedge-tailed eagle, *Aquila audax*.
 
     Source: Reymond, Vision Research 25, 1477, 1985 (abstract): the retina resolves 140 cycles/degree, and the optics
-    resolve 157 at the smallest pupil. At 550 nm, that pupil is 4.9 mm wide. No source has been read for the nodal
-    distance of 22 mm, which does not affect any angle. The pigment at 567 nm is that of long-wavelength cones of birds,
-    because no pigment of an eagle was found.
+    resolve 157 at the smallest pupil. A pupil with this cutoff at 550 nm is 4.9 mm wide. No source has been read for
+    the nodal distance of 22 mm, which does not affect any angle. The pigment at 567 nm is that of long-wavelength cones
+    of birds, because no pigment of an eagle was found.
 
     receptors_across: receptors along each side of the patch, 1 to 1000.
 

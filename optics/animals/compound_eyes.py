@@ -1,4 +1,4 @@
-"""Compound eyes of insects and of a crustacean.
+"""Compound eyes of insects and of a crustacean. `optics.receptors_of` returns the receptors that a summary names.
 
 All rhabdoms and rhabdomeres have the refractive index 1.363 in a medium of index 1.340. These are values for flies
 (Stavenga, J. Comp. Physiol. A 190, 115, 2004). Measured indices of the other animals are not used.
@@ -37,7 +37,7 @@ class Facet:
     """Measurements of an ommatidium.
 
     diameter: diameter D [m] of the facet.
-    focal_length: focal length f [m] in front of the lens, in air.
+    focal_length: object-side focal length f [m], in air.
     rhabdom: diameter d [m] of the rhabdom's tip.
     length: length l [m] of the rhabdom.
     proximal: diameter [m] of the rhabdom's far end, if it tapers.
@@ -60,7 +60,7 @@ def _guide(diameter: float, length: float, proximal: float | None = None) -> Wav
 
 
 def _by_angle(diameter: float, focal_length: float, angle_deg: float, length: float) -> Facet:
-    """Return a facet whose rhabdom has the width focal length · angle: it subtends `angle_deg` in the visual field."""
+    """Return a facet whose rhabdom subtends `angle_deg` in the visual field: its diameter is focal length · angle."""
     return Facet(diameter, focal_length, focal_length * math.radians(angle_deg), length)
 
 

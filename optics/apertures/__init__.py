@@ -1,4 +1,4 @@
-"""Shapes of the pupil's opening. Each has a soft edge for samples on a grid, and quadrature nodes for integrals.
+"""Shapes of the pupil's opening. An aperture has a soft edge for samples on a grid, and nodes for integrals.
 
 aperture       Aperture: interface of all shapes
 circular       Circle, Annulus

@@ -49,7 +49,7 @@ class Bitmap(ReadOnlyArrays):
             raise ValueError(f"image has {edges} straight edges: must be at most {MOST_EDGES}; draw it more coarsely")
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points (x, y) [pupil radii] that lie in open pixels; ValueError unless they are real."""
+        """Return a mask of the points (x, y) [pupil radii] in open pixels; ValueError if x or y is not real."""
         n = len(self.image)
         column, row = (np.floor((reals(name, at) + 1) * (n / 2)).astype(int) for name, at in (("x", x), ("y", y)))
         inside = (row >= 0) & (row < n) & (column >= 0) & (column < n)

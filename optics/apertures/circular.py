@@ -134,8 +134,8 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
 
     A(ρ) = ∫ g(r) r θ(ρ, r) dr, where g is the kernel and R the radius of the disk. θ = 2 arccos((ρ² + r² - R²)/(2ρr))
     is the angle over which a circle of radius r about the point at ρ lies inside the disk. It varies only for r from
-    |ρ - R| to ρ + R, and like a square root near both ends. The substitution r = |ρ - R| + span sin²(πu/2) makes the
-    integrand smooth.
+    |ρ - R| to ρ + R, and like a square root near both ends. Let s be the length of this range within the kernel's
+    reach. The substitution r = |ρ - R| + s sin²(πu/2), with u from 0 to 1, makes the integrand smooth.
     """
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
@@ -154,7 +154,8 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
     """Return nodes over a ring: Gauss-Legendre nodes along the radius, and equidistant nodes around each circle.
 
     Smaller circles have fewer nodes. The rule represents the edge exactly and converges spectrally. Over a full disk,
-    the mean around a ring is a smooth function of r². For few cycles, a rule in r² therefore needs fewer nodes.
+    the integrand's mean on the circle of radius r is a smooth function of r². For few cycles, a rule in r² therefore
+    needs fewer nodes.
 
     cycles: highest spatial frequency of the integrand [cycles per pupil radius].
     digits: digits of the integral, relative to the area.

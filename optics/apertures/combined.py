@@ -129,7 +129,7 @@ def hexagonal_segments(
 ) -> Combined:
     """Return a segmented mirror: rings of hexagons around a central hexagon.
 
-    The outermost corners of the complete mirror, with the omitted segments, lie on the pupil's rim.
+    The outermost corners of the complete mirror, including omitted segments, lie on the pupil's rim.
 
     rings: number of rings, 0 to 12.
     gap: gap between neighbours, in units of the distance between their centres.

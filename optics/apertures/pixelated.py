@@ -77,9 +77,9 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Return `fixed`, or how many nodes along a pixel make rows and columns of nodes as accurate as `nodes`.
+        """Return the number of nodes along a pixel for rows and columns of nodes: `fixed`, if it is given.
 
-        None: more than 32 nodes would be necessary.
+        Otherwise the rows and columns are as accurate as the result of `nodes`. None: this would need more than 32.
         """
         if self.fixed is not None:
             return self.fixed

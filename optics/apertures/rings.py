@@ -30,7 +30,7 @@ class Rings(Aperture):
         open centre.
 
     Raises:
-        ValueError: the radii do not ascend, their number is odd, 0 or above 500, or one is not a number in [0, 1].
+        ValueError: the radii do not ascend, their number is odd, 0 or above 500, or a radius is not a number in [0, 1].
     """
 
     radii: Any

@@ -28,7 +28,7 @@ class Shape(Protocol):
         """Edge of the shape. For some shapes, the outline contains further pieces that do not belong to the edge."""
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points (x, y) [pupil radii] within the shape; ValueError unless they are real."""
+        """Return a mask of the points (x, y) [pupil radii] within the shape; ValueError if x or y is not real."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,11 @@ class Disk:
         return Outline.circles((float(self.radius),), self.centre)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge; ValueError unless real."""
+        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge.
+
+        Raises:
+            ValueError: x or y is not real.
+        """
         x, y = reals("x", x), reals("y", y)
         return np.asarray(np.hypot(x - self.centre[0], y - self.centre[1]) <= self.radius)
 
@@ -91,7 +95,11 @@ class Oblong:
         return Outline.polygon(np.column_stack([corners.real, corners.imag]) + self.centre)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge; ValueError unless real."""
+        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge.
+
+        Raises:
+            ValueError: x or y is not real.
+        """
         x, y = reals("x", x), reals("y", y)
         place = (x - self.centre[0] + 1j * (y - self.centre[1])) * np.exp(-1j * np.deg2rad(self.rotation_deg))
         return np.asarray((np.abs(place.real) <= self.width / 2) & (np.abs(place.imag) <= self.height / 2))
@@ -135,7 +143,11 @@ class Spider:
         return Outline.joined([rectangle.outline for rectangle in self.rectangles])
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge; ValueError unless real."""
+        """Return a mask of the points (x, y) [pupil radii] within the shape or on its edge.
+
+        Raises:
+            ValueError: x or y is not real.
+        """
         return np.any([rectangle.contains(x, y) for rectangle in self.rectangles], axis=0)
 
 

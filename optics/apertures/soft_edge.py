@@ -62,7 +62,7 @@ class SoftEdge:
 
     @property
     def cycles(self) -> float:
-        """Cycles of the kernel's oscillation from its centre to its end."""
+        """Cycles of the kernel's highest frequency, `stopband`, from its centre to its end."""
         return self.reach * self.stopband
 
     def ring(self, r: np.ndarray) -> np.ndarray:

@@ -147,7 +147,7 @@ class _Arc:
         return dr.atan2(cross, dot + TINY) + dr.select(between, 2 * pi, 0)
 
     def _integral(self, x: Array, y: Array, radius: Array, first: Array, last: Array, zero: Array) -> Array:
-        """Return ∫ H(r) (R - p·e(t)) R dt along an arc of radius R, for the point p and the unit vector e(t) at t.
+        """Return ∫ H(r) (R - p·e(t)) R dt along an arc of radius R, for the point p and the unit vector e at angle t.
 
         H is the function of `radial_table`.
         """

@@ -6,7 +6,8 @@ Consider the triangle of a point and an edge. The integral of the kernel g over 
 
 where θ runs over the angle that the edge subtends, and r is the distance from the point to the edge in the direction θ.
 The polygon's transmittance is the sum over its edges. Angles, and hence these contributions, are negative if the point
-lies on the outer side of an edge. Let t be the position along an edge at the signed distance d. Then
+lies on the outer side of an edge. Let d be the signed distance of an edge from the point, and t the position along the
+edge from the foot of the perpendicular. Then
 
     G dθ = d H(r) dt,   r² = d² + t²,
 
@@ -82,8 +83,8 @@ class _Line:
     length of the perpendicular.
 
     The kernel covers a disc around the point, whose radius is the kernel's reach. Parts of the line outside this disc
-    contribute the angle that they subtend. If the piece ends outside, the chord within the disc contributes a value
-    tabulated for a half-plane. A piece that ends within the disc contributes ∫ d H(r) dt.
+    contribute the angle that they subtend. If the piece ends outside, half the chord within the disc contributes a
+    value tabulated for a half-plane. A piece that ends within the disc contributes ∫ d H(r) dt.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -167,7 +168,7 @@ def radial_table(edge: SoftEdge) -> Interpolant:
 def _straight_table(edge: SoftEdge) -> Interpolant:
     """Return a table of the transmittance at a distance d inside the soft edge of a half-plane.
 
-    It is 1 - ∫ g(r) r 2 arccos(d/r) dr from d to the reach of the kernel g.
+    For d >= 0, it is 1 - ∫ g(r) r 2 arccos(d/r) dr from d to the reach of the kernel g. Values at d and -d add up to 1.
     """
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + 2 * edge.beta))
 

@@ -77,7 +77,7 @@ def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
 def _panel(
     low: float, high: float, tangent: np.ndarray, cycles: float, digits: float, degree: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return heights and weights of the nodes between two ends, for a wave of `cycles` cycles between them.
+    """Return heights and weights of the nodes in a panel, for a wave of `cycles` cycles between its ends.
 
     At a circle's top or bottom, the length of the chord changes like a square root of the height. A substitution with
     sin² makes it smooth.

@@ -155,7 +155,7 @@ class BallLens:
         return self.radius / power
 
     def pupil(self, aperture_radius: float, wavelength: float = MIDDLE) -> Pupil:
-        """Return the pupil through the centre of the lens, with the wavefront of parallel light behind the lens.
+        """Return the pupil on the plane through the lens's centre, with the wavefront of parallel light behind it.
 
         The wavefront refers to a sphere about the paraxial focus, where sensors are by default. The pupil's amplitude
         is uniform over its plane, although rays are denser or sparser towards the rim of a thick lens.

@@ -45,7 +45,7 @@ class Beam:
 
     @property
     def aperture(self) -> Aperture:
-        """Aperture of the pupil, divided into the pixels of its relief if there are any."""
+        """Aperture of the pupil, divided into the pixels of its relief if they bend the light."""
         pixels = self.pupil.pixels if self.pupil.bends(self.wavelength) else 0
         return PixelatedAperture.squares(self.pupil.aperture, pixels) if pixels else self.pupil.aperture
 

@@ -82,7 +82,7 @@ class ConvergingWave:
         return replace(self, position=position, height=height, **moved)
 
     def _seen_from(self, to: np.ndarray, sines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return sines of directions (2, n) to points of the sphere, and their distances [m], from another point.
+        """Return sines (2, n) of the directions from another point to points of the sphere, and their distances [m].
 
         to: the other point (x, y, z) [m] relative to the centre, with z along the light, (3, 1).
         """
@@ -108,8 +108,8 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
 
     Raises:
         ValueError: a number of the object or the normal is invalid, the attributes have different lengths, no ray has
-            light, the samples lie on another sphere than `radius` or on a line, or the pupil is obscured or not convex,
-            or neither a circle nor an ellipse and sampled too coarsely.
+            light, the samples lie on another sphere than `radius` or on a line, the pupil is obscured or not convex, or
+            a pupil that is neither a circle nor an ellipse is sampled too coarsely.
     """
     normal = _unit(ON_Z if image_normal is None else image_normal)
     x, y, z, opd, intensity = _alike(system)
@@ -146,8 +146,8 @@ def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWav
 
     Raises:
         ValueError: the wavelengths differ, dx is not positive, the data are not finite or not two-dimensional, the
-            illuminated samples lie on a line, or the pupil is dark, obscured, not convex or unevenly illuminated, or
-            neither a circle nor an ellipse and sampled too coarsely.
+            illuminated samples lie on a line, the pupil is dark, obscured, not convex or unevenly illuminated, or a
+            pupil that is neither a circle nor an ellipse is sampled too coarsely.
     """
     data, own = complexes("data", system.data), _one("wavelength", system.wavelength)
     pitch = positive("dx", _one("dx", system.dx), "mm") * MM

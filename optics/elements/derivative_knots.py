@@ -1,9 +1,10 @@
 """Inputs of a PSF that carry derivatives, and the cells in which these derivatives are polynomials.
 
-The derivative of the light behind the pupil with respect to one sample of a map is the light times a cardinal spline.
-This spline is a different cubic polynomial in every cell between two knots, whatever the values of the map are.
-Derivatives with respect to samples of a flat map therefore have as much detail as those of a rough map. Samples of the
-pupil that resolve only the light give wrong derivatives. Quadrature nodes in each cell are used instead.
+The derivative of the light behind the pupil with respect to one sample of a map is proportional to a cardinal spline
+times the light (for a mask, the light without it). This spline is a different cubic polynomial in every cell between
+two knots, whatever the values of the map are. Derivatives with respect to samples of a flat map therefore have as much
+detail as those of a rough map. Samples of the pupil that resolve only the light give wrong derivatives. Quadrature
+nodes in each cell are used instead.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
 
 
 def carries_derivatives(beam: Beam) -> bool:
-    """Return whether any number of the light carries a derivative."""
+    """Return whether any number of the beam's pupil or source, or its distance, carries a derivative."""
     pupil = beam.pupil
     numbers: list[Any] = [pupil.aperture_radius, pupil.thin_lens_focal_length, beam.distance, beam.source.distance]
     numbers += beam.source.angle

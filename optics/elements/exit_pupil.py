@@ -131,7 +131,7 @@ def read_exit_pupil(
         [µm], like prysm's Wavefront in a pupil. Its phase must change by less than half a wave between samples.
     wavelength: vacuum wavelength [m].
     medium_n: refractive index of the image space.
-    focal_length: distance from pupil to image [m], which only objects of the second kind require. Others contain it.
+    focal_length: distance from pupil to image [m], required for objects of the second kind. The first kind contains it.
     order: highest radial order of the fitted Zernike modes.
     image_normal: normal (x, y, z) of the image plane in the object's coordinates. None: the z axis, which is the axis
         of the lens. Objects of the second kind contain no directions; their image plane is parallel to the pupil.

@@ -33,9 +33,10 @@ def band_of(samples: np.ndarray, level: float) -> float:
 
 
 def power_beyond(samples: np.ndarray) -> np.ndarray:
-    """Return the power (mean square) of the samples' components from each frequency upwards, (longer side,).
+    """Return the power (mean square) of the samples' components from each frequency upwards, (entry,).
 
-    Entry k contains all components whose frequency along x or along y is at least k/4 cycles per half a side.
+    Entry k contains all components whose frequency along x or along y is at least k/4 cycles per half a side. There is
+    one entry for each sample along the longer side.
 
     The best-fitting bicubic polynomial is subtracted first, because a polynomial bends light and does not scatter it.
     The cosine transform continues the samples by their mirror images, without jumps. The ends of the samples therefore

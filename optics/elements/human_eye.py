@@ -51,16 +51,17 @@ PERFECT_NM = 555.0  # wavelength for the perfect lens in `mean_human_mtf`
 
 @dataclass(frozen=True, eq=False)
 class HumanEye:
-    """A reduced eye: one refracting surface between air and Thibos' medium, with an additional wavefront.
+    """A reduced eye: one refracting surface between air and the medium "chromatic_eye", with an additional wavefront.
 
-    The surface has the chromatic aberration of a human eye and no other aberration at 570 nm.
+    The surface has the chromatic aberration of a human eye and no other aberration at 570 nm. The medium is Thibos',
+    see `optics.medium`.
 
     aperture_radius: radius [m] of the pupil, at most the radius of the circle over which the wavefront is known.
     wavefront: additional wavefront. "standard_observer" (Autrusseau, Thibos & Shevell 2011, known up to a radius of 3
         mm), a Zernike, or None.
     centered: True to add the tilt that centres the image of a point on the axis. A wavefront known over a wider circle
-        than the pupil usually contains a tilt: cropped coma shifts the image. Without this tilt, the centroid of the
-        standard observer's image lies 1.4 arc minutes off the axis for a pupil of 3 mm.
+        than the pupil usually contains a tilt: cropped coma shifts the image. If centered is False, the centroid of
+        the standard observer's image lies 1.4 arc minutes off the axis for a pupil of 3 mm.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -93,7 +94,7 @@ class HumanEye:
 
     @cached_property
     def pupil(self) -> Pupil:
-        """Pupil of the eye, for `optics.psf` and other functions. Their sensor distance is then `focal_length`."""
+        """Pupil of the eye, for `optics.psf` and other functions. Use `focal_length` as their sensor distance."""
         humour = medium("chromatic_eye")
         paraboloid = BSplineRelief.paraboloid(0.0, 1 / SURFACE, self.aperture_radius)
         reported = self._reported

@@ -53,7 +53,7 @@ class LightGeometry:
 
     @cached_property
     def spheres(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Spherical waves of lenses and sources: refractive index and distance [m] of the wave's centre, (beam,) each.
+        """Spherical waves of lenses and sources: index of the medium, and distance [m] of the centre, (beam,) each.
 
         The index of a wave that converges is negative.
         """
@@ -62,9 +62,9 @@ class LightGeometry:
         return [(read_only(index), read_only(r)) for index, r in known if np.isfinite(r).any()]
 
     def waves(self, x: np.ndarray, y: np.ndarray) -> np.ndarray | float:
-        """Return the sum of the spherical waves' paths at points (x, y) [m], in wavelengths, up to a constant.
+        """Return the sum of the spherical waves' paths at points (x, y) [m], in vacuum wavelengths, up to a constant.
 
-        The shape is (beam, y, x).
+        The shape is (beam, y, x). Without spherical waves, the result is the number 0.
 
         x, y: points, (beam, y, x).
         """

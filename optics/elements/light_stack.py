@@ -168,7 +168,7 @@ class LightStack:
         return total
 
     def powers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return y^i x^j at points in units of the radius, for `polynomial_waves`, (beam, i, j, point).
+        """Return y^i x^j for `polynomial_waves`, with x and y in units of the radius, (beam, i, j, point).
 
         x, y: points [m], (beam, y, x).
         """
@@ -182,7 +182,7 @@ class LightStack:
         return np.asarray((coefficients @ powers.reshape(len(powers), coefficients.shape[2], -1))[:, 0])
 
     def _other_path(self, place: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the part of the path [m] of one beam that is neither a polynomial nor a sphere about the axis."""
+        """Return the part of the path [m] of one beam that is neither a polynomial nor a wave centred on the axis."""
         beam, total = self.beams[place], np.zeros(np.broadcast_shapes(x.shape, y.shape))
         pupil = beam.pupil
         if self._tilted[place]:
@@ -256,7 +256,7 @@ class LightStack:
 
 
 def _powers(values: np.ndarray, count: int) -> np.ndarray:
-    """Return the powers 0 to count - 1 of values (beam, point), (beam, power, point)."""
+    """Return the powers 0 to count - 1 of values (beam, point), as an array (beam, power, point)."""
     found = np.ones((len(values), count, values.shape[1]))
     for power in range(1, count):
         np.multiply(found[:, power - 1], values, out=found[:, power])

@@ -101,7 +101,10 @@ class PixelRelief(Relief):
 
 
 def _reach(power: np.ndarray, share: float) -> float:
-    """Return the frequency [cycles per radius] beyond which at most the fraction `share` of the power lies."""
+    """Return the frequency [cycles per radius] beyond which at most the fraction `share` of the power lies.
+
+    Infinity: the frequency lies beyond REPETITIONS repetitions of the spectrum.
+    """
     n = len(power)
     order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)
     sent = power[order % n] * np.sinc(order / n) ** 2

@@ -156,7 +156,7 @@ class Pupil:
 
     @property
     def pixels(self) -> int:
-        """Number of the relief's square pixels across the pupil; 0 for a smooth relief."""
+        """Number of the relief's square pixels across the pupil; 0 if it has none or all heights are equal."""
         return 0 if self.height is None else int(self.height.pixels)
 
     def image_distance(self, source_distance: float) -> float:
@@ -168,7 +168,7 @@ class Pupil:
         source_distance: s [m]; infinity for parallel light.
 
         Raises:
-            ValueError: the lens forms no real image, or the distance is not positive or carries a derivative.
+            ValueError: the lens forms no real image, or source_distance is not positive or carries a derivative.
         """
         positive("source_distance", source_distance, infinite=True)
         if self.thin_lens_focal_length is None:
@@ -213,7 +213,7 @@ class Pupil:
         return self.n.step(wavelength, self.index_before(wavelength))
 
     def bends(self, wavelength: float) -> bool:
-        """Return whether the relief changes the path, or derivatives of its index are requested."""
+        """Return whether there is a relief whose index differs from its surroundings or carries a derivative."""
         step = self.index_step(wavelength)
         return self.height is not None and (is_differentiable(step) or step != 0)
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 from optics.numerics.arguments import finite, in_range, one_of, positive, shown, vacuum_wavelength, without_derivative
-from optics.numerics.autodiff import Scalar, is_differentiable, number
+from optics.numerics.autodiff import Scalar, is_differentiable, number, of_torch
 
 __all__ = ["MEDIA", "Cornu", "Dispersion", "RefractiveIndex", "Sellmeier", "index_of", "material", "medium"]
 
@@ -29,7 +29,7 @@ class Dispersion(ABC):
             ValueError: the wavelength is invalid, or n is outside [1, 10] there.
         """
         n = self._n(vacuum_wavelength(wavelength))
-        value = number(n)
+        value = self._number(wavelength, n)
         if not value >= 1:
             raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at least 1")
         if value > LARGEST:
@@ -49,6 +49,10 @@ class Dispersion(ABC):
     @abstractmethod
     def _n(self, wavelength: float) -> Scalar:
         """Return the index at a vacuum wavelength [m], without checking its range."""
+
+    def _number(self, wavelength: float, n: Scalar) -> float:
+        """Return the result `n` of `_n` without derivatives."""
+        return number(n)
 
 
 @dataclass(frozen=True)
@@ -92,9 +96,17 @@ class RefractiveIndex(Dispersion):
         return is_differentiable(self.a) or is_differentiable(self.b)
 
     def _n(self, wavelength: float) -> Scalar:
+        return self._curve(self.a, self.b, wavelength)
+
+    def _number(self, wavelength: float, n: Scalar) -> float:
+        if of_torch(self.a) or of_torch(self.b):  # A copy of their numbers may be kept, but none of n.
+            return float(self._curve(number(self.a), number(self.b), wavelength))
+        return number(n)
+
+    def _curve(self, a: Scalar, b: Scalar, wavelength: float) -> Scalar:
         square = wavelength**2
         higher = self.c / square**2 + self.d / square**3
-        found = self.a + self.b / square
+        found = a + b / square
         return found if higher == 0 else found + higher
 
 

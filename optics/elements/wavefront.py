@@ -18,10 +18,10 @@ import numpy as np
 from optics.elements.relief import HeightMap
 from optics.elements.square_samples import map_samples
 from optics.elements.zernike_modes import mode, norm, weighted_modes
-from optics.elements.zernike_order import HIGHEST, fringe_mode, noll_mode, numbered, osa_mode
-from optics.numerics.arguments import finite, plain_reals, positive, reals, shown
-from optics.numerics.array_library import gather, library, like
-from optics.numerics.autodiff import Array, carries_derivative, is_differentiable, number
+from optics.elements.zernike_order import HIGHEST, fringe_mode, modes_of_vector, noll_mode, numbered
+from optics.numerics.arguments import finite, positive, reals, shown
+from optics.numerics.array_library import gather, library, like, on_host, on_processor
+from optics.numerics.autodiff import Array, carries_derivative, is_differentiable
 
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
 
@@ -112,7 +112,7 @@ class Zernike(Aberration):
             named = {(n, m): finite(f"coefficients_um[{n}, {m}]", c, carried=True) for (n, m), c in modes.items()}
             object.__setattr__(self, "coefficients_um", modes)
         else:
-            named = _of_vector(given)
+            named = modes_of_vector(given)
         object.__setattr__(self, "modes", named)
 
     @classmethod
@@ -148,13 +148,27 @@ class Zernike(Aberration):
         return cls({key: value / norm(*key) for key, value in named.items()}, radius)
 
     def ahead(self, x: Array, y: Array) -> Array:
-        named = [key for key, value in self.modes.items() if value != 0 or self.asks]
-        if named and library(x).__name__ != "drjit" and not carries_derivative(x):
-            return weighted_modes(self._coefficients(named, x), tuple(named), x, y)
+        if library(x).__name__ != "drjit" and on_host(x) and not carries_derivative(x):
+            return self.ahead_at(on_processor(x), on_processor(y), x)
         total = like(x, 0.0)
-        for n, m in named:
+        for n, m in self._named:
             total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
         return total
+
+    def ahead_at(self, x: np.ndarray, y: np.ndarray, like_array: Array) -> Array:
+        """Return the result of `ahead` at positions of NumPy, whose polynomials wavefronts share.
+
+        like_array: array of NumPy or PyTorch, which determines the library and the device of the result.
+        """
+        named = self._named
+        if not named:
+            return like(like_array, 0.0)
+        return weighted_modes(self._coefficients(named, like_array), tuple(named), x, y)
+
+    @property
+    def _named(self) -> list[tuple[int, int]]:
+        """Modes whose coefficients are not 0, or carry derivatives."""
+        return [key for key, value in self.modes.items() if value != 0 or self.asks]
 
     def at(self, x: Any, y: Any) -> np.ndarray:
         """Return the wavefront [m] at positions in units of the radius. The polynomials continue beyond 1.
@@ -279,19 +293,3 @@ def _check_mode(key: Any) -> None:
         raise ValueError(
             f"coefficients_um has {shown(key)}: must be modes (n, m) with n up to {HIGHEST}, |m| <= n and n - m even"
         )
-
-
-def _of_vector(given: Any) -> dict[tuple[int, int], float]:
-    """Convert a vector, ordered by the index of OSA, to a dictionary of modes; ValueError if it is invalid."""
-    vector = plain_reals("coefficients_um", given)
-    most = (HIGHEST + 1) * (HIGHEST + 2) // 2
-    if vector.ndim != 1 or not 0 < vector.size <= most:
-        raise ValueError(
-            f"coefficients_um has shape {vector.shape}: must be {{(n, m): µm}}, or a vector of 1 to {most} [µm]"
-        )
-    if not np.isfinite(vector).all():
-        raise ValueError("coefficients_um holds NaN or infinity: must be finite [µm]")
-    modes = {}
-    for j, value in enumerate(vector):
-        modes[osa_mode(j)] = number(value)
-    return modes

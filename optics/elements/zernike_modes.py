@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.array_library import library, like
-from optics.numerics.autodiff import plain
+from optics.numerics.array_library import beside
 
 __all__ = ["mode", "norm", "weighted_modes"]
 
@@ -46,19 +45,20 @@ def _jacobi(order: int, highest: int, t: Any) -> Iterator[Any]:
         yield now
 
 
-def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: Any, y: Any) -> Any:
-    """Return Σ w Z_n^m at (x, y) for weights w of the modes `named`, (n, m).
+def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: np.ndarray, y: np.ndarray) -> Any:
+    """Return Σ w Z_n^m at (x, y) for weights w of the modes `named`, (n, m), as an array of the library of `weights`.
 
     Unless they are too large, the polynomials are cached, since many wavefronts are evaluated at the same points.
 
-    weights, x, y: arrays of NumPy or PyTorch, in float64. Positions carry no derivatives.
+    weights: array of NumPy or PyTorch, in float64.
+    x, y: positions, float64.
     """
     size = np.broadcast_shapes(x.shape, y.shape)
     if len(named) * math.prod(size) > MOST_CACHED:
-        return sum((w * mode(n, m, x, y) for w, (n, m) in zip(weights, named, strict=True)), like(x, np.zeros(size)))
-    places = [plain(at) for at in (x, y)]
-    known = _modes(named, places[0].tobytes(), x.shape, places[1].tobytes(), y.shape)
-    return (weights @ (known if library(x) is np else library(x).from_numpy(known))).reshape(size)
+        parts = (w * beside(weights, mode(n, m, x, y)) for w, (n, m) in zip(weights, named, strict=True))
+        return sum(parts, beside(weights, np.zeros(size)))
+    known = _modes(named, x.tobytes(), x.shape, y.tobytes(), y.shape)
+    return (weights @ beside(weights, known)).reshape(size)
 
 
 @lru_cache(maxsize=8)

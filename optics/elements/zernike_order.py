@@ -10,10 +10,12 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from optics.numerics.arguments import finite, is_sized, shown, whole
+import numpy as np
+
+from optics.numerics.arguments import finite, is_sized, plain_reals, shown, whole
 from optics.numerics.autodiff import is_differentiable, of_torch
 
-__all__ = ["FRINGE", "HIGHEST", "NOLL", "fringe_mode", "noll_mode", "numbered", "osa_mode"]
+__all__ = ["FRINGE", "HIGHEST", "NOLL", "fringe_mode", "modes_of_vector", "noll_mode", "numbered", "osa_mode"]
 
 HIGHEST = 30  # choice: highest radial order
 NOLL = (HIGHEST + 1) * (HIGHEST + 2) // 2
@@ -72,3 +74,19 @@ def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
     if (is_differentiable(given) and not of_torch(given)) or isinstance(given, str) or not is_sized(given):
         raise ValueError(f"coefficients_um = {shown(given)}: must be {{number: µm}}, or a row [µm] from number 1 on")
     return numbered(dict(enumerate(given, start=1)), mode)
+
+
+def modes_of_vector(given: Any) -> dict[Mode, float]:
+    """Return coefficients by mode from a vector ordered by the index of OSA, without derivatives.
+
+    Raises:
+        ValueError: the argument is not a vector of 1 to 496 finite numbers.
+    """
+    vector = plain_reals("coefficients_um", given)
+    if vector.ndim != 1 or not 0 < vector.size <= NOLL:
+        raise ValueError(
+            f"coefficients_um has shape {vector.shape}: must be {{(n, m): µm}}, or a vector of 1 to {NOLL} [µm]"
+        )
+    if not np.isfinite(vector).all():
+        raise ValueError("coefficients_um holds NaN or infinity: must be finite [µm]")
+    return {osa_mode(j): float(value) for j, value in enumerate(vector)}

@@ -7,7 +7,7 @@ sparse matrix and the coefficients of the splines. Both only depend on the sampl
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,7 +52,7 @@ def sampled_height(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Ar
     if isinstance(relief, HeightMap):
         return _of_map(relief, pupil.radius, samples, convert)
     powers = RELIEF_POWERS if isinstance(relief, BSplineRelief) else None
-    return _interpolated(partial(relief_height, pupil), powers, samples, convert)
+    return _interpolated(lambda x, y: relief_height(pupil, convert(x), convert(y)), powers, samples, convert)
 
 
 def sampled_wavefront(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Array | None:
@@ -65,8 +65,11 @@ def sampled_wavefront(pupil: Pupil, samples: WindowSamples, convert: Convert) ->
         return None
     if isinstance(wavefront, WavefrontMap):
         return _of_map(wavefront, wavefront.radius or pupil.radius, samples, convert)
-    powers = wavefront.order + 1 if isinstance(wavefront, Zernike) and wavefront.order <= HIGHEST_ORDER else None
-    return _interpolated(partial(wavefront_ahead, pupil), powers, samples, convert)
+    if isinstance(wavefront, Zernike):
+        radius, none = wavefront.radius or pupil.radius, convert(np.zeros(0))
+        powers = wavefront.order + 1 if wavefront.order <= HIGHEST_ORDER else None
+        return _interpolated(lambda x, y: wavefront.ahead_at(x / radius, y / radius, none), powers, samples, convert)
+    return _interpolated(lambda x, y: wavefront_ahead(pupil, convert(x), convert(y)), None, samples, convert)
 
 
 def _of_map(surface: HeightMap | WavefrontMap, radius: float, samples: WindowSamples, convert: Convert) -> Array:
@@ -77,20 +80,22 @@ def _of_map(surface: HeightMap | WavefrontMap, radius: float, samples: WindowSam
 
 
 def _interpolated(
-    values: Callable[[Array, Array], Array | None], powers: int | None, samples: WindowSamples, convert: Convert
-) -> Array | None:
+    values: Callable[[np.ndarray, np.ndarray], Array],
+    powers: int | None,
+    samples: WindowSamples,
+    convert: Convert,
+) -> Array:
     """Return values at samples, (η, ξ), interpolated from a few points of the pupil if possible.
 
-    values: function of positions (x, y) [m].
+    values: function of positions (x, y) [m], whose result is in the library of the computation.
     powers: number of powers of x and of y of a polynomial; None for other functions, which are not interpolated.
     """
     many, few = len(samples.at), (powers or 0) + SPHERE_POINTS
     if powers is None or few >= many or isinstance(samples, PixelNodes) or not single_stack(samples).smooth(0.0):
-        x, y = map(convert, samples.points)
-        return values(x, y)
-    found = values(*map(convert, _few_points(samples, few)))
+        return values(*samples.points)
+    found = values(*_few_points(samples, few))
     weight = convert(even_weights(many, few))
-    return None if found is None else weight @ found @ weight.T
+    return weight @ found @ weight.T
 
 
 def _bytes_of(matrix: Any) -> int:

@@ -21,8 +21,10 @@ from optics.methods.diffraction_kernel import diffraction_kernel
 from optics.methods.remaining_factor import RemainingFactor
 from optics.methods.sine_stack import SineStack
 from optics.methods.slow_factor import Path
+from optics.methods.window_crossings import WindowCrossings
 from optics.methods.window_sums import intensity_of
-from optics.numerics.array_library import turned
+from optics.numerics.array_library import beside, library, turned
+from optics.numerics.autodiff import Array
 from optics.numerics.grid import sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 
@@ -31,42 +33,35 @@ __all__ = ["window_errors"]
 CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_sampling.py
 UNSEEN = 0.05  # choice: error that both sums may share, relative to the tolerance
 ROUNDING = {dtype: float(np.finfo(dtype).eps) for dtype in ("float32", "float64")}
-ACROSS = 10  # choice: number of rows and of columns in which the check computes the PSF
-SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns, see `_drawn`
 INTERPOLATED = 0.5  # choice: largest error of the interpolated kernel of the check, relative to the tolerance
 # Choices: numbers of interpolation points across the pupil, and phases [rad] from which on each is too small.
 ORDERS, PHASES = (2, 3, 4, 5, 7, 9, 12, 16), (0.02, 0.3, 0.8, 1.2, 1.8, 3.0, 6.0)
 
 
-def window_errors(
-    samples: SineStack, path: Path, field: np.ndarray, images: np.ndarray, tolerance: float
-) -> np.ndarray:
-    """Return the relative L2 errors of intensities over a window, estimated in a few rows and columns, (stack,).
+def window_errors(samples: SineStack, path: Path, field: Array, crossings: WindowCrossings, tolerance: float) -> Array:
+    """Return the relative L2 errors of intensities over a window, estimated at crossings of rows and columns, (stack,).
 
-    The result is NaN for a window without light.
+    The result is NaN for a window without light. Its library and device are those of the field.
 
     samples: samples of the pupils for the comparison. They and the path may have a first axis of length 1.
-    field: contribution of each of these samples to the middle of the window, see `SineStack.arriving`, (stack, y, x).
-    images: |U|² over the window, (stack, y, x).
+    field: contribution of each of these samples to the middle of the window, see `SineStack.arriving`, (stack, y, x),
+        an array of NumPy or PyTorch.
+    crossings: intensities at the crossings.
     tolerance: tolerance of the PSFs.
     """
-    dtype = str(field.real.dtype)
+    own, dtype = library(field), str(field.real.dtype).removeprefix("torch.")
     key = "check", path.key, dtype, float(tolerance)
     check: _CheckSums = samples.known.get(key, lambda: _CheckSums(samples, path, dtype, INTERPOLATED * tolerance))
-    total, beams = np.square(images, dtype=np.float64).reshape(len(images), -1).sum(1), np.arange(len(images))
-    lit = images if (total > 0).all() else np.where((total > 0)[:, None, None], images, 1)
-    rows, columns, chance = _drawn(lit)
-    exact = check.intensity(field, rows, columns)
-    drawn = images[beams[:, None, None], rows[:, :, None], columns[:, None, :]]
-    squares = np.stack([np.square(drawn - exact), np.square(exact)]) / chance
-    squared, bright = squares.reshape(2, len(images), -1).mean(2)
+    exact, total = check.intensity(field, crossings.rows, crossings.columns), crossings.total
+    squares = own.stack([own.square(crossings.images - exact), own.square(exact)]) / crossings.chance
+    squared, bright = squares.reshape(2, len(exact), -1).mean(2)
     # choice: with an error above a tenth, the PSF may be too bright, so the error is relative to the darker of the two
-    bright = np.minimum(total, bright)
-    total = np.where(total > 0, np.where(squared > 0.01 * total, bright, total), np.nan)
+    bright = own.minimum(total, bright)
+    total = own.where(total > 0, own.where(squared > 0.01 * total, bright, total), np.nan)
     rounding = ROUNDING[dtype]
     # Below the goal of the interpolation, the difference may be its own error, which both sums do not share.
-    unlike = np.where(check.apart > INTERPOLATED * tolerance, check.apart, 0)
-    return np.asarray(CAUTION * (np.sqrt(squared / total) + unlike) + UNSEEN * tolerance + rounding)
+    unlike = beside(field, np.where(check.apart > INTERPOLATED * tolerance, check.apart, 0))
+    return CAUTION * (own.sqrt(squared / total) + unlike) + UNSEEN * tolerance + rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,20 +84,20 @@ class _CheckSums:
     dtype: str
     most: float
 
-    def intensity(self, field: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    def intensity(self, field: Array, rows: np.ndarray, columns: np.ndarray) -> Array:
         """Return |U|² at crossings of rows (stack, row) and columns (stack, column), (stack, row, column).
 
-        field: contribution of each sample to the middle of the window, (stack, y, x).
+        field: contribution of each sample to the middle of the window, (stack, y, x). Its library computes the sums.
         """
         count = len(self._weight)
         across, down = (
-            (kernel[:, :, None, :] * self._weight).reshape(len(rows), -1, kernel.shape[2])
+            beside(field, (kernel[:, :, None, :] * self._weight).reshape(len(rows), -1, kernel.shape[2]))
             for kernel in self._rows(columns, rows)
         )
         sums = down @ field @ across.swapaxes(1, 2)
         split = sums.reshape(len(rows), rows.shape[1], count, columns.shape[1], count)
-        found: np.ndarray = intensity_of(np.einsum("nbavu,nvbua->nvu", self._ratio(rows, columns), split))
-        return found
+        ratio = beside(field, self._ratio(rows, columns))
+        return intensity_of(library(field).einsum("nbavu,nvbua->nvu", ratio, split))
 
     @property
     def apart(self) -> np.ndarray:
@@ -206,44 +201,3 @@ def _remaining(
     for axis in (0, 1):
         found /= axis_factor(path, samples, axis, directions[axis], place[axis])
     return found
-
-
-def _drawn(images: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return rows and columns of each PSF, and the probability with which each of their crossings is drawn.
-
-    The shapes are (stack, row), (stack, column) and (stack, row, column).
-    """
-    count, light = len(images), (np.sqrt(images), np.square(images))
-    of_rows, of_columns = ([part.sum(axis=along) for part in light] for along in (2, 1))
-    if images.shape[1] == images.shape[2]:
-        places, chance = _along_axis(*map(np.concatenate, zip(of_rows, of_columns, strict=True)))
-        rows, columns, down, across = places[:count], places[count:], chance[:count], chance[count:]
-    else:
-        (rows, down), (columns, across) = _along_axis(*of_rows), _along_axis(*of_columns)
-    return rows, columns, down[:, :, None] * across[:, None, :]
-
-
-def _along_axis(root: np.ndarray, bright: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of a few rows, or columns, and the probability with which each is drawn, (stack, row).
-
-    Rows are drawn at even steps of their cumulative probability. The probability is a mixture of four distributions.
-    The first is uniform. The second is proportional to the square root of the intensity, like the error of the
-    intensity if the error of the amplitude is the same everywhere. The third favours the brightest samples and their
-    neighbours, and the last the sides of the window, where phases change fastest.
-
-    root, bright: sums over each row of the square root of the intensity, and of its square, (stack, row).
-    """
-    root, bright = root.astype(np.float64), bright.astype(np.float64)
-    size = root.shape[1]
-    count = min(ACROSS, size)
-    if count == size:
-        return np.broadcast_to(np.arange(count), root.shape), np.full(root.shape, 1 / count)
-    bright[:, 1:-1] = bright[:, :-2] + bright[:, 1:-1] + bright[:, 2:]
-    uniform, of_root, of_bright, of_sides = SHARES
-    chance = root * (of_root / root.sum(axis=1))[:, None] + bright * (of_bright / bright.sum(axis=1))[:, None]
-    chance += uniform / size
-    chance[:, [0, -1]] += of_sides / 2
-    levels = chance.cumsum(axis=1)
-    wanted = (np.arange(count) + 0.5) / count * levels[:, -1:]
-    place = (levels[:, None, :] < wanted[:, :, None]).sum(axis=2).clip(max=size - 1)
-    return place, chance[np.arange(len(chance))[:, None], place]

@@ -13,6 +13,7 @@ from optics.methods.remaining_factor import RemainingFactor
 from optics.methods.sine_stack import SineStack
 from optics.methods.slow_factor import Path, cross_term
 from optics.methods.window_check import window_errors
+from optics.methods.window_crossings import WindowCrossings
 from optics.methods.window_sums import intensity_of, weighted
 from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
@@ -56,7 +57,8 @@ def window_image_errors(
     images: result of `window_images`, (beam, y, x).
     """
     path = Path(stack.wavelength, stack.distance, window)
-    return window_errors(finer, path, finer.arriving(stack, str(images.dtype)), images, tolerance)
+    crossings = WindowCrossings.from_images(images)
+    return np.asarray(window_errors(finer, path, finer.arriving(stack, str(images.dtype)), crossings, tolerance))
 
 
 def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dtype: str) -> list[tuple[Any, Any]]:

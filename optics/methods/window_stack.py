@@ -21,6 +21,7 @@ from optics.methods.single_stack import single_stack
 from optics.methods.slow_factor import Path
 from optics.methods.stack_operation import is_single, stack_images
 from optics.methods.window_check import window_errors
+from optics.methods.window_crossings import WindowCrossings
 from optics.methods.window_sampling import WindowSampling
 from optics.methods.window_sums import intensity_of, window_field
 from optics.numerics.array_library import library, like, turned
@@ -61,18 +62,20 @@ class WindowStack:
         images = [self._image(size, waves, sampling, path) for path, (size, waves) in lights]
         return library(images[0]).stack(images, 1) / self.pupil.area
 
-    def errors(self, sampling: WindowSampling, images: np.ndarray, tolerance: float) -> np.ndarray:
+    def errors(self, sampling: WindowSampling, images: Array, tolerance: float) -> Array:
         """Return the relative L2 error of each PSF over the window, see `window_errors`, (source, wavelength).
 
-        images: result of `intensity` as a NumPy array. The stack carries no derivatives.
+        images: result of `intensity` without derivatives, in the library and on the device of `convert`.
         tolerance: tolerance of the PSFs.
         """
-        seen, finer = np.moveaxis(images * self.pupil.area, 1, 0), single_stack(sampling.finer)
+        seen, finer = (images * self.pupil.area).swapaxes(0, 1), single_stack(sampling.finer)
+        crossings, count = WindowCrossings.from_images(seen.reshape(-1, *seen.shape[2:])), len(self.sources)
         found = []
-        for path, factors, own in zip(self._paths, self._factors(sampling.finer), seen, strict=True):
-            light = _product(*factors, self.dtype) * finer.to_middle(path.wavelength, self.dtype)
-            found.append(window_errors(finer, path, light, own, tolerance))
-        return np.stack(found, 1)
+        for place, (path, factors) in enumerate(zip(self._paths, self._factors(sampling.finer), strict=True)):
+            own = crossings.part(slice(place * count, (place + 1) * count))
+            arriving = _product(*factors, self.dtype) * self.convert(finer.to_middle(path.wavelength, self.dtype))
+            found.append(window_errors(finer, path, arriving, own, tolerance))
+        return library(images).stack(found, 1)
 
     @property
     def _paths(self) -> list[Path]:

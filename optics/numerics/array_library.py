@@ -15,9 +15,26 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.autodiff import Array, carries_derivative, is_differentiable, plain
+from optics.numerics.kept_values import KeptValues
 from optics.numerics.precision import padded_for_packets
 
-__all__ = ["fma", "gather", "indices", "library", "like", "matrix_like", "sparse_product", "turned"]
+__all__ = [
+    "beside",
+    "fma",
+    "gather",
+    "indices",
+    "library",
+    "like",
+    "matrix_like",
+    "on_host",
+    "on_processor",
+    "sparse_product",
+    "to_double",
+    "turned",
+]
+
+MOST_BYTES = 256e6  # choice, limited by memory: sparse matrices that are kept on other devices than the processor
+_ENTRIES = KeptValues(MOST_BYTES, lambda kept: sum(part.numel() * part.element_size() for part in kept[1:]))
 
 
 def library(x: Array) -> Any:
@@ -47,11 +64,30 @@ def like(x: Array, value: Any) -> Array:
         _refuse_mixture(value)
         value = plain(value)
     if own.__name__ == "torch":
-        tensor = value if is_differentiable(value) else own.tensor(value, dtype=x.dtype)
+        tensor = value if isinstance(value, own.Tensor) else own.tensor(value, dtype=x.dtype)
         return tensor.to(x.device, x.dtype)
     if is_differentiable(value):
         return type(x)(own.ravel(value))
     return type(x)(padded_for_packets(value)) if isinstance(value, np.ndarray) else own.opaque(type(x), value)
+
+
+def beside(x: Array, values: np.ndarray) -> Array:
+    """Return an array of NumPy as an array of the library and the device of `x`, NumPy or PyTorch, of the same type."""
+    own = library(x)
+    return values if own is np else own.from_numpy(values).to(x.device)
+
+
+def on_processor(x: Array) -> np.ndarray:
+    """Return an array of NumPy or PyTorch as a NumPy array of the same type, without derivatives.
+
+    The program waits until other devices have computed it.
+    """
+    return np.asarray(x if library(x) is np else x.detach().cpu().resolve_conj().resolve_neg())
+
+
+def to_double(x: Array) -> Array:
+    """Return an array of NumPy or PyTorch in double precision, a copy unless it has this precision."""
+    return x.astype(np.float64, copy=False) if library(x) is np else x.double()
 
 
 def matrix_like(x: Array, value: Any) -> Array:
@@ -98,16 +134,32 @@ def sparse_product(matrix: Any, values: Array) -> Array:
         return matrix @ values
     if on_host(values):
         return _operations(own).sparse_product.apply(values, matrix)
-    coordinates = matrix.tocoo()
-    places = own.as_tensor(np.stack([coordinates.row, coordinates.col]), device=values.device)
-    weights = own.as_tensor(coordinates.data, dtype=values.dtype, device=values.device)
-    sparse = own.sparse_coo_tensor(places, weights, matrix.shape, check_invariants=False)
-    return own.sparse.mm(sparse, values[:, None])[:, 0]
+    return _sum_of_products(values, matrix)
 
 
-def on_host(tensor: Array) -> bool:
-    """Return whether a tensor of PyTorch lies in the memory of the processor, which NumPy shares without a copy."""
-    return bool(tensor.device.type == "cpu")
+def on_host(x: Array) -> bool:
+    """Return whether an array of NumPy or PyTorch lies in the memory of the processor, which both share."""
+    return library(x) is np or bool(x.device.type == "cpu")
+
+
+def _sum_of_products(values: Array, matrix: Any) -> Array:
+    """Return the product of a sparse matrix and a tensor on any device, from selected numbers of the tensor."""
+    own, key = library(values), (id(matrix), str(values.device), str(values.dtype))
+    # The matrix is kept with its entries, so that no other matrix has its id.
+    _, places, weight = _ENTRIES.get(key, lambda: (matrix, *_entries(values, matrix)))
+    return (own.index_select(values, 0, places).reshape(weight.shape) * weight).sum(1)
+
+
+def _entries(values: Array, matrix: Any) -> tuple[Array, Array]:
+    """Return columns, flat, and values, (row, entry), of the entries of a sparse matrix, on the device of `values`.
+
+    Rows with fewer entries than others are filled up with zeros.
+    """
+    counts = np.diff(matrix.indptr)
+    column = np.arange(max(int(counts.max(initial=0)), 1)) < counts[:, None]
+    places, weight = np.zeros(column.shape, np.int32), np.zeros(column.shape)
+    places[column], weight[column] = matrix.indices, matrix.data
+    return beside(values, places.ravel()), beside(values, weight).to(values.dtype)
 
 
 def turned(size: Any, waves: Array, dtype: str) -> Array:

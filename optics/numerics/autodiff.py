@@ -15,15 +15,19 @@ __all__ = [
     "Array",
     "Scalar",
     "carries_derivative",
+    "entries",
     "grad_enabled",
     "holds_arrays",
     "is_differentiable",
+    "is_known",
+    "keep_copy",
     "number",
     "of_torch",
     "plain",
     "to_user",
 ]
 
+COPY = "numbers_on_host"  # attribute of tensors of PyTorch
 DEEPEST = 20  # choice: levels of objects within objects
 
 # Dr.Jit creates its types when a backend is first loaded, so type checkers cannot see them. These names are aliases of
@@ -77,6 +81,29 @@ def carries_derivative(value: Any) -> bool:
     return of_torch(value) or (is_differentiable(value) and grad_enabled(value))
 
 
+def entries(row: Any) -> Any:
+    """Return a row of numbers whose entries carry its derivatives. A tensor of PyTorch is copied to the host once."""
+    if not of_torch(row) or row.ndim == 0:
+        return row
+    found = tuple(row)
+    for entry, value in zip(found, plain(row), strict=True):
+        keep_copy(entry, value)
+    return found
+
+
+def is_known(tensor: Array) -> bool:
+    """Return whether a copy of the numbers of a tensor is kept, see `keep_copy`."""
+    return hasattr(tensor, COPY)
+
+
+def keep_copy(tensor: Array, numbers: np.ndarray) -> None:
+    """Keep the numbers of a tensor of PyTorch, which never change, so that `plain` need not copy them from its device.
+
+    tensor: a tensor that no user has, since users may change theirs.
+    """
+    setattr(tensor, COPY, numbers)
+
+
 def number(value: Any) -> float:
     """Return `value` as a float without derivative. A Dr.Jit array must have one element.
 
@@ -99,7 +126,8 @@ def plain(value: Any) -> np.ndarray:
         BackendError: a Dr.Jit array is on a device other than the selected one.
     """
     if of_torch(value):
-        value = value.detach().cpu().resolve_neg()
+        known = getattr(value, COPY, None)
+        value = value.detach().cpu().resolve_neg() if known is None else known
     elif is_differentiable(value):
         import drjit as dr
 

@@ -31,8 +31,8 @@ def readable(name: str, value: Any) -> Any:
     """Return `value`, with PyTorch's lazy conjugation and negation carried out; errors are about the argument `name`.
 
     NumPy cannot read tensors that are marked as conjugate or negative, such as `tensor.conj()` and its imaginary part,
-    or that are on a GPU. A copy on the processor is returned, unless the tensor requires a gradient. NumPy would use
-    masked elements (numpy.ma) as data. Entries of lists and tuples are treated in the same way.
+    or that are on a GPU. Tensors are returned on the CPU, unless they require a gradient. Masked elements (numpy.ma)
+    are refused, because NumPy would use them as data. Entries of lists and tuples are treated in the same way.
 
     Raises:
         ValueError: elements are masked, or a tensor is on the device "meta", which contains no numbers.
@@ -53,7 +53,7 @@ def readable(name: str, value: Any) -> Any:
 
 
 def full_precision(name: str, value: Any) -> Any:
-    """Return `value` as `readable` does; ValueError about `name` if it, or an entry, is in half precision or less.
+    """Return `value` as `readable` does; ValueError if the value, or an entry of it, is in half precision or less.
 
     Near 1 µm, the step of float16 is 60 nm, a tenth of a wavelength.
     """
@@ -64,7 +64,10 @@ def full_precision(name: str, value: Any) -> Any:
 
 
 def as_array(name: str, values: Any) -> np.ndarray:
-    """Return `values` as an array, of type object if NumPy cannot convert them. See `full_precision`."""
+    """Return `values` as an array, or an array that contains only None if NumPy cannot convert them.
+
+    See `full_precision`.
+    """
     values = full_precision(name, values)
     try:
         given = np.asarray(values)
@@ -75,7 +78,10 @@ def as_array(name: str, values: Any) -> np.ndarray:
 
 
 def real_array(name: str, value: Any) -> np.ndarray | None:
-    """Return `value` as an array of real numbers of any precision; None if it is something else. See `readable`."""
+    """Return `value` as an array of real numbers of any precision, or of Booleans; None if it is something else.
+
+    See `readable`.
+    """
     value = readable(name, value)
     try:
         given = np.asarray(value)

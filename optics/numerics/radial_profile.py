@@ -47,10 +47,10 @@ class RadialProfile:
     def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialProfile:
         """Return points that resolve spatial frequencies up to `band` [1/m] with a relative error of about `error`.
 
-        The number of points follows from Chebyshev coefficients over [-R, R], with the line's `radius` R. Those of a
-        wave of frequency b are 2 J_m(2πbR). Obliquity factors have poles at ±i distance, so their coefficients fall
-        like e^{-m asinh(distance / R)}. The pitch h of the table follows from the error of eight-point interpolation,
-        LAGRANGE_8 (2πbh)⁸.
+        The number of points follows from Chebyshev coefficients over [-R, R], with the profile's `radius` R. Those of a
+        wave of frequency b are 2 J_m(2πbR). Obliquity factors have poles at r = ±iz, with the `distance` z [m] from the
+        pupil, so their coefficients fall like e^{-m asinh(z / R)}. The pitch h of the table follows from the error of
+        eight-point interpolation, LAGRANGE_8 (2πbh)⁸.
         """
         digits = -math.log10(error)
         turns = 2 * math.pi * band * rim + 2 * rim / distance
@@ -76,7 +76,7 @@ class RadialProfile:
 
     @property
     def entries(self) -> int:
-        """Number of entries of the matrix that maps points to the table."""
+        """Number of entries of the matrix that maps points to the table; 0 if `is_table`."""
         return 0 if self.is_table else self.points * self.table
 
     @property
@@ -174,7 +174,7 @@ def _refinement(points: int, table: int, rim: float, dtype: str) -> tuple[np.nda
     """Return the flat matrix (table + 7, points) that interpolates from Chebyshev points to the table, and its shape.
 
     The interpolating polynomial is even. The table has evenly spaced positions, which are numbered from -3 to table +
-    3. The axis is position 0, and `rim`, which is in units of the line's radius, is position table - 1.
+    3. The axis is position 0, and `rim`, which is in units of the profile's radius, is position table - 1.
     """
     radius = rim * _places(table)
     nodes = np.cos(np.pi * (np.arange(points) + 0.5) / (2 * points))

@@ -16,7 +16,7 @@ def warn_renamed(old: str, new: str, stacklevel: int = 3) -> None:
 
 
 def warn_once(subject: str, message: str, stacklevel: int = 4) -> None:
-    """Warn once per process and subject that the form of a call will change."""
+    """Warn once per process and subject that a name or the form of a call changes."""
     if subject not in _warned:
         _warned.add(subject)
         warnings.warn(message, FutureWarning, stacklevel)

@@ -1,9 +1,12 @@
-"""Fourier sums between scattered points and a grid. Points are spread over a few cells, which are then transformed.
+"""Fourier sums between scattered points and a grid.
+
+Each point is spread over a few cells of a finer grid, which is then transformed.
 
     S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)},   u(j) = Σ_k S_k e^{2πi (p_j k_x + q_j k_y)},   k counted from n//2.
 
-The spreading kernel is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019). A
-period consists of two cells per sample of the sum. The result is divided by the transform of the kernel.
+The spreading kernel is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019).
+The finer grid is periodic, with at least two cells per sample of the sum. The result is divided by the transform of the
+kernel.
 """
 
 from __future__ import annotations

@@ -8,12 +8,23 @@ from typing import Any
 import numpy as np
 import torch
 
-from optics.numerics.autodiff import Array
+from optics.numerics.autodiff import Array, is_known, keep_copy, plain
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, make_ready
 from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["DrJitOperation", "Once", "common_device", "torch_place"]
+__all__ = [
+    "DrJitOperation",
+    "common_device",
+    "computing_device",
+    "on_device",
+    "once",
+    "plain_numbers",
+    "torch_place",
+]
+
+# Types of devices for whose tensors the processor computes: "mps" has no double precision, and "meta" no numbers.
+ON_PROCESSOR = ("cpu", "mps", "meta")
 
 
 class Once(torch.autograd.Function):
@@ -26,6 +37,17 @@ class Once(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, gradient: Any) -> Any:
         return FirstDerivative.apply(gradient.requires_grad_())[0] if torch.is_grad_enabled() else gradient
+
+
+def once(numbers: Mapping[str, torch.Tensor], values: Mapping[str, Any]) -> dict[str, torch.Tensor]:
+    """Return tensors by name that can be differentiated only once.
+
+    values: their numbers, see `plain_numbers`.
+    """
+    found = {name: Once.apply(tensor) for name, tensor in numbers.items()}
+    for name, tensor in found.items():
+        keep_copy(tensor, np.asarray(values[name]))
+    return found
 
 
 class DrJitOperation(torch.autograd.Function):
@@ -96,7 +118,7 @@ def torch_place() -> str:
 
 
 def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
-    """Return the device of all tensors, or the CPU without any; ValueError if they differ.
+    """Return the device of all tensors, or the CPU if there are none; ValueError if their devices differ.
 
     Single numbers on the CPU fit any device.
     """
@@ -107,3 +129,34 @@ def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
                 raise ValueError(f"{name} is on {place} and {first} on {known}: must be on one device, or pass device=")
         return known
     return torch.device("cpu")
+
+
+def computing_device(numbers: Mapping[str, torch.Tensor], otherwise: torch.device) -> torch.device:
+    """Return the device on which PyTorch computes with these tensors.
+
+    It is the device of the tensors with axes. If they have several, or there are none, it is `otherwise`. If it is
+    one of ON_PROCESSOR, the device of Dr.Jit is returned.
+    """
+    places = {tensor.device for tensor in numbers.values() if tensor.ndim or tensor.device.type != "cpu"}
+    found = places.pop() if len(places) == 1 else otherwise
+    return torch.device(torch_place()) if found.type in ON_PROCESSOR else found
+
+
+def plain_numbers(numbers: Mapping[str, torch.Tensor]) -> dict[str, Any]:
+    """Return the numbers of tensors by name, without derivatives, as NumPy arrays or numbers.
+
+    Those of tensors on a GPU are copied together, because the program waits for each copy.
+    """
+    away = {name: t for name, t in numbers.items() if t.device.type not in ON_PROCESSOR and not is_known(t)}
+    copied: dict[str, Any] = {}
+    if len(away) > 1 and len({tensor.device for tensor in away.values()}) == 1:
+        flat = torch.cat([tensor.detach().double().reshape(-1) for tensor in away.values()]).cpu().numpy()
+        parts = np.split(flat, np.cumsum([tensor.numel() for tensor in away.values()])[:-1])
+        copied = {name: part.reshape(away[name].shape)[()] for name, part in zip(away, parts, strict=True)}
+    return {name: copied[name] if name in copied else plain(tensor)[()] for name, tensor in numbers.items()}
+
+
+def on_device(place: torch.device, values: np.ndarray) -> torch.Tensor:
+    """Return an array of NumPy as a tensor on a device. On the processor, both share their memory."""
+    tensor = torch.from_numpy(values)
+    return tensor if place.type == "cpu" else tensor.to(place)

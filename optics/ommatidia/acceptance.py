@@ -27,7 +27,7 @@ DIGITS = 4.0  # choice: digits of amplitudes
 
 @dataclass(frozen=True)
 class AcceptanceFunction(ReadOnlyArrays):
-    """Fraction of a distant point source's light on a facet that the rhabdom absorbs, for a grid of directions.
+    """Fraction that a rhabdom absorbs of a distant point source's light on its facet, for a grid of directions.
 
     sines: sines of the source's direction along x and y, ascending, (n,). Both axes have the same sines.
     values: fraction for each wavelength, (band, y, x); 0 outside the unit circle.
@@ -53,10 +53,11 @@ class AcceptanceFunction(ReadOnlyArrays):
 
 
 def acceptance_function(ommatidium: Ommatidium, wavelengths: np.ndarray, loss: float = 5e-3) -> AcceptanceFunction:
-    """Return the acceptance function of an ommatidium. Calls with equal arguments return the same object.
+    """Return the acceptance function of an ommatidium.
 
-    The grid is widened until it contains all but the fraction `loss` of the light that the modes accept from all
-    directions, at each wavelength. Its half width is at most a sine of 0.5, so wider fields lose more.
+    Calls with the same ommatidium and equal other arguments return the same object. The grid is widened until it
+    contains all but the fraction `loss` of the light that the modes accept from all directions, at each wavelength. Its
+    half width is at most a sine of 0.5, so wider fields lose more.
 
     wavelengths: vacuum wavelengths [m], (band,).
     loss: fraction in [1e-5, 0.1].

@@ -3,11 +3,12 @@
 The amplitude of a mode is the overlap of its field ψ with the light U in the plane of the waveguide's end. U is a
 Rayleigh-Sommerfeld integral over the pupil, and the order of the two integrals can be exchanged:
 
-    c(s) = ∫ ψ(x) U_s(x) dx = ∫ P(ξ) e^{ik n₀ s·ξ} Ψ(ξ) dξ,   Ψ(ξ) = ∫ ψ(x) z/(2πD²) (1/D - ik) e^{ikD} dx.
+    c(s) = ∫ ψ(x) U_s(x) dx = ∫ P(ξ) e^{ik₀ s·ξ} Ψ(ξ) dξ,   Ψ(ξ) = ∫ ψ(x) z/(2πD²) (1/D - ik) e^{ikD} dx.
 
 P is the amplitude that the pupil transmits, D the distance from x to ξ, and z the distance from the pupil to the end of
-the waveguide. Each mode is propagated back to the pupil once. The amplitudes for all directions s (sines) then follow
-from one Fourier sum. A waveguide off the pupil's axis points at the pupil's centre. The module `radiation` computes Ψ.
+the waveguide. The wavenumber is k₀ in front of the pupil, and k behind it. Each mode is propagated back to the pupil
+once. The amplitudes for all directions s (sines) then follow from one Fourier sum. A waveguide off the pupil's axis
+points at the pupil's centre. The module `radiation` computes Ψ.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class ModesAtPupil:
     x, y: positions of the nodes [m].
     weights: amplitude P of the pupil, times the mode's field Ψ at the node, times the node's area dξ, (mode, node).
     area_of: dξ of each node [m²].
-    wavenumber: k n₀ [1/m] in front of the pupil.
+    wavenumber: k₀ [1/m] in front of the pupil.
     area: open area of the pupil [m²].
     """
 
@@ -66,7 +67,7 @@ class ModesAtPupil:
         return found
 
     def power_on(self, sines: Grid, taken: np.ndarray, digits: float = DIGITS) -> np.ndarray:
-        """Return the fraction of the light on the pupil that the modes accept, weighted and added up, (y, x).
+        """Return the fraction of the pupil's light that each mode accepts, times its weight, summed over modes, (y, x).
 
         sines: grid of sines of the light's directions, relative to the sines of the beam's source.
         taken: weight of each mode, for example the fraction of its light that is absorbed.

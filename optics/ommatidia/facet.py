@@ -1,4 +1,4 @@
-"""Facet lenses: thick, curved on both sides, between air and the crystalline cone."""
+"""Facet lenses: thick lenses with spherical or flat surfaces, between air or water and the crystalline cone."""
 
 from __future__ import annotations
 

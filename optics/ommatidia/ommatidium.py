@@ -99,9 +99,9 @@ class Ommatidium:
         return found.reshape(len(found), *x.shape)
 
     def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Return the fraction of a distant point source's light on the facet that the rhabdom absorbs.
+        """Return the fraction that the rhabdom absorbs of a distant point source's light on the facet.
 
-        angle_x, angle_y: see `mode_power`; arrays of any shape. The result has the same shape.
+        angle_x, angle_y: see `mode_power`. The result has the shape to which both broadcast.
 
         Raises:
             ValueError: see `mode_power`.
@@ -141,7 +141,10 @@ class Ommatidium:
 
     @staticmethod
     def _top(at: np.ndarray, seen: np.ndarray) -> float:
-        """Return the position of the maximum of a parabola through three points."""
+        """Return the position of the maximum of a parabola through three points.
+
+        If the parabola has no maximum, this is the position of the middle point.
+        """
         (left, middle, right), step = seen, float(at[1] - at[0])
         bend = left - 2 * middle + right
         return float(at[1]) if bend >= 0 else float(at[1]) + step * (left - right) / (2 * bend)

@@ -1,7 +1,7 @@
 """Field that the modes of a waveguide radiate to the points of a pupil.
 
 In coordinates around the waveguide's axis, the radiated field is cos lφ or sin lφ, times a function of the angle θ from
-this axis and of the distance D:
+this axis and of the distance D from the centre of the waveguide's end:
 
     Ψ(ξ) = z e^{ikD} cos lφ G(sin θ, D),   G = ∫ ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} dx,   d = |ξ - x|.
 
@@ -69,7 +69,7 @@ def radiated(
 
 
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return a function of a mode's index that returns G D² at points at the distances D = z/cos θ.
+    """Return a function that maps a mode's index to its G D² at points with the distances D = z/cos θ.
 
     The values are interpolated linearly between closely spaced points. G is defined at the top of the module.
     """
@@ -88,7 +88,7 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return a function of a mode's index that returns G D² at points with arbitrary sines and distances D.
+    """Return a function that maps a mode's index to its G D² at points with arbitrary sines and distances D.
 
     G is defined at the top of the module.
     """

@@ -208,7 +208,7 @@ class Waveguide:
         return v, v if self.proximal_diameter is None else v * self.proximal_diameter / self.diameter
 
     def _mean_core_share(self, mode: Mode) -> float:
-        """Return the mean of the local mode's share in the core, over the length on which it is guided."""
+        """Return the mean of the local mode's `Mode.core_share`, over the length on which the mode is guided."""
         v, end = self._v_range(mode)
         low = max(end, mode.cut_off)
         node, weight = gauss_legendre(NODES)

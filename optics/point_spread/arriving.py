@@ -1,4 +1,7 @@
-"""Fraction of the pupil's light that arrives on an unbounded plane. A mask absorbs the rest, or it is evanescent."""
+"""Fraction of the pupil's light that arrives on an unbounded plane.
+
+The rest is absorbed by a mask, or is evanescent.
+"""
 
 from __future__ import annotations
 
@@ -50,12 +53,13 @@ def arriving_light(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]
 
 
 def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
-    """Return the fraction of light that is not evanescent, and its uncertainty, (wavelength,).
+    """Return the fraction of the light that passes the mask and is not evanescent, and its uncertainty, (wavelength,).
 
     The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge.
-    For an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent, see `_at_edge`. This
-    fraction is multiplied by the mask's transmission along the edge, relative to that of the whole aperture. Light that
-    the relief bends beyond grazing is evanescent, too.
+    For rays along the axis and an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent.
+    For other rays, this fraction is multiplied by the result of `_at_edge`. It is also multiplied by the mask's
+    transmission along the edge, relative to that of the whole aperture. Light that the relief bends beyond grazing is
+    evanescent, too.
 
     If this estimate is too uncertain, and the pupil is at most some wavelengths wide, the spectrum of the light behind
     the pupil is summed instead.
@@ -102,7 +106,7 @@ def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
 
 
 def _at_edge(request: Request) -> Array:
-    """Return the evanescent light of an edge, divided by that for rays along the axis.
+    """Return the evanescent light that the aperture's edge diffracts, relative to that for rays parallel to the axis.
 
     A point of the edge spreads its light along the line s + t n of frequencies, in units of 1/λ. Here s is the
     frequency of the ray, and n is the normal of the edge. The power of this light is proportional to 1/t². The line
@@ -146,8 +150,8 @@ def _summed(request: Request, unsure: float = 1.0) -> Array | None:
     """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum cannot be fast enough.
 
     The fraction is ∫ |F(u)|² df / A over |f| < 1/λ, with the field u behind the pupil and the area A of its aperture.
-    Lengths are in units of the radius. |F(u)|² has no structure finer than one cycle per diameter. Pixelated reliefs
-    and pupils with more than 100 cycles per radius are left out.
+    Lengths are in units of the radius. |F(u)|² has no structure finer than one cycle per diameter. The result is also
+    None for pixelated reliefs and for pupils with more than 100 cycles per radius.
 
     unsure: uncertainty of the estimate. The larger it is, the longer the sum may take.
     """

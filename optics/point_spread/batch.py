@@ -45,7 +45,7 @@ class PSFBatch(OnWindow):
     dx: pitch [m] of the samples.
     plans: one plan per PSF, in the same order, as a flat tuple.
     members: light of each PSF, in the order of `plans`.
-    setup: parameters that all PSFs share.
+    setup: parameters that all PSFs share, with the source and the sensor's distance of the first PSF.
 
     See PSFResult for conventions.
     """

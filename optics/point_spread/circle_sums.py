@@ -112,11 +112,12 @@ def soft_sums(circles: SoftCircles, values: Array) -> Array:
 
 
 def sums_of_cells(values: Array, distance: np.ndarray, radii: np.ndarray, dx: float) -> Array:
-    """Return sums within circles of values that are means over cells, flat (row, radius), with derivatives.
+    """Return sums of values within circles, flat (row, radius), with derivatives.
 
-    Cells have the side dx. A cell at the distance ρ has the weight (R - ρ)/dx + 1/2, limited to [0, 1]. The sum of the
-    weighted values v is the difference of the function t ↦ Σ v max(t - ρ, 0)/dx between t = R + dx/2 and t = R - dx/2.
-    This function follows from the sums of v and of vρ over all cells nearer than t.
+    The values are means over square cells with the side dx. A cell at the distance ρ has the weight (R - ρ)/dx + 1/2,
+    limited to [0, 1]. All weights are 0 for R = 0. The sum of the weighted values v is the difference of the function
+    t ↦ Σ v max(t - ρ, 0)/dx between t = R + dx/2 and t = R - dx/2. This function follows from the sums of v and of vρ
+    over all cells nearer than t.
 
     values: flat Dr.Jit Float64 array (row, sample).
     distance: distance ρ [m] of each sample from the centre, (sample,).

@@ -18,7 +18,8 @@ from optics.methods.window_plan import TIGHTEST
 from optics.methods.window_sampling import WindowSampling
 from optics.methods.window_stack import WindowStack
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.autodiff import Array, carries_derivative, plain
+from optics.numerics.array_library import library, on_host, on_processor
+from optics.numerics.autodiff import Array, carries_derivative
 from optics.point_spread.request import Setup
 
 __all__ = ["coarse_stack"]
@@ -31,8 +32,9 @@ def coarse_stack(
 
     The result is None if other methods are faster, or must be used.
 
-    stack: the light, whose numbers may carry derivatives of PyTorch.
-    without: the same light without derivatives.
+    stack: the light, whose numbers may carry derivatives of PyTorch. If they are on another device than the processor,
+        it computes PSFs and errors. Only the inputs of `without`, the places of the check and the errors are copied.
+    without: the same light without derivatives, for NumPy.
     tolerance, method: see `optics.psf`.
     """
     # Dr.Jit computes the edge of the aperture, so PyTorch cannot compute derivatives with respect to the radius.
@@ -42,8 +44,12 @@ def coarse_stack(
     if sampling is None:
         return None
     images = stack.intensity(sampling)
-    met: np.ndarray = without.errors(sampling, plain(images), tolerance) <= tolerance
-    return images, met  # a dark window has the error NaN, so other methods compute it
+    if on_host(images):
+        errors = without.errors(sampling, on_processor(images), tolerance)
+    else:
+        with library(images).no_grad():
+            errors = on_processor(stack.errors(sampling, images, tolerance))
+    return images, errors <= tolerance  # a dark window has the error NaN, so other methods compute it
 
 
 def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method: str) -> WindowSampling | None:

@@ -35,10 +35,10 @@ def encircled_energy(
 ) -> Any:
     """Return the fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m], (wavelength, radius).
 
-    The result for a `WhitePSF` is (type, radius). The fraction is computed as a weighted sum over samples. The weights
-    are the circle, convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies
-    that alias onto them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the
-    circle, which are computed if the window does not contain them. If samples are means over cells
+    The result for a `WhitePSF` is (receptor type, radius). The fraction is computed as a weighted sum over samples. The
+    weights are the circle, convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at
+    frequencies that alias onto them. The sum therefore equals the integral over the sharp circle. It includes samples
+    beyond the circle, which are computed if the window does not contain them. If samples are means over cells
     (`PSFResult.holds_cells`), each weight is about the part of the cell inside the circle.
 
     radii: a number or a row of numbers. At 0 the result is 0.
@@ -108,7 +108,7 @@ def _around(
 def _kernel(dx: float, cutoff: float, room: float) -> SoftEdge:
     """Return a kernel in units of 1/cutoff that passes the intensity's frequencies and blocks their aliases.
 
-    The spectrum ends at the lowest frequency that the width of the kernel permits, because sums then need fewer nodes.
+    A wider kernel has a spectrum that ends at a lower frequency, so that sums need fewer nodes.
 
     room: largest distance [m] over which the kernel may extend.
     """

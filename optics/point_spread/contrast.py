@@ -103,7 +103,8 @@ def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: f
     known, unsure: fraction of the light that arrives, and its uncertainty, (wavelength,).
 
     Raises:
-        AccuracyError: no such window can be computed. The message states a tolerance that smaller windows meet.
+        AccuracyError: no such window can be computed. The message states a tolerance below 1 that smaller windows meet,
+            if there is one.
     """
     seen, coarsest = result, 0.5 / result.highest_cutoff
     for _ in range(GROWTHS):
@@ -156,7 +157,7 @@ def image_quality(
     tolerance: float = 0.02,
     with_error: bool = False,
 ) -> np.ndarray | Array:
-    """Return throughput times the area of the MTF above the noise floor, up to the Nyquist frequency, (wavelength,).
+    """Return throughput times the MTF's mean height above the noise floor, up to the Nyquist frequency, (wavelength,).
 
         IQ = T / f_N ∫_0^f_N max(MTF(f) - σ / T, 0) df,   in [0, 1]
 

@@ -122,7 +122,7 @@ class Converging(ReadOnlyArrays):
 
         A check of a single plane of polarisation does not detect this error. It results from the approximation that the
         path has the same curvature for the whole pupil. Only light whose polarisation rotates with its ray contributes
-        to the other component. The fraction of this light is the squared sine of the steepest ray.
+        to the other component. The fraction of this light is estimated as half the squared sine of the steepest ray.
 
         scalar: scalar field over the window, (y, x).
         """

@@ -44,7 +44,7 @@ class DiskSum:
         that alias onto them: see `optics.encircled_energy`. If samples are too coarse, or too few around the disk, the
         light is recomputed on other samples.
 
-        centre: centre (x, y) [m] of the disk; None for the window's middle.
+        centre: centre (x, y) [m] of the disk; None for sample n//2.
 
         Raises:
             ValueError: the disk extends beyond the window.

@@ -13,8 +13,9 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.window_stack import WindowStack
 from optics.numerics.arguments import is_sized, items, pair
-from optics.numerics.autodiff import Array, Scalar, number
+from optics.numerics.autodiff import Array, Scalar, entries, number
 from optics.numerics.grid import Grid
+from optics.point_spread.coarse_stack import coarse_stack
 from optics.point_spread.psf import psf
 from optics.point_spread.request import sensor_place
 
@@ -26,7 +27,7 @@ class LightBatch:
     """Light through several pupils, for several distances. All numbers may carry derivatives.
 
     pupils: the pupils.
-    distances: pairs of the sensor's and the source's distance [m].
+    distances: pairs of the sensor's and the source's distance [m]. The sensor's may be None, see `optics.psf`.
     angle: direction (x, y) [rad] in which the light travels.
     """
 
@@ -39,7 +40,7 @@ class LightBatch:
         """Return the light for a pupil or a sequence of pupils, and for distances that are numbers or sequences.
 
         Raises:
-            ValueError: something else is given, a sequence is empty, or two rows differ in length.
+            ValueError: something else is given, a sequence is empty, or the sequences of distances differ in length.
         """
         several = items("pupil", pupil, Pupil, "Pupil(25e-6)") if is_row(pupil) else (pupil,)
         items("pupil", several, Pupil, "Pupil(25e-6)")
@@ -54,8 +55,8 @@ class LightBatch:
                 f"{counts['source_distance']}: must be of equal length, because they are used pairwise"
             )
         count = next(iter(counts.values()), 1)
-        sensors, sources = (tuple(row) if name in counts else (row,) * count for name, row in rows.items())
-        angle = pair("source_angle", source_angle, "angles (x, y) [rad]")
+        sensors, sources = (tuple(entries(row)) if name in counts else (row,) * count for name, row in rows.items())
+        angle = pair("source_angle", entries(source_angle), "angles (x, y) [rad]")
         for source in sources:
             PointSource(source, angle)
         return cls(several, tuple(zip(sensors, sources, strict=True)), angle)
@@ -79,6 +80,28 @@ class LightBatch:
         flat: Array = dr.concat([tensor.array for tensor in found])
         return type(found[0])(flat, (len(found), *found[0].shape))
 
+    def coarse_images(
+        self,
+        fixed: LightBatch,
+        wavelengths: np.ndarray,
+        view: Mapping[str, Any],
+        convert: Callable[[np.ndarray], Array],
+    ) -> dict[int, Array]:
+        """Return {index of a member: its PSFs (wavelength, y, x)} for members that stacks compute accurately enough.
+
+        fixed: the same light without derivatives.
+        convert: see `stacks`.
+        """
+        found: dict[int, Array] = {}
+        asked = wavelengths, Grid(view["shape"], view["dx"], view["centre"]), view["dtype"]
+        both = zip(self.stacks(*asked, convert), fixed.stacks(*asked, np.asarray), strict=True)
+        for (places, own), (_, without) in both:
+            part = coarse_stack(own, without, view["tolerance"], view["method"])
+            if part is not None:
+                images, met = part[0], np.all(part[1], axis=1)
+                found |= {place: image for place, image, right in zip(places, images, met, strict=True) if right}
+        return found
+
     def stacks(
         self, wavelengths: np.ndarray, window: Grid, dtype: str, convert: Callable[[np.ndarray], Array]
     ) -> list[tuple[list[int], WindowStack]]:
@@ -99,7 +122,7 @@ class LightBatch:
         return found
 
     def cutoff(self, wavelengths: np.ndarray) -> float:
-        """Return the highest frequency [1/m] of all intensities; see `PSFResult.cutoff`."""
+        """Return an upper bound on the frequencies [1/m] of all intensities; see `PSFResult.cutoff`."""
         slopes = [
             1 / math.hypot(1, number(sensor_place(pupil, sensor, source)) / pupil.radius)
             for pupil, sensor, source in self.members
@@ -109,5 +132,5 @@ class LightBatch:
 
 
 def is_row(value: Any) -> bool:
-    """Return whether `value` is a sequence or an array with entries, as opposed to a number."""
+    """Return whether `value` is a sequence or an array with at least one axis, as opposed to a number."""
     return is_sized(value) and not isinstance(value, str)

@@ -37,7 +37,7 @@ class Microvilli:
             in_range("dichroic_ratio", ratio, 1.0, 1e12)
 
     def absorbed(self, light: VectorFocus) -> np.ndarray:
-        """Return the absorbed light, (y, x) [1/m²], with complete absorption of light polarised along the microvilli.
+        """Return the absorbed light, (y, x) [1/m²], if all light polarised along the microvilli is absorbed.
 
         With the field E and the direction m of the microvilli, it is |E·m|² + (|E|² - |E·m|²)/`dichroic_ratio`.
 
@@ -84,8 +84,8 @@ class Microvilli:
         are nearly parallel to the axis, and is smaller if rays are steep. For the arguments, see `signal`.
 
         Raises:
-            ValueError: `light` is polarised: only an unpolarised field contains both planes of polarisation. See also
-                `signal`.
+            ValueError: `light` is at least partly polarised: only unpolarised light contains all planes of polarisation
+                equally. See also `signal`.
             AccuracyError: see `signal`.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")

@@ -1,4 +1,4 @@
-"""Sums over wavelengths, and the interface of light of several wavelengths."""
+"""Sums over wavelengths, and the interface of PSFs for light of several wavelengths."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Mixture", "a_mixture", "flat", "mixed"]
 
 
 class Mixture(Protocol):
-    """Interface of light of several wavelengths, such as a WhitePSF.
+    """Interface of PSFs for light of several wavelengths, such as a WhitePSF.
 
     Its methods are documented by the functions of the same names.
     """

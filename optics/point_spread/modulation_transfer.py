@@ -1,6 +1,7 @@
 """Contrast as a function of spatial frequency, on a grid and at any other frequency.
 
-If the PSF carries derivatives, contrasts are Dr.Jit arrays that carry derivatives. Otherwise they are NumPy arrays.
+If the PSF carries derivatives, `MTF.profile` returns Dr.Jit arrays that carry derivatives. Otherwise it returns NumPy
+arrays.
 """
 
 from __future__ import annotations
@@ -159,7 +160,7 @@ class MTF(ReadOnlyArrays):
         """Return the MTF of the first `count` wavelengths.
 
         Raises:
-            ValueError: there are fewer wavelengths, or count is not a whole number.
+            ValueError: count is not a whole number from 1 to the number of wavelengths.
         """
         count = whole("count", count, 1, self.tensor.shape[0])
         tensor, shares = (_first(part, count) for part in (self.tensor, self.shares))
@@ -213,8 +214,8 @@ class MTF(ReadOnlyArrays):
     def _radial_errors(self, f: np.ndarray) -> np.ndarray:
         """Return the mean of `errors` over the orientations at radial frequencies f, (wavelength, frequency).
 
-        The mean is interpolated between rings that are one step of the grid wide. Below one step, the largest possible
-        error is used.
+        The mean is interpolated between rings that are one step of the grid wide. Below one step, the mean is at
+        least `predicted_error`, except at frequency 0, where it is 0.
         """
         step, side = float(self.fx[1] - self.fx[0]), self.fx.size
         ring = np.rint(np.hypot.outer(self.fy, self.fx) / step).astype(np.intp).ravel()

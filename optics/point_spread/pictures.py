@@ -1,6 +1,7 @@
 """Computation of requested PSFs.
 
-Each PSF is planned, computed and compared with the direct sum. If the comparison fails, the PSF is computed again.
+Each PSF is planned, computed and, unless this would take too long, compared with the direct sum. If the comparison
+fails, the PSF is computed again.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class _Attempt:
     def at(cls, request: Request, planned: tuple[Plan, Sampling]) -> _Attempt:
         """Return the PSF by the planned method. If "auto" chose one without derivatives, an exact method replaces it.
 
-        Dr.Jit only records the computation here, and executes it when the PSF is first read.
+        If Dr.Jit computes the PSF, it only records the computation here, and executes it when the PSF is first read.
 
         Raises:
             NoDerivativesError: the user requested a method that has no derivatives on the selected device.
@@ -154,7 +155,8 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
     alike: True if each request may reuse the method of the preceding request.
 
     Raises:
-        AccuracyError: no method meets a tolerance, or a window is so dark that rounding errors exceed it.
+        AccuracyError: no method meets a tolerance, a spot check still finds a larger error in the last attempt, or a
+            window is so dark that rounding errors exceed the tolerance.
     """
     import drjit as dr
 
@@ -174,13 +176,14 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
 
 
 def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
-    """Return the PSF, or a more accurate one, and its plan with the error from the spot check.
+    """Return the PSF, or a more accurate one, and its plan with the error from the spot check, or a predicted error.
 
     asked: the user's request. If it names an approximate method, the result is accepted regardless of its error.
     tries: number of remaining attempts, including this one.
 
     Raises:
-        AccuracyError: the error of the last attempt also exceeds the tolerance.
+        AccuracyError: the error of the last attempt also exceeds the tolerance, or the next attempt is impossible. See
+            also `_predicted_error`.
     """
     problem, tolerance = attempt.request.problem, asked.problem.tolerance
     image = attempt.image if isinstance(attempt.image, np.ndarray) else attempt.image.numpy()
@@ -219,7 +222,8 @@ def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) ->
 
         rounding = (2 ε √(mean PSF / W²) + ε² / W²) / √(mean PSF²).
 
-    If an approximation predicts a dark window, its error counts as 1, because it may miss all light there.
+    If an approximation predicts no light in the window, its error counts as at least 1, because it may miss all light
+    there.
 
     Raises:
         AccuracyError: the window is so dark that rounding errors exceed the tolerance.

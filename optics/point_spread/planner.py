@@ -127,9 +127,9 @@ OTHERS, OTHERS_IF_DIVIDED = 4e-3, 15e-3  # choices: time [s] of planning other m
 def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SECONDS) -> tuple[Plan, Sampling]:
     """Return the plan and the fastest sampling that meets the problem's tolerance. Plans are cached.
 
-    method: "auto" compares all methods that may save time, "exact" only exact methods, and "field" only exact methods
-        with a complex field. A method's name selects that method. Its sampling must then meet the tolerance, but the
-        error of an approximation may exceed it.
+    method: "auto" compares all methods that may save time (for derivatives, only exact ones), "exact" only exact
+        methods, and "field" only exact methods with a complex field. A method's name selects that method. Its sampling
+        must then meet the tolerance, but the error of an approximation may exceed it.
 
     Raises:
         ValueError: the method is unknown.

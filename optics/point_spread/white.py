@@ -133,7 +133,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
     ) -> np.ndarray | Array:
         """Return the fraction of the white light within circles, (type, radius). See `optics.encircled_energy`.
 
-        It is the sum of the encircled energies of all wavelengths, times their `weights`.
+        It is the sum of the encircled energies of all wavelengths, each times its weight in `weights`.
 
         radii, centre: radii [m] of the circles, and their centre (x, y) [m]; None for sample n//2.
         with_error: True to return (value, predicted error).

@@ -2,6 +2,8 @@
 
     python -m validation.benchmarks.gpu [--only NAME ...]
 
+For 512 PSFs of 65 x 65 samples, of a population and of one pupil, with and without gradients: --only "512 PSFs".
+
 Each device computes in a separate process. The script prints the wall time per call, as the median over calls after
 those that compile and warm up. It also prints the largest difference between the results of both devices, as a share of
 the largest number.
@@ -98,6 +100,38 @@ def gradient() -> Callable[[], Any]:
     return call
 
 
+def design(depths: int, gradient: bool) -> Callable[[], Callable[[], Any]]:
+    """Prepare PSFs of a height map of 32 x 32 samples in eight wavelengths, or their gradients, with PyTorch.
+
+    The map is a tensor on the measured device. Of the PSFs, those of one depth are returned.
+    """
+
+    def make() -> Callable[[], Any]:
+        import torch
+
+        import optics.torch
+        from optics.numerics.device import device
+
+        lens = {"aperture_radius": 30e-6, "thin_lens_focal_length": FOCUS}
+        view = {"dx": 0.5e-6, "shape": (65, 65), "tolerance": 0.01}
+        waves, distances = np.linspace(450e-9, 650e-9, 8), np.geomspace(5e-3, 1, depths)
+        start = 5e-8 * np.random.default_rng(0).random((32, 32)).cumsum(0).cumsum(1) / 32
+        heights = torch.tensor(start).to(device()).requires_grad_()
+
+        def call() -> Any:
+            heights.grad = None
+            pupil = optics.Pupil(**lens, height=heights)
+            found = optics.torch.psf(pupil, waves, FOCUS, distances, **view)
+            if not gradient:
+                return found[0].detach().cpu().numpy()
+            (found * found).sum().backward()
+            return heights.grad.cpu().numpy()
+
+        return call
+
+    return make
+
+
 def whole_plane(side: int) -> Callable[[], Callable[[], Any]]:
     """Prepare the propagation of a field from plane to plane by the angular spectrum."""
 
@@ -164,6 +198,8 @@ CASES = (
     Case("the same in float64", one_picture(513, 100e-6, "float64")),
     *(Case(f"{n} PSFs of a population", many_pictures(n)) for n in (32, 512)),
     Case("gradient of a PSF, 16 heights", gradient),
+    *(Case(f"{8 * n} PSFs of one pupil, PyTorch", design(n, False)) for n in (1, 64)),
+    *(Case(f"gradient of {8 * n} PSFs of one pupil, PyTorch", design(n, True)) for n in (1, 64)),
     *(Case(f"plane to plane, {n} x {n}", whole_plane(n)) for n in (512, 2048)),
     Case("kernel of a receptor", kernel),
     *(Case(f"signals, perfect lens, areas, {n} worlds", looks(n, False, "areas")) for n in WORLDS),

@@ -1,5 +1,7 @@
 """Elements evaluate on arrays of NumPy, PyTorch and Dr.Jit: the same numbers, and each library's own derivatives."""
 
+import warnings
+
 import drjit as dr
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import torch
 import optics
 from optics.elements.beam import Beam
 from optics.elements.source import PointSource
+from optics.numerics.array_library import like
 from optics.numerics.precision import precision
 
 TYPES = precision("float64")
@@ -102,3 +105,12 @@ def test_a_tensor_keeps_its_precision():
     found = relief.height(torch.tensor(X / R), torch.tensor(Y / R))
     found.sum().backward()
     assert (found.dtype, relief.samples.grad.dtype) == (torch.float64, torch.float32)
+
+
+def test_a_tensor_without_gradient_is_converted_without_a_warning():
+    """It may be a result of elements, such as the amplitude of a mask."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = like(torch.zeros(2), torch.tensor([0.25, 0.5], dtype=torch.float64))
+    assert found.dtype == torch.float32
+    assert found.tolist() == [0.25, 0.5]

@@ -13,6 +13,7 @@ hankel: test_textbook.py, test_oracles_circular.py
 pupil_edge: test_sine_samples.py
 slow_factor: test_low_rank.py
 window_check: test_window_sampling.py
+window_crossings: test_window_crossings.py
 window_rank: test_window_sampling.py, test_torch_stacks.py
 window_sampling: test_window_sampling.py
 window_edges: test_window_edges.py

@@ -4,8 +4,9 @@ table."""
 import json
 
 import numpy as np
+import pytest
 
-from validation.benchmarks.gpu import PLACES, Case, child, chosen, row
+from validation.benchmarks.gpu import PLACES, Case, child, chosen, design, row
 
 
 def test_a_child_measures_what_is_chosen(tmp_path, monkeypatch):
@@ -28,3 +29,16 @@ def test_rows():
     assert row("looks", spent, found) == "| looks | 20 | 5 | 4 | 1 | 2.5e-01 |"
     spent["cuda"]["looks"] = {"failed": "ValueError: no"}
     assert row("looks", spent, found) == "| looks | works | ValueError: no | | |"
+
+
+@pytest.mark.parametrize(("gradient", "shape"), [(False, (8, 65, 65)), (True, (32, 32))])
+def test_designs_repeat_their_results(gradient, shape):
+    call = design(1, gradient)()
+    first, second = call(), call()
+    assert first.shape == shape
+    assert np.abs(first).max() > 0
+    np.testing.assert_array_equal(first, second)
+
+
+def test_one_word_selects_512_psfs():
+    assert len(chosen(["512 PSFs"])) == 3

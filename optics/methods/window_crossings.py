@@ -1,0 +1,95 @@
+"""Crossings of a few rows and columns, at which the check of a PSF computes it (`window_check`).
+
+Rows are drawn at even steps of their cumulative probability. The probability is a mixture of four distributions. The
+first is uniform. The second is proportional to the square root of the intensity, like the error of the intensity if the
+error of the amplitude is the same everywhere. The third favours the brightest samples and their neighbours, and the
+last the sides of the window, where phases change fastest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from optics.numerics.array_library import gather, indices, library, on_processor, to_double
+from optics.numerics.autodiff import Array
+
+__all__ = ["WindowCrossings"]
+
+ACROSS = 10  # choice: number of rows and of columns in which the check computes the PSF
+SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows and columns
+
+
+@dataclass(frozen=True, eq=False)
+class WindowCrossings:
+    """Crossings of rows and columns of PSFs. The first axis of all arrays counts the PSFs.
+
+    rows, columns: indices, (stack, row) and (stack, column).
+    images: |U|² at the crossings, (stack, row, column), in the library and on the device of the PSFs.
+    chance: probability with which each crossing is drawn, (stack, row, column).
+    total: sum of |U|⁴ over the window, (stack,).
+    """
+
+    rows: np.ndarray
+    columns: np.ndarray
+    images: Array
+    chance: Array
+    total: Array
+
+    @classmethod
+    def from_images(cls, images: Array) -> WindowCrossings:
+        """Return crossings for PSFs |U|², (stack, y, x), an array of NumPy or PyTorch.
+
+        Only the indices are copied from another device to the processor.
+        """
+        own, (count, height, width) = library(images), images.shape
+        total = own.square(to_double(images)).reshape(count, -1).sum(1)
+        lit = images
+        if own is not np or not (total > 0).all():
+            lit = own.where((total > 0)[:, None, None], images, 1)
+        light = own.sqrt(lit), own.square(lit)
+        of_rows, of_columns = ([part.sum(along) for part in light] for along in (2, 1))
+        if height == width:
+            both = [own.concatenate(pair) for pair in zip(of_rows, of_columns, strict=True)]
+            places, chance = _along_axis(*both)
+            rows, columns, down, across = places[:count], places[count:], chance[:count], chance[count:]
+        else:
+            (rows, down), (columns, across) = _along_axis(*of_rows), _along_axis(*of_columns)
+        corner = _beams(rows) * height + rows
+        drawn = gather(images, corner[:, :, None] * width + columns[:, None, :])
+        places = on_processor(own.concatenate([rows, columns], 1))
+        found = places[:, : rows.shape[1]], places[:, rows.shape[1] :]
+        return cls(*found, drawn, down[:, :, None] * across[:, None, :], total)
+
+    def part(self, some: slice) -> WindowCrossings:
+        """Return the crossings of some PSFs."""
+        return WindowCrossings(*(getattr(self, one.name)[some] for one in fields(self)))
+
+
+def _along_axis(root: Array, bright: Array) -> tuple[Array, Array]:
+    """Return the indices of a few rows, or columns, and the probability with which each is drawn, (stack, row).
+
+    root, bright: sums over each row of the square root of the intensity, and of its square, (stack, row).
+    """
+    own, root, bright = library(root), to_double(root), to_double(bright)
+    size = root.shape[1]
+    count = min(ACROSS, size)
+    if count == size:
+        return indices(own.ones_like(root).cumsum(1) - 1), own.full_like(root, 1 / count)
+    bright[:, 1:-1] = bright[:, :-2] + bright[:, 1:-1] + bright[:, 2:]
+    uniform, of_root, of_bright, of_sides = SHARES
+    chance = root * (of_root / root.sum(1))[:, None] + bright * (of_bright / bright.sum(1))[:, None]
+    chance += uniform / size
+    chance[:, 0] += of_sides / 2
+    chance[:, -1] += of_sides / 2
+    levels = chance.cumsum(1)
+    steps = own.ones_like(root[:, :count]).cumsum(1) - 0.5
+    wanted = steps / count * levels[:, -1:]
+    place = (levels[:, None, :] < wanted[:, :, None]).sum(2).clip(max=size - 1)
+    return place, gather(chance, _beams(place) * size + place)
+
+
+def _beams(places: Array) -> Array:
+    """Return the index of each entry along the first axis, (stack, 1)."""
+    return library(places).ones_like(places[:, :1]).cumsum(0) - 1
