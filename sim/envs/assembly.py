@@ -206,7 +206,7 @@ def _require_eyes(eyes: Any) -> None:
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
-    """Refuse arguments that a user task defines itself, and a task's mode that is neither the default nor the given one."""
+    """Refuse arguments that a user task defines itself, and a mode that is neither the default nor the given one."""
     parameters = inspect.signature(make_vec_env).parameters
     for name, why in OF_TASKS.items():
         if given[name] != parameters[name].default:
