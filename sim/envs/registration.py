@@ -51,7 +51,7 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
 
 
 def _register(id_: str, episode_steps: int, options: dict[str, Any]) -> None:
-    """Register an id. Gymnasium's `TimeLimit` truncates the episodes, so that callers can choose another length."""
+    """Register an id. Callers of Gymnasium's functions can pass `max_episode_steps` for another length of episodes."""
     gymnasium.register(
         id_,
         entry_point="sim.envs.registered_env:RegisteredEnv",
