@@ -1,9 +1,9 @@
 """A PSF over a window. It can be recomputed over other windows if a measure needs finer or wider samples.
 
 A pupil of radius R illuminates a point of the sensor, at the distance z, with rays whose sines differ by at most
-2R/√(R² + z²). The highest frequency of the intensity is therefore f_c = 2R/(λ√(R² + z²)), independent of the pupil's
-relief. The spectrum of samples at the pitch dx repeats every 1/dx. Sums over samples are therefore correct if dx <
-1/f_c (about λz/2R), and all contrasts are correct if dx <= 1/(2 f_c).
+2R/√(R² + z²). The highest frequency of the intensity is therefore f_c = 2R/(λ√(R² + z²)), with the wavelength λ behind
+the pupil; the relief does not change it. The spectrum of samples at the pitch dx repeats every 1/dx. Sums over samples
+are therefore correct if dx < 1/f_c (about λz/2R), and all contrasts are correct if dx <= 1/(2 f_c).
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     requests: one per wavelength, or per component of a mean. Measures recompute the PSF from them. Empty: unknown.
     shares: weight of each request in a mean over wavelengths (see `mean`), (request,). None: it is not a mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
-        derivatives; None unless `psf` was called with field=True. The amplitude [1/m] has the carrier exp(ikz), and its
-        squared modulus is the PSF. `field` is the same as one complex NumPy array.
-    for_window: True if the samples of the pupil suffice only for the light in the window. Sums over dark parts may then
-        exceed their error bound, so measures compute the PSF again, from samples that resolve all light.
+        derivatives; None for means, and unless `psf` was called with field=True. The amplitude [1/m] has the carrier
+        exp(ikz), and its squared modulus is the PSF. `field` is the same as one complex NumPy array.
+    for_window: True if the samples of the pupil suffice only for the light in the window. Errors of sums over dark
+        parts may then exceed their bound, so measures recompute the PSF from finer samples if possible.
     """
 
     tensor: Array
@@ -110,10 +110,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def power_error(self) -> np.ndarray:
-        """Predicted error of `power`, (wavelength,). Errors: see `power`.
+        """Predicted error of `power`, (wavelength,). It raises the same exceptions as `power`.
 
-        It includes the error of the PSF and half of the power at the window's rim, because samples define the position
-        of the rim only to within a cell.
+        It includes the error of the PSF and half of the power of the outermost samples, because samples at points
+        define the position of the window's rim only to within a cell. Means over cells need only the first part.
         """
         seen = self._resolved
         image = seen.psf.astype(np.float64)
@@ -131,7 +131,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def holds_cells(self) -> bool:
-        """True if samples are means over cells, whose sum is the whole power; False if they are values at points."""
+        """True if samples are means over cells, whose sums are exact; False if they are values at points."""
         return all(plan.method in OF_CELLS for plan in self.plans)
 
     @property
@@ -167,7 +167,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def highest_cutoff(self) -> float:
-        """Highest frequency [1/m] of the intensity of all PSFs, including the components of a mean."""
+        """Highest frequency [1/m] of the intensity of all PSFs, including the known components of a mean."""
         if self.shares is None or not self.can_recompute:
             return float(self.cutoff.max())
         shortest = min(request.beam.wavelength for request in self.requests)
@@ -238,7 +238,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def of_all_light(self) -> PSFResult:
-        """The PSF over the same window, from samples of the pupil that resolve all light if it can be recomputed.
+        """The PSF over the same window, recomputed if possible and if `for_window` is True.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -246,9 +246,9 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return self.recompute_on(self.window, "a sum") if self.for_window and self.can_recompute else self
 
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
-        """Return a PSF for sums, whose samples are at most `coarsest` [m] apart, or are means over cells.
+        """Return a PSF whose samples can be summed: they are at most `coarsest` [m] apart, or are means over cells.
 
-        It is `of_all_light` if samples are fine enough or means over cells. Otherwise, each sample is divided.
+        It is `of_all_light` if this holds already. Otherwise, the cells are divided, and the PSF is recomputed.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -283,7 +283,7 @@ def spread(requests: Sequence[Request]) -> PSFResult:
     For at least MANY wavelengths, each may use the method of the preceding one, see `Request.after`.
 
     Raises:
-        AccuracyError: no method meets the tolerance, or a window is so dark that rounding errors exceed it.
+        AccuracyError: no method meets the tolerance, or rounding errors exceed the tolerance in a dark window.
     """
     import drjit as dr
 

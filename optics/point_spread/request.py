@@ -28,7 +28,7 @@ GROWN = 1.25  # choice: factor in time, relative to the previous wavelength, abo
 class Request:
     """A request for one monochromatic PSF.
 
-    beam: the light.
+    beam: the light, with the pupil and the distance of the sensor.
     problem: numbers that describe the light, the window and the tolerance.
     method: "auto", "exact" or a method's name.
     most_seconds: time limit of the PSF [s].
@@ -46,8 +46,8 @@ class Request:
     def after(self, other: Request, plan: Plan) -> Request:
         """Return this request with another request's plan as `like`, if the two differ only in wavelength and window.
 
-        The request is returned unchanged if they differ otherwise, if a method was requested by name, or if the plan's
-        method is an approximation.
+        The request is returned unchanged if they differ otherwise, if `method` is not "auto", or if the plan's method
+        is an approximation.
 
         A method that is suitable for one wavelength is usually suitable for the next. Trying it first saves the
         comparison of methods, which takes as long as a small PSF.
@@ -58,10 +58,11 @@ class Request:
         return replace(self, like=plan) if same and alike and plan.method in EXACT else self
 
     def planned(self) -> tuple[Plan, Sampling]:
-        """Return the plan and the samples of the PSF.
+        """Return the plan, and the samples of the pupil with which the PSF is computed.
 
         Raises:
-            AccuracyError: no method meets the tolerance within the limits on memory and time.
+            AccuracyError: no method meets the tolerance within the limits on memory and time. The time limit is shorter
+                for a height map that jumps.
         """
         pupil = self.beam.pupil
         jump = 0.0 if pupil.height is None else pupil.height.jump
@@ -115,8 +116,8 @@ def sensor_place(pupil: Pupil, sensor_distance: Scalar | None, source_distance: 
     240 µm if the pupil has no lens.
 
     Raises:
-        ValueError: the distance is missing although it would depend on a number that carries a derivative, or the lens
-            forms no real image.
+        ValueError: no distance is given, and the default would depend on a number that carries a derivative; or the
+            lens forms no real image.
     """
     if sensor_distance is not None:
         return sensor_distance

@@ -35,15 +35,15 @@ DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this,
 class Effort:
     """Limits on the effort of a spot check. All values are choices.
 
-    points: number of points of a PSF that is not rotationally symmetric.
-    points_along_radius: number of points of a rotationally symmetric PSF.
+    points: largest number of points at which a PSF is checked.
+    points_along_radius: the same for a rotationally symmetric PSF in a window around the axis.
     fewest: number of points below which the estimate is useless.
-    spare_digits: numbers of digits that the direct sum may have in addition to the requested accuracy. The first
-        affordable one is used.
+    spare_digits: digits by which the direct sum is more accurate than requested. The first affordable number is used,
+        or the last one.
     share: time limit of the check, relative to the time of the PSF.
     share_of_few: the same for windows with fewer than `few` samples. In windows of so few samples, a direct sum at
         `fewest` points takes longer than `share` permits. Without a check, the error may be as large as its bound.
-    seconds: time [s] that every check may take.
+    seconds: time [s] that a check may take even if the shares permit less.
     """
 
     points: int = 40
@@ -63,7 +63,7 @@ EFFORT = Effort()
 class _DirectSum:
     """The reference: the direct sum at a number of points.
 
-    Its nodes resolve `cycles` cycles per radius and are accurate to `digits` digits.
+    Its quadrature resolves `cycles` cycles per pupil radius and is accurate to `digits` digits.
     """
 
     points: int
@@ -74,8 +74,8 @@ class _DirectSum:
 def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) -> float | None:
     """Return the relative L2 error of the intensity over the window, estimated from the direct sum.
 
-    The points are selected according to the probabilities from `_chances`. The result is None if the check is
-    impossible or would take too long.
+    The points are selected according to the probabilities from `_chances`. The result is None if the problem has a
+    `reach`, if the window is dark, or if the check would take too long.
 
     With n points of probability p_k, the sum of squared errors Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
 
@@ -137,7 +137,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
-    """Return the direct sum with the largest numbers of points and digits that the time of the PSF allows."""
+    """Return the direct sum with the largest numbers of points and digits in EFFORT that the time limit allows."""
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
     share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
@@ -183,8 +183,8 @@ def exact_psf(
 ) -> tuple[np.ndarray, float] | None:
     """Return the PSF at points (x, y) [m] by the direct sum, and its relative error at the value `bright` [1/m²].
 
-    The result is None if the problem has a `reach`, or if the sum would take longer than a check of a PSF that takes
-    `seconds`.
+    The result is None if the problem has a `reach`, or if the sum needs more time than `spot_check` may spend on a PSF
+    whose computation takes `seconds`.
     """
     darkness = _darkness(beam, problem, bright)
     reference = _affordable(beam, problem, darkness, seconds)
@@ -271,9 +271,10 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of points to sides and corners, and the probabilities that do not depend on the PSF.
+    """Return the sum of both kinds of nearness in `_chances`, and the sum of the distributions without the PSF.
 
-    Both are flat arrays. The second one is the sum of three of the distributions that `_chances` lists.
+    Both are flat arrays. The second one is the sum of three distributions: the uniform one, and those of nearness to a
+    side and to a corner.
 
     centre: position (x, y) of the window's centre, in samples.
     """

@@ -44,10 +44,11 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
     the first Rayleigh-Sommerfeld integral of exp(-ikL(r)) over the points ξ of the pupil at the distance r from the
-    axis, with the wave number k and the sensor's distance z. For a circle without a mask, its modulus is |1 - z/L - ikz
-    ln(L/z)|, with L at the rim. The maximum is searched near the brightest sample. If the samples are too coarse, finer
-    samples are computed there. The maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the
-    maxima without aberration.
+    axis, with the wave number k and the sensor's distance z. The modulus of a mask's amplitude transmittance is a
+    factor of the integrand. For a circle without a mask, the modulus of U is |1 - z/L - ikz ln(L/z)|, with L at the
+    rim. The maximum is searched near the brightest samples. If the samples are too coarse, finer samples are computed
+    there. The maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the maxima without
+    aberration, with the same weights; if its requests are unknown, by the maximum at its mean wavelength.
 
     with_error: True to return (value, predicted error), each (wavelength,).
 
@@ -81,7 +82,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
 
 
 def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
-    """Return the maximum of the PSF of the same aperture and mask without aberration, (wavelength,), flat."""
+    """Return the maximum of the PSF of the same aperture and mask without aberration, a Dr.Jit array (wavelength,)."""
     import drjit as dr
 
     types = precision("float64")
@@ -112,10 +113,10 @@ class Peak(NamedTuple):
 
 
 def _peak(result: PSFResult) -> Peak:
-    """Return the highest value near the brightest sample of a PSF of one wavelength, or of a mean.
+    """Return the maximum of a PSF of one wavelength, or of a mean, near its brightest samples.
 
     Raises:
-        AccuracyError: the value lies outside the window, or the necessary samples cannot be computed.
+        AccuracyError: the maximum lies outside the window or is not found, or the necessary samples cannot be computed.
     """
     fine = AT_A_PEAK / float(result.cutoff[0])
     image, wanted = result.psf[0], "the Strehl ratio"
@@ -141,7 +142,7 @@ def _brightest(result: PSFResult) -> tuple[float, float]:
     The brightest sample need not belong to the highest lobe. A non-negative function with the maximum p and no
     frequency beyond the cutoff f is at least p cos²(πfd) at a distance d < 1/(2f) from the maximum (M. Riesz 1914). The
     sample nearest the maximum therefore has at least this value, with d the largest possible distance of that sample.
-    All samples above it are searched.
+    The surroundings of all samples above this value are searched, or of the MOST_SPLINED brightest ones.
     """
     from scipy.ndimage import map_coordinates, spline_filter
 
@@ -197,7 +198,9 @@ def _refuse_brighter_outside(result: PSFResult, peak: float) -> None:
 
 
 def _vertex(result: PSFResult, middle: tuple[int, int] | None = None) -> Peak:
-    """Return the maximum of the paraboloid through the sample `middle` (row, column) and its neighbours.
+    """Return the maximum of the paraboloid through the sample `middle` and its neighbours.
+
+    It is the sample itself if samples are means over cells, or if the paraboloid has no maximum.
 
     middle: (row, column); None: the brightest sample.
     """
@@ -233,7 +236,7 @@ def _vertex(result: PSFResult, middle: tuple[int, int] | None = None) -> Peak:
 
 
 def _measured_error(result: PSFResult, peak: Peak) -> float:
-    """Return the relative error of a peak: its difference from the direct sum, if this is affordable.
+    """Return the relative error of a peak: the difference from the direct sum if this is affordable, at most its bound.
 
     The direct sum is evaluated on 3 x 3 points around the peak. Their pitch is CLOSER times finer than AT_A_PEAK, so
     the error of a paraboloid through them is PARABOLOID_ERROR / CLOSER^4.

@@ -58,11 +58,12 @@ def vector_focus(
     tolerance: relative L2 error of the intensity over the window.
 
     Raises:
-        ValueError: an argument is invalid, the relief is pixelated, a parameter carries derivatives, or the pupil of an
-            aplanatic lens is not an ideal lens alone, lit along its axis.
-        AccuracyError: no method meets the tolerance within the limits on memory and time, a ray behind the pupil has a
-            sine above 0.98, or an aplanatic lens has a Fresnel number below 20. The rays of such a lens do not meet in
-            a point.
+        ValueError: an argument is invalid, the relief is pixelated, a parameter carries derivatives, or an aplanatic
+            lens has a relief, wavefront or mask, is not lit along its axis, has no focal length, or has a radius that
+            is not below the distance.
+        AccuracyError: no method meets the tolerance within the limits on memory and time, a ray behind a pupil with
+            "flat" apodization has a sine above 0.98, or an aplanatic lens has a Fresnel number below 20. The rays of
+            such a lens do not meet in a point.
         BackendError: see `optics.psf`.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
@@ -91,7 +92,7 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
 
 
 def _check_rays(beam: Beam) -> None:
-    """Raise an AccuracyError unless rays propagate behind the pupil, because evanescent waves have no direction."""
+    """Raise an AccuracyError if a ray behind the pupil is evanescent or its sine exceeds STEEPEST."""
     steepest = beam.pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.index
     if steepest > STEEPEST:
         raise AccuracyError(
@@ -114,7 +115,7 @@ def _check_aplanatic(beam: Beam) -> None:
 
 
 def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Return Jones vectors (part, 2) of parts that do not interfere, and the Stokes parameters divided by the first.
+    """Return Jones vectors (part, 2) of parts that do not interfere, and the Stokes parameters divided by S0.
 
     Raises:
         ValueError: `polarization` is neither a Jones vector nor Stokes parameters.

@@ -32,7 +32,7 @@ def window_seconds(problem: Problem) -> float:
 
 
 def check_seconds(problem: Problem, sampling: Sampling) -> float:
-    """Return the time [s] of the spot check of a PSF that is itself a direct sum; 0 for other PSFs.
+    """Return the time [s] of the spot check of a PSF that is itself a direct sum; 0 for other PSFs or without a check.
 
     The check has about twice as many nodes as the PSF. For other methods, the check's time is neglected, because it is
     a small part of the PSF's time.
@@ -50,7 +50,8 @@ def check_seconds(problem: Problem, sampling: Sampling) -> float:
 def window_bytes(problem: Problem, sampling: Sampling) -> float:
     """Return the peak memory [bytes] of all arrays that are as large as the window.
 
-    The spot check sorts all samples of the window. `WindowSampling` has a check of a few rows instead.
+    A spot check needs a part of this memory, because it sorts all samples of the window. A PSF with a `WindowSampling`
+    has another check, of a few rows, and one with a `reach` has none.
     """
     sorts = problem.reach is None and not isinstance(sampling, WindowSampling)
     each = OUTPUT_ARRAYS * ITEM_BYTES[problem.dtype] + (CHECK_BYTES if sorts else 0.0)
@@ -58,7 +59,7 @@ def window_bytes(problem: Problem, sampling: Sampling) -> float:
 
 
 def check_window(window: Grid, dtype: str, count: int = 1, arrays: int = 1) -> None:
-    """Refuse a window whose arrays alone exceed the limits on memory and time, whatever the method.
+    """Refuse a window that exceeds the limits on memory or time with any method.
 
     count: number of PSFs over the window that exist at the same time.
     arrays: number of arrays of real numbers that are stored for each PSF.

@@ -30,7 +30,7 @@ class ErrorCauses(ReadOnlyArrays):
     """Parts of the error of contrasts, relative to all light that arrives, (wavelength,).
 
     lost: upper bound on the light outside the window.
-    light: uncertainty of the light that arrives.
+    light: uncertainty of the light that arrives, which `lost` includes.
     rest: error of the PSF inside the window.
     """
 
@@ -68,7 +68,7 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
 
 
 def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return an estimate of the contrast of the lost light, (fy, fx).
+    """Return an estimate of the lost light's part of each contrast, (fy, fx).
 
     The estimate assumes that this light is distributed like the light in the outer parts of the window.
     """
@@ -93,6 +93,6 @@ def _spectrum(image: np.ndarray) -> np.ndarray:
 
 
 def _fade(n: int, start: float) -> np.ndarray:
-    """Return a fade from 1 to 0 between the position `start` and the ends of a row of samples."""
+    """Return a fade from 1 to 0 between the position `start`, in half widths of a row of samples, and its ends."""
     away = np.abs(np.arange(n) - n // 2) / max(n / 2, 1.0)
     return np.asarray(np.square(np.cos(np.pi / 2 * np.clip((away - start) / (1 - start), 0, 1))))

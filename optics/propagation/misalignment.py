@@ -100,7 +100,9 @@ class Alignment:
         return self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]
 
     def nodes(self, radius: float, sine: float, wavelength: float, allowed: float) -> tuple[np.ndarray, float]:
-        """Return the depths [m] between which fields are interpolated, or just 0, and the error of the intensity.
+        """Return the depths [m] between which fields are interpolated, and the error of the intensity.
+
+        If one depth is sufficient, it is 0.
 
         Along a ray at the angle θ to the axis, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2,
         with the largest depth ζ and the wave number k. Interpolation between n Chebyshev nodes has an error of at most

@@ -1,7 +1,8 @@
 """A step of a system: the propagation of a field from one plane to the next.
 
 The samples of the next plane are as dense as its pupil requires. Their pitch is reduced a little, so that the period of
-the propagation is a whole number of samples of both planes, and transforms can compute both of its sums.
+the propagation is a whole number of samples of both planes. Fast Fourier transforms can then compute both the spectrum
+and the field that follows from it.
 
 Fields on tilted planes are interpolated between several depths (optics.propagation.misalignment). All depths of a step
 share one period, so each needs one transform.
@@ -107,7 +108,7 @@ class Stop:
         return light or carries_derivative(self.along)
 
     def apart(self, other: Alignment) -> float:
-        """Return the distance [m] between both centres along x or along y, whichever is larger."""
+        """Return the distance [m] of the stop's centre from another plane's along x or along y, whichever is larger."""
         return max(map(abs, self.alignment.beside(other)))
 
 
@@ -117,8 +118,9 @@ class StepSettings:
 
     tolerance: tolerance of each step.
     wavelength: wavelength in vacuum [m].
-    margin: frequencies [cycles per radius of a pupil] of diffracted light beyond those of geometrical rays. Light of
-        higher frequencies is removed. Infinite: all light is propagated that can reach the next plane.
+    margin: amount [cycles per radius of a pupil] by which frequencies of diffracted light may exceed those of
+        geometrical rays. Light of higher frequencies is removed. Infinite: all light is propagated that can reach the
+        next plane.
     """
 
     wavelength: float
@@ -138,7 +140,7 @@ class StepSettings:
         return max(self.ripple, LEAST_RIPPLE)
 
     def reaching(self, half_widths: float, distance: float) -> float:
-        """Return the highest frequency [1/m] of light that `propagate` carries to the next plane, including its fade.
+        """Return the highest frequency [1/m] of light that `propagate` carries to the next plane: the end of its fade.
 
         The result is infinite if both planes coincide. If they are close, it includes evanescent waves that have not
         yet decayed.
@@ -159,7 +161,8 @@ class StepSettings:
     def matched(self, field: PlaneField, stop: Stop, grid: Grid) -> Grid:
         """Return a grid of at least the same size and density, whose pitch divides the period of the step.
 
-        The grid is returned unchanged if the propagation has no such period.
+        The grid is not changed if no light is faded, if its pitch already divides the period, or if too many samples
+        would be necessary.
         """
         source, coarsest, half_width = Grid(field.u.shape, field.dx), grid.dx, grid.half_width
         for _ in range(PITCHES):
@@ -216,7 +219,7 @@ class StepSettings:
 
         Between tilted planes, the smallest distance defines the band, and the largest one the displacement of light.
 
-        window: samples of the next stop, with the axis of the field's plane at (0, 0).
+        window: samples of the next stop, relative to the centre of the field's plane.
         """
         z, wavelength = abs(stop.distance), self.wavelength / self.medium_n
         deepest = field.alignment.steepness * field.half_width + stop.alignment.steepness * stop.half_width

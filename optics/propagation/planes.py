@@ -59,8 +59,9 @@ class PupilSampling:
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
-        The band is the sum of the frequencies of the arriving light, of the pupil's phase and of the pupil's edge.
-        Frequencies beyond the band may be aliased, but not into the band.
+        The band extends to the highest frequency that can reach the next plane and is not removed. Light behind the
+        pupil also has higher frequencies, up to the sum of those of the arriving light, of the pupil's phase and of the
+        pupil's edge. They may be aliased, but not into the band.
 
         field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. Its
             frequencies are then part of the pupil's phase.

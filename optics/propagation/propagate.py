@@ -1,7 +1,7 @@
-"""Propagation of a sampled field from one plane to another by its angular spectrum.
+"""Propagation of a sampled field from one plane to another, by its angular spectrum or by matrix products.
 
-The samples define a band-limited function, which is zero outside the sampled area. Its spectrum is multiplied by the
-transfer function of free space and transformed onto the output samples:
+The samples define a band-limited function, whose samples outside the given area are zero. Its spectrum is multiplied by
+the transfer function of free space and transformed onto the output samples:
 
     U(x, y; z) = F⁻¹{F{U₀} H}     (Goodman, §3.10.2; H in optics.propagation.transfer_function)
 
@@ -107,9 +107,9 @@ def propagate(
     distance: distance [m] behind the plane of u; negative for planes in front of it.
     out_dx, out_shape, out_centre: pitch [m], shape (y, x) and centre (x, y) [m] of the output. By default, pitch and
         shape equal those of u, and the centre is on the axis.
-    tolerance: relative L2 error of the intensity over the output, for exact samples u. If u contains light at its
-        Nyquist frequency, that is, if it is sampled too coarsely, the plan states the additional error. The smallest
-        tolerance is 1e-5 for float32 and 3e-12 for float64.
+    tolerance: relative L2 error of the intensity over the output, for exact samples u. Light of u at its Nyquist
+        frequency, a sign of samples that are too coarse, causes an additional error, which the plan states if it
+        exceeds the tolerance. The smallest tolerance is 1e-5 for float32 and 3e-12 for float64.
     method: "auto" and "angular_spectrum" are exact. "auto" replaces the transforms by matrix products if these are
         faster, in distant or shifted windows. "fresnel" is the paraxial approximation.
     medium_n: refractive index of the space, 1 to 10.
@@ -143,7 +143,7 @@ def propagate(
 def propagated_field(
     given: np.ndarray, dx: float, passage: Passage, window: Grid, tolerance: float, dtype: str
 ) -> PropagationResult:
-    """Return the field (…, y, x) after a passage. `propagate` has checked the arguments.
+    """Return the field (…, y, x) propagated onto the window. The arguments are not checked.
 
     Raises:
         AccuracyError: no sampling meets the tolerance.
@@ -172,7 +172,7 @@ def propagated_between_depths(
 
 
 def step_map(result: PropagationResult, shape: tuple[int, int], depths: Depths | None) -> LinearMap:
-    """Return the propagation of a result, by transforms, as a linear map of fields (y, x) of a shape.
+    """Return the propagation that gave `result`, which used transforms, as a linear map of fields (y, x) of `shape`.
 
     depths: depths of a step between tilted planes.
     """
@@ -207,7 +207,7 @@ def lit_part(field: np.ndarray) -> np.ndarray:
 def _propagated(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling | SeparableSampling, list[PropagatedPlane]]:
-    """Return the planes, propagated by the method with the shorter predicted time."""
+    """Return the planes, propagated by transforms, or by matrix products if possible and predicted to be faster."""
     direct = separable(passage, *grids, SEPARABLE_SHARE * tolerance)
     if direct is None:
         return _with_padding(sources, passage, grids, tolerance, types)
@@ -226,8 +226,8 @@ def _with_padding(
 ) -> tuple[TransformSampling, list[PropagatedPlane]]:
     """Return the planes, propagated with enough padding for the blur due to light at the Nyquist frequency.
 
-    If even the largest useful padding is insufficient, none is added, because the samples themselves are then too
-    coarse.
+    If even the largest useful padding is insufficient, the initial one is kept, because the samples themselves are then
+    too coarse.
     """
     most = most_spare(passage, grids[0])
     spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)

@@ -1,11 +1,11 @@
-"""Propagation to distant or shifted windows by matrix products, with a kernel that is a sum of functions of x times y.
+"""Propagation to distant or shifted windows by matrix products; the kernel is a sum of products f(x) g(y).
 
 The field is the sum over samples of Rayleigh and Sommerfeld's kernel (Goodman, §3.5),
 
     U(x) = Σ_j u[j] A(ρ) exp(ikD(ρ)) dx²,   D(ρ) = √(z² + ρ²),   A(ρ) = |z| / (2πD²) (1/D - ik),   ρ = x - ξ_j.
 
-Let c be the centre of the window. D is the sum of a function of ρx, a function of ρy, and a coupling e, which vanishes
-if ρx = cx or ρy = cy:
+For backward propagation (z < 0), the kernel is the conjugate. Let c be the centre of the window. D is the sum of a
+function of ρx, a function of ρy, and a coupling e, which vanishes if ρx = cx or ρy = cy:
 
     D(ρ) = D(ρx, cy) + D(cx, ρy) - D(c) + e(ρ).
 

@@ -152,7 +152,7 @@ def _middle(shape: tuple[int, int], part: tuple[int, int]) -> tuple[slice, ...]:
 
 
 def _spectrum(plane: np.ndarray, how: TransformSampling) -> np.ndarray:
-    """Return the spectrum of a plane (y, x): (fx, fy) in FFT order with a whole `how.step`, else (fy, fx) centred."""
+    """Return the spectrum of a plane (y, x): (fx, fy) in FFT order unless `how.step` is 0, else (fy, fx) centred."""
     if how.step:
         return periodic_spectrum(plane, how.period, how.across)
     return fourier_sum(plane, how.period, (how.across, how.across), -1)
@@ -183,7 +183,7 @@ def evanescent_share(plane: np.ndarray, period: int, dx: float, passage: Passage
 
 
 def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
-    """Return Σ w |u|². The weights are for real and imaginary parts. The result is 0 if the weight is None."""
+    """Return Σ w |u|², with one weight for each real and each imaginary part of u. It is 0 if `weight` is None."""
     if weight is None:
         return 0.0
     if weight is ONE:

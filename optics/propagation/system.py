@@ -120,9 +120,9 @@ class _Light:
     backward: bool
 
     def through(self, elements: Sequence[Element], margin: float = MARGINS[0]) -> tuple[StackResult, float]:
-        """Return the field behind a system, and the smallest margin with which a similar system should begin.
+        """Return the field behind a system, and the margin with which a similar system should begin.
 
-        margin: smallest margin to try.
+        margin: smallest `StepSettings.margin` to try.
 
         Raises:
             ValueError: see `propagate_through`.
@@ -174,9 +174,9 @@ def _with_carrier(tracked: Field, stops: list[Stop], settings: StepSettings) -> 
 class _Passed:
     """The field behind a system.
 
-    error: predicted error of the intensity, without that of removed light.
+    error: predicted error of the intensity, without that of removed light until `_converged` adds it.
     complete: True if all light is included that can reach the next plane.
-    first_margin: smallest margin with which a similar system should begin.
+    first_margin: smallest `StepSettings.margin` with which a similar system should begin.
     """
 
     field: PlaneField
@@ -191,9 +191,9 @@ def _converged(
 ) -> _Passed:
     """Return the field with as much diffracted light as the tolerance requires.
 
-    Most light follows geometrical rays. The margin of frequencies around them is doubled until the intensity changes by
-    less than the tolerance. If this does not happen, or if derivatives are requested, all light is included that can
-    reach the next plane.
+    Most light follows geometrical rays. The margin of frequencies around them is doubled until the error that is
+    estimated from the change of the intensity meets the tolerance. If it does not, if the tolerance is below
+    LEAST_TOLERANCE, or if derivatives are requested, all light is included that can reach the next plane.
     """
     before, differentiated = None, any(stop.carries_derivatives(settings.wavelength) for stop in stops)
     for margin in MARGINS if tolerance >= LEAST_TOLERANCE and not differentiated else ():

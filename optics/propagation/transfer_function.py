@@ -106,9 +106,9 @@ def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxia
 def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
     """Return the square band for light that moves up to `half` [m] along each axis over the distance z.
 
-    It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. The
-    displacement along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression. The blur is
-    therefore larger than that of a fade in fx alone, by the factor of the expression's gradient. The result is
+    It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. Unless
+    paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression.
+    The blur is then larger than that of a fade in fx alone, by the factor of the expression's gradient. The result is
     `EVERYTHING` if no light may be faded.
 
     ripple: fraction of the light that remains beyond the fade.
@@ -163,8 +163,8 @@ def _gradient(sine: float) -> float:
 def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
     """Return the evanescent fraction of each cell of a spectrum, (samples, samples) in FFT order.
 
-    Waves outside the circle f = n/λ do not propagate. Within a cell, the circle is approximated by a straight edge. The
-    error is of the order of the cell's width squared.
+    Waves outside the circle f = 1/wavelength, with the wavelength in the medium, do not propagate. Within a cell, the
+    circle is approximated by a straight edge. The error is of the order of the cell's width squared.
     """
     f = np.fft.fftfreq(samples) * wavelength / dx
     fraction: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
@@ -175,8 +175,8 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
 def _fade_table(ripple: float) -> Interpolant:
     """Return a fade from 1 at 0 to 0 at 1: the complement of the integral of a Kaiser window.
 
-    A fade of this shape over a band of width Δf blurs a field over the distance β/(π Δf). The amplitude beyond this
-    distance is the fraction `ripple`.
+    A fade of this shape over a band of width Δf blurs a field over the distance β/(π Δf), where β is the window's
+    parameter. The amplitude beyond this distance is the fraction `ripple`.
     """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)

@@ -57,7 +57,8 @@ class TransformSampling:
     period: period in samples of the source.
     across: number of frequencies along each axis.
     step: pitch of the window in samples of the source if this is a whole number, else 0.
-    reach: distance [m] from the far edge of one plane to the far edge of the other, along the longer axis.
+    reach: lateral distance [m] from the far edge of one plane to the far edge of the other, along x or along y,
+        whichever is larger.
     """
 
     passage: Passage
@@ -110,7 +111,8 @@ class KeptLight:
     """The light that can reach a window.
 
     band: its band of frequencies.
-    reach: distance [m] along the longer axis from the far edge of one plane to the far edge of the other.
+    reach: lateral distance [m] from the far edge of one plane to the far edge of the other, along x or along y,
+        whichever is larger.
     """
 
     band: Band
@@ -118,7 +120,7 @@ class KeptLight:
 
 
 def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
-    """Return the band of the light that can reach the window.
+    """Return the band of the light that can reach the window, or the passage's limit if there is one.
 
     The band contains all frequencies if no light can be faded, because light at the Nyquist frequency of the source
     lands in the window or near it.
@@ -143,7 +145,7 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
-    """Return the sampling with the shortest period for a passage, and with the band that this period allows.
+    """Return the sampling with the shortest period for a passage, restricted to the band that can reach the window.
 
     spare: padding [m] for the blur of a truncated spectrum.
 
@@ -253,7 +255,8 @@ def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
 def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of a source's light that lands within the window's range along an axis (0 for y, 1 for x).
 
-    The fraction is the overlap of two intervals of widths `lit` and `seen`, whose centres are `missed` apart.
+    The fraction is the overlap of two intervals, relative to the first one. Their widths are `lit` and `seen`, and
+    their centres are `missed` apart.
 
     walks: displacements [m] of the light along this axis.
     """

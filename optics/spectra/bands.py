@@ -31,7 +31,7 @@ class SpectralBands(ReadOnlyArrays):
     weights: (channel, band). For every channel c, Σ_b weights[c, b] daylight(wavelengths[b]) = 1, so that the signal of
         a white surface is 1 in `daylight`, which is 1 at 560 nm.
     white_catch: quantum catch from a white surface in `daylight`, before the weights are normalised, (channel,): ∫
-        daylight(λ) λ S_c(λ) dλ [m²]. S_c is the pigment's quantal sensitivity, with a peak of 1.
+        daylight(λ) λ S_c(λ) dλ [m²]. S_c is the quantal sensitivity of the receptors, with a peak of 1.
     """
 
     wavelengths: np.ndarray
@@ -42,9 +42,9 @@ class SpectralBands(ReadOnlyArrays):
     def uniform(cls, bands: int, receptors: Any = "rgb") -> SpectralBands:
         """Return equal bands over the receptors' range.
 
-        For every reflectance that is linear between the bands' centres, the weights give the exact integral of
-        sensitivity x daylight x reflectance (by quadrature to 1 nm). For other smooth reflectances, the error is
-        O(bands⁻²).
+        For every reflectance that is linear between the bands' centres and constant beyond them, the weights give the
+        exact integral of sensitivity x daylight x reflectance (by quadrature to 1 nm). For other smooth reflectances,
+        the error is O(bands⁻²).
 
         receptors: `Receptors`, or any argument of `receptors_of`.
 
@@ -67,18 +67,18 @@ class SpectralBands(ReadOnlyArrays):
 
         The spectrum may have any shape, including the lines of a fluorescent lamp, which samples at the bands' centres
         could miss. The values are first computed as means over the bands, weighted by the receptors' sensitivity and
-        relative to daylight. They are then adjusted by the smallest change that makes Σ_b weights[c, b] radiance[b]
-        equal to the quantum catch of receptor type c (by quadrature to 1 nm). If there are fewer bands than types, this
-        is possible only in the least-squares sense. If a spectrum with lines is divided into few bands, a value may be
-        negative.
+        relative to daylight. They are then adjusted by the smallest change that makes Σ_b weights[c, b] values[b] equal
+        to the quantum catch of receptor type c, relative to that from a white surface in daylight (by quadrature to 1
+        nm). If there are fewer bands than types, this is possible only in the least-squares sense. If a spectrum with
+        lines is divided into few bands, a value may be negative.
 
         radiance: a Spectrum, or a function of wavelengths [m]. For a surface, it is reflectance times illuminant.
         receptors: the receptors for which these bands were made.
         nonnegative: True for values of at least 0. Catches are then as close to the exact ones as this permits.
 
         Raises:
-            ValueError: radiance is neither a Spectrum nor a function, is not finite at a wavelength, or has another
-                number of values. Another argument is invalid.
+            ValueError: radiance is neither a Spectrum nor a function, is not finite at a wavelength, or gives neither
+                one value nor one per wavelength. Another argument is invalid.
         """
         if not isinstance(radiance, Spectrum) and not callable(radiance):
             raise ValueError(

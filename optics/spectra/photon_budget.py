@@ -36,8 +36,8 @@ class PhotonBudget:
         at dusk.
     integration_time: integration time Δt [s] of a receptor. It is typically 10 to 50 ms in insects and vertebrates in
         bright light.
-    quantum_efficiency: η. Of the photons at the peak wavelength of a receptor's pigment, this fraction is absorbed. It
-        includes losses in front of the receptor.
+    quantum_efficiency: fraction η of the photons, at the peak wavelength of a receptor's pigment, that the pigment
+        absorbs. Photons that are lost in front of the receptor count as not absorbed.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.

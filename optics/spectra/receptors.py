@@ -149,7 +149,7 @@ def _range(range_nm: Any) -> tuple[float, float]:
 
 
 def _range_of(receptors: Receptors) -> tuple[float, float]:
-    """Return the range of wavelengths beyond whose ends every type has at most the fraction NEGLIGIBLE of its catch."""
+    """Return the range (low, high) [nm] for which every type has at most NEGLIGIBLE of its catch beyond either end."""
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1)
     so_far = np.cumsum(receptors.catch(nm), axis=1)
     so_far /= so_far[:, -1:]
@@ -189,7 +189,8 @@ def receptors_of(receptors: Any) -> Receptors:
     receptors: `Receptors`, a name such as "rgb" or "lms" (the keys of RECEPTORS), or a sequence of receptor types.
 
     Raises:
-        ValueError: a name is unknown (the message suggests a similar one), or there are no types or invalid ones.
+        ValueError: a name is unknown (the message suggests a similar one, if any), or there are no types or invalid
+            ones.
     """
     if isinstance(receptors, Receptors):
         return receptors

@@ -50,7 +50,8 @@ class Mount:
         these kinds with an object of this name
 
     Raises:
-        ValueError: `on` is not a nonempty string, an angle or offset is not finite, or the kind is unknown.
+        ValueError: `on` is not a nonempty string, an angle is not finite, `offset` is not three finite numbers, or the
+            kind is unknown.
     """
 
     on: str
@@ -142,8 +143,8 @@ def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
     """Return mounts in a circle around the upward axis of an object, from left to right. The eyes look outwards.
 
-    The upward axis of a body or site is its z axis. A single eye looks ahead. `Eyes` uses the same arrangement on the
-    built-in agent.
+    The upward axis of a body or site is its z axis. A single eye looks ahead. The eyes of the built-in agent
+    (`sim.Eyes`) are arranged in the same way.
 
     on: name of a body, site or camera
     n_eyes: number of eyes, 1 to 10,000

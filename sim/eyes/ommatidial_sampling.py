@@ -1,4 +1,4 @@
-"""Samples of a compound eye: rays drawn from the acceptance functions of its ommatidia."""
+"""Samples of a compound eye: rays that are spread over the acceptance functions of its ommatidia."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class OmmatidialSampling:
     depth: DepthLayers = ONE_PSF
 
     def sensor(self, rays_per_receptor: float) -> OmmatidialSensor:
-        """Return the eye's sensor with this number of rays per ommatidium, rounded to a whole number."""
+        """Return the eye's sensor with this number of rays per ommatidium, rounded to a whole number of at least 1."""
         eye, rays = self.eye, max(1, round(rays_per_receptor))
         turns = np.random.default_rng(1).random((len(eye), 1, 2))
         pattern = np.random.default_rng(0).integers(PATTERNS, size=len(eye))
@@ -74,7 +74,7 @@ class _RayPattern:
     """Rays of one ommatidium.
 
     directions: unit vectors in a facet's frame (right, up, axis), (ray, 3)
-    weights: fraction of the acceptance function in each ray's cell, (ray, band)
+    weights: weights of the rays, (ray, band); in each band, their sum is 1
     """
 
     directions: np.ndarray
@@ -84,8 +84,8 @@ class _RayPattern:
 def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
     """Return rays at the centroids of a Voronoi tessellation of directions, by Lloyd's algorithm (1982).
 
-    The weight of a ray is an integral over its cell. Importance weights at random points would double the error at
-    edges, because bands differ in their acceptance functions.
+    The weight of a ray is the integral of the acceptance function over its cell. Importance weights at random points
+    would double the error at edges, because bands differ in their acceptance functions.
 
     seed: determines the initial points
     """
@@ -108,7 +108,7 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
 
 
 def _tests(places: np.ndarray, spread: float) -> np.ndarray:
-    """Return the light of two test scenes at places (place, 2), as an array (place, scene).
+    """Return the light of two test scenes in directions with these sines (place, 2), as an array (place, scene).
 
     The light is uniform in the first scene, and a Gaussian of variance `spread` around the axis in the second.
     """

@@ -1,8 +1,8 @@
 """Receptive fields of an eye behind a pupil, and low-discrepancy directions drawn from the mixture of all fields.
 
 The mixture is the mean of the fields of all receptors, as a probability density. Fields are tabulated on cells of the
-visual field's tangent plane, in the coordinates of `sim.eyes.sensor`. The same number of cells divides the width and
-the height of a receptor.
+visual field's tangent plane, in the coordinates of `sim.eyes.sensor`. The width and the height of a
+receptor are divided into the same number of cells.
 """
 
 from __future__ import annotations
@@ -150,16 +150,16 @@ class ReceptiveFields:
 
 
 def cells_per_receptor(resolution: tuple[int, int]) -> int:
-    """Return the number of cells along a receptor's side, for eyes of this resolution."""
+    """Return the number of cells along a receptor's side for eyes of this resolution, if `cells_for` needs no more."""
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
 def kernels_of(eye: optics.Eye, cells: int, depth: DepthLayers) -> np.ndarray:
     """Return the kernel of each depth layer, rotated by 180°, (plane, y, x).
 
-    A plane is a band of a depth layer, and a receptor's side consists of `cells` cells. The signal of the receptor at r
-    is the convolution Σ_v K(r - v) L(v). The weights of the light L as a function of v are therefore the kernel K,
-    rotated by 180° and centred on the receptor.
+    A plane is a band of a depth layer, and a receptor's side consists of `cells` cells. If K is the kernel and L(v) the
+    light from the position v in the visual field, the signal of the receptor at r is the convolution Σ_v K(r - v) L(v).
+    The weights of the light are therefore the kernel, rotated by 180° and centred on the receptor.
     """
     return _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
 
@@ -254,7 +254,7 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
     """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
 
-    field: field that all receptors share, as its power in each cell, (plane, y, x)
+    field: power in each cell of the field, which is the same for all receptors, (plane, y, x)
     resolution: rows and columns of receptors
     cells: number of cells along a receptor's side
     receptors: indices of the receptors, counted row by row

@@ -1,8 +1,9 @@
 """Weighted sums over samples for each receptor, as one matrix product per row of receptors.
 
 Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. Narrow
-receptive fields have short ranges. A view is one eye in one world. If light has few spectral components
-(`sim.tracing.closed_form_tracer`), the weights of the bands are multiplied into the receptors' weights in advance.
+receptive fields have short ranges. A view is one eye in one world. If light is traced in few spectral
+components instead of bands (`sim.tracing.closed_form_tracer`), the contributions of components to bands, and of bands
+to channels, are multiplied into the receptors' weights in advance.
 """
 
 from __future__ import annotations
@@ -126,7 +127,7 @@ def of_receptors(factors: np.ndarray) -> ReceptorSums:
 def of_components(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], mixing: np.ndarray, basis: np.ndarray
 ) -> ReceptorSums:
-    """Return the function that maps light along rays to signals by one matrix product per component and channel.
+    """Return the function that maps light along rays to signals by one `RowProduct` per component.
 
     The factors of bands and channels are multiplied into the weights in advance.
 
@@ -150,7 +151,7 @@ def of_components(
 
 
 def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-    """Return the function that maps light along rays to signals by one matrix product per band.
+    """Return the function that maps light along rays to signals by one `RowProduct` per band.
 
     This is cheaper than `of_components` if there are fewer bands than pairs of a component and a channel.
 
@@ -183,7 +184,7 @@ def _in_band(light: np.ndarray, factors: np.ndarray, is_component: bool, band: i
 def within_stretches(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], share: float
 ) -> tuple[scipy.sparse.csr_array, ...]:
-    """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
+    """Return weights (receptor, ray) per band, with 0 for the negligible rays at both ends of each row of receptors.
 
     At each end of a row, rays are omitted until one more omission would reduce the sum of some receptor's weights in
     some band by more than the fraction `share` / 2. The remaining weights are then scaled so that the sums are

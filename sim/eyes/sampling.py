@@ -40,10 +40,10 @@ NEGLIGIBLE = 0.1
 class Trial:
     """Samples for some of the receptors, computed without building the sensor of the whole eye.
 
-    directions: directions of the rays or centres of the areas, (ray, 3)
+    directions: directions of the rays, or centres of the areas on the tangent plane at distance 1, (ray, 3)
     bounce_samples: see `sim.eyes.sensor.BoxSensor`, (ray, 2)
     weights: weight of each ray in each receptor's signal, (layer * band, receptor, ray)
-    extent: width and height of areas; None for rays
+    extent: width and height of the areas on this plane; None for rays
     """
 
     directions: np.ndarray
@@ -56,9 +56,9 @@ class Trial:
 class BoxSampling:
     """Samples of an eye with a perfect lens.
 
-    Every receptor's area is sampled at the same low-discrepancy points, whose requested number is rounded to a whole
-    number. The points of each receptor are shifted by its own fixed random offset (with wrap-around at the edges of the
-    area), so that the errors of neighbouring receptors are independent.
+    Every receptor's area is sampled at the same low-discrepancy points. The requested number of points is rounded to a
+    whole number of at least 1. The points of each receptor are shifted by its own fixed random offset (with wrap-around
+    at the edges of the area), so that the errors of neighbouring receptors are independent.
     """
 
     eye: optics.Eye
@@ -142,9 +142,9 @@ class BoxSampling:
 
 @dataclass(frozen=True)
 class FieldSampling:
-    """Samples of an eye behind a pupil: directions drawn from the mixture of all receptors' receptive fields.
+    """Samples of an eye behind a pupil: rays drawn from the mixture of all receptive fields, or a lattice of areas.
 
-    If the requested number leaves a receptor without a ray, more rays are drawn until every receptor has one.
+    If the requested number leaves a receptor without a ray, `sensor` draws more rays until every receptor has one.
 
     tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. White light from beyond each side of the lattice
         of areas contributes at most this amount to a signal, on average over the receptors.

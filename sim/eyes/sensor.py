@@ -3,9 +3,9 @@
 `sim.eyes.sampling` chooses the samples. All directions are fixed when the sensor is built, so that the same kernel
 renders every step.
 
-Coordinates are positions on the visual field's tangent plane: x to the right, in receptor widths, and y *down*, in
-receptor heights, in the direction of increasing rows. The origin is on the optical axis. For h x w receptors, receptor
-(i, j) covers the square [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2].
+Coordinates are positions on the visual field's tangent plane: x to the right, in average receptor widths, and y
+*down*, in average receptor heights, in the direction of increasing rows. The origin is on the optical axis. If h x w
+receptors have equal sizes, receptor (i, j) covers the square [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2].
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_compon
 
 @dataclass(frozen=True)
 class Facets(ReadOnlyArrays):
-    """Weights and starting points of rays that start at facets.
+    """Weights and starting points of the rays of a compound eye.
 
     weights: weight of each ray's light in each band, (ray, band) float32
     origins: starting points of the rays in the eye's frame [m], (ray, 3); None: all rays start at the pupil
@@ -39,8 +39,8 @@ class BoxSensor(ReadOnlyArrays):
 
     directions: unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32; ray = receptor *
         rays_per_receptor + sample
-    bounce_samples: points in the unit square, one for each ray, that set the direction of reflected light, (ray, 2)
-        float32
+    bounce_samples: points in the unit square, one for each ray, that determine the direction of its bounce ray (see
+        `sim.tracing.lighting`), (ray, 2) float32
     rays_per_receptor: number of samples of one receptor; the renderer's kernel sums them
     depth: a single layer, because a perfect lens is in focus at all distances
     extent: if the samples are areas, their width and height as rectangles of the tangent plane at distance 1;
@@ -74,25 +74,25 @@ class BoxSensor(ReadOnlyArrays):
 class ReceptiveFieldSensor(ReadOnlyArrays):
     """Sensor of an eye behind a pupil, whose receptors and bands all use the same set of directions.
 
-    The directions are drawn from the mixture of all receptive fields. The signal of receptor r is a weighted sum over
-    rays p in bands b (self-normalised importance sampling):
+    The directions are drawn from the mixture of all receptive fields. In band b, the signal of receptor r is a
+    weighted sum over rays p (self-normalised importance sampling):
 
-        signal_r = sum_p W_b[r, p] radiance_b(p),   W_b[r, p] ∝ RF_{r,b}(p) / q(p),   sum_p W_b[r, p] = power_b
+        signal_{r,b} = sum_p W_b[r, p] radiance_b(p),   W_b[r, p] ∝ RF_{r,b}(p) / q(p),   sum_p W_b[r, p] = power_b
 
-    RF is the receptive field, which is the PSF, rotated by 180° and convolved with the receptor's square. q is the
-    density of the directions, and power_b is the fraction of the pupil's power inside the kernel. With several depth
-    layers, each layer has its own W, which is applied to the fraction of a ray's light that the layer receives.
+    RF is the receptive field, q is the density of the directions, and power_b is the fraction of the pupil's power
+    inside the field (see `sim.eyes.receptive_fields.ReceptiveFields`). With several depth layers, each layer has its
+    own W, which is applied to the fraction of a ray's light that the layer receives.
 
-    If the samples are areas of the visual field instead of rays, W_b[r, p] is the fraction of the receptive field in
-    area p.
+    If the samples are areas of the visual field instead of rays, W_b[r, p] is the integral of the receptive field
+    over area p.
 
     Small weights of rays far above and below a row of receptors are set to 0. For each receptor, they amount to at most
     the fraction `eye.tolerance` of the sum of its weights. In scenes nowhere brighter than white in full daylight, this
     changes no signal by more than `sim.eyes.sampling.NEGLIGIBLE` times the receptors' noise.
 
     directions: unit vectors in the eye's frame, (ray, 3) float32
-    bounce_samples: points in the unit square, one for each ray, that set the direction of reflected light, (ray, 2)
-        float32
+    bounce_samples: points in the unit square, one for each ray, that determine the direction of its bounce ray (see
+        `sim.tracing.lighting`), (ray, 2) float32
     weights: sparse matrices (receptor, ray), one for each band of each depth layer
     resolution: receptors (height, width)
     depth: the depth layers
@@ -149,9 +149,9 @@ class OmmatidialSensor(ReadOnlyArrays):
 
     The kernel multiplies the light along each ray by the weight of the ray and sums over an ommatidium's rays. Let Ω_b
     be the integral of the acceptance function in band b over all directions. In this band, the weight of a ray is the
-    integral over the directions near the ray, divided by the mean of Ω over all bands. The weights therefore sum to
-    Ω_b / mean(Ω). The signal of type t is Σ_b mixing[t, b] times the sum in band b, divided by the same expression for
-    white light.
+    integral over the directions that are nearest to the ray, divided by the mean of Ω over all bands. The weights
+    therefore sum to Ω_b / mean(Ω). The signal of receptor type t is Σ_b mixing[t, b] times the sum in band b (see
+    `receptor_sums`), divided by the same expression for white light.
 
     directions, bounce_samples, rays_per_receptor: see `BoxSensor`
     facets: weights and starting points of the rays

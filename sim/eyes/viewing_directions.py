@@ -135,7 +135,7 @@ def whole_head(interommatidial_deg: float) -> np.ndarray:
 
 
 def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (12, 3) of an icosahedron, unit vectors, and its faces (20, 3)."""
+    """Return the corners of an icosahedron, unit vectors (12, 3), and its faces as indices of corners, (20, 3)."""
     golden = (1 + math.sqrt(5)) / 2
     corners = np.array(
         [np.roll([0.0, y, z * golden], turn) for turn in range(3) for y in (-1, 1) for z in (-1, 1)]

@@ -34,7 +34,8 @@ class Motion:
     path: positions at the end of each substep [m], (n, substep, 2)
     velocity: velocity after the last substep [m/s], (n, 2)
     contact: True if the agent touched something in any substep, (n,) bool
-    unstable: True if the simulation broke down, (n,) bool; the agent then stays in place with velocity 0
+    unstable: True if the simulation broke down, (n,) bool; the agent then stays in place with velocity 0 and
+        without contact
     """
 
     path: np.ndarray
@@ -72,7 +73,8 @@ class AgentPhysics:
         whole world.
 
     Raises:
-        ValueError: the model lacks the agent's joints, actuators or touch sensor, or an object could collide.
+        ValueError: the model lacks the agent's joints, actuators or touch sensor, or an object could collide or is not
+            a mocap body.
     """
 
     def __init__(self, world: World, threads: int, closed_form: bool = True) -> None:
@@ -224,7 +226,7 @@ class _Columns:
 
 
 def _slow(velocity: np.ndarray) -> np.ndarray:
-    """Return a mask of the components of velocities [m/s] below 100 m/s (UNSTABLE_SPEED); False for NaN."""
+    """Return a mask of the velocity components whose magnitude is below 100 m/s (UNSTABLE_SPEED); False for NaN."""
     slow: np.ndarray = np.abs(velocity) < UNSTABLE_SPEED
     return slow
 

@@ -30,7 +30,8 @@ class ArrayWorlds(MujocoWorlds):
     time: writable simulation time [s], (n, 1)
 
     All other arrays of mjData (`xpos`, `geom_xpos`, `site_xpos`, `sensordata`, `cvel` ...) are read-only. They are
-    stacked over worlds when they are first read after a step. A name that mjData lacks raises an AttributeError.
+    stacked over worlds when they are first read after the worlds have changed. A name that mjData lacks raises an
+    AttributeError.
 
     Raises:
         ValueError: an argument has the wrong type or is out of range, or `variation` names an object that the model

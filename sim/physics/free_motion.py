@@ -34,7 +34,7 @@ class FreeMotion:
     obstacles: ids of the geoms that could be touched (n,)
     lower, upper: axis-aligned bounding boxes of the obstacles in the horizontal plane (n, 2) [m]
     reach: distance of the agent's centre from a box beyond which the agent cannot touch the obstacle [m]
-    strongest: largest command that does not saturate the servo [m/s]
+    strongest: largest component of a command for which the response was tested to be linear [m/s]
     """
 
     response: np.ndarray
@@ -87,7 +87,7 @@ class FreeMotion:
         return in_reach
 
     def obeys(self, command: np.ndarray) -> np.ndarray:
-        """Return a mask of the commands (n, 2) that do not saturate the servos, (n,) bool."""
+        """Return a mask of the commands (n, 2) whose components are at most `strongest` in magnitude, (n,) bool."""
         obeys: np.ndarray = (np.abs(command) <= self.strongest).all(axis=-1)
         return obeys
 

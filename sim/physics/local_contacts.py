@@ -49,7 +49,8 @@ class LocalContacts:
     def few(self, in_reach: np.ndarray) -> np.ndarray:
         """Return the obstacles of each agent's small model, (n, obstacle) bool.
 
-        They are all obstacles within reach, or none if a small model has too few boxes for all of them.
+        They are all obstacles within reach, or none if these are more than the placeholders in a small model
+        (`sim.worlds.agent_model.ROOM`).
 
         in_reach: obstacles within reach of each agent, (n, obstacle) bool
         """
@@ -94,9 +95,9 @@ def local_contacts_of(
 ) -> LocalContacts | None:
     """Return the local contacts of a world's agent; None if small models cannot replace the whole model.
 
-    Small models cannot replace it if agents have no free motion or no obstacles, or if bodies other than the agent
-    move. Every obstacle must be a simple primitive that is fixed to the world, and the world's model must not
-    have been changed since it was compiled.
+    Small models cannot replace it if agents have no free motion or no obstacles, or if the model has joints, actuators
+    or sensors besides those of the agent. Every obstacle must be a simple primitive that is fixed to the world, and the
+    world's model must not have been changed since it was compiled.
 
     whole: the world's complete model
     """

@@ -114,7 +114,7 @@ class MujocoWorlds:
         return broken
 
     def _replace_passed(self, broken: list[int]) -> None:
-        """Replace the earlier poses of worlds whose physics broke down with their poses after the action."""
+        """Replace the poses at moments during the action by those after it, in worlds whose physics broke down."""
         for world in broken:
             self.require_places(world)
         fine = [world for world in range(self.n) if world not in broken]
@@ -161,7 +161,7 @@ class MujocoWorlds:
         mujoco.mj_forward(data.model, data)
 
     def _pass_frame(self, world: int) -> None:
-        """Advance a world to the next frame. Only poses are computed, so frames do not change the physics."""
+        """Advance a world to the next frame. Then only update its poses, so that frames do not change the physics."""
         data = self.datas[world]
         mujoco.mj_step(data.model, data, self.substeps // self.frames)
         mujoco.mj_kinematics(data.model, data)
@@ -172,7 +172,8 @@ class MujocoWorlds:
 def _broken(data: mujoco.MjData) -> str | None:
     """Return the reason why a world's physics broke down, or None.
 
-    MuJoCo has already reset a world that broke down, unless the model disables automatic resets.
+    MuJoCo has already reset a world with unstable positions, speeds or accelerations, unless the model disables
+    automatic resets.
     """
     warned = data.warning.number
     if warned.any() and any(warned[int(kind)] for kind in _UNSTABLE):

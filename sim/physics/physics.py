@@ -54,7 +54,7 @@ class Physics(Protocol):
     def adopt_changed_model(self) -> bool:
         """Give each world its own model if the task changed the model at the start of the first episode.
 
-        Return True if the worlds now have their own models.
+        Return True if this call gave the worlds their own models.
         """
 
     def watch(self) -> None:
@@ -66,7 +66,7 @@ class Physics(Protocol):
         whose: beginning of the error message
 
         Raises:
-            RuntimeError: the task changed the model that all worlds share.
+            RuntimeError: the task changed the model that several worlds share.
         """
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:

@@ -34,9 +34,10 @@ class SlidingAgents:
 
     world: layout, model and starting positions
     n: number of worlds, 1 to 1,000,000
-    threads: number of threads that may step them, 1 to 65,536
+    threads: number of threads that may step the worlds, 1 to 65,536
     variation: ranges of quantities that differ between episodes; None: there are none
-    before, state: attributes, all worlds before and after the last action
+    before: attribute, all worlds before the last action; None before the first action
+    state: attribute, current state of all worlds
     motion: attribute, motion of the agents during the last action; None before the first action
     chance: attribute, random streams of the worlds
 

@@ -167,7 +167,7 @@ class CameraRays:
 
 
 def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
-    """Return the first hits of rays that pass through the inner sides of closed shapes.
+    """Return the first hits of rays, which the inner sides of closed shapes do not stop.
 
     si: first hits of the rays, including inner sides
     closed: see `CameraInputs`
@@ -221,7 +221,7 @@ def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarra
 def _pose(
     view: Viewpoint, size: tuple[int, int], near: float, suns: Mapping[int, np.ndarray], n_lights: int
 ) -> np.ndarray:
-    """Return the view and the directions to suns, which change between frames, in rows of four floats, flat."""
+    """Return the view and directions to directional lights, which change between frames: rows of four floats, flat."""
     rows = aligned(4 * (_VIEW + n_lights), np.float32).reshape(-1, 4)
     rows[0, :3], rows[1:4, :3] = view.position, view.rotation.T
     rows[4] = np.tan(np.radians(view.fovy_deg) / 2), near, size[1], size[0]
@@ -231,7 +231,7 @@ def _pose(
 
 
 def _closed(mirror: MergedMirror) -> np.ndarray:
-    """Return for each shape id 1 if a camera inside the shape sees through it, otherwise 0, (id,) uint32."""
+    """Return, for each shape id, 1 if a camera inside the shape sees through it, and otherwise 0, (id,) uint32."""
     names = mirror.shape_names
     return np.array([names.get(i, "") in mirror.closed for i in range(max(names) + 1)], np.uint32)
 
@@ -246,13 +246,13 @@ def _is_sun(lamp: Emitter) -> bool:
 
 
 def _is_textured_glow(light: MitsubaObject) -> bool:
-    """Return whether a light is a surface with a texture. (A sky is not: its tables are accessible.)"""
+    """Return whether a light is a surface with a texture. (A sky is not, and Mitsuba exposes its sampling tables.)"""
     kinds = int(mi.EmitterFlags.Surface) | int(mi.EmitterFlags.SpatiallyVarying)
     return int(light.flags()) & kinds == kinds
 
 
 def _sun_weight(light: MitsubaObject) -> np.ndarray:
-    """Return the irradiance on a surface that faces a sun, (wavelength,)."""
+    """Return the irradiance on a surface that faces a directional light, (wavelength,)."""
     si: Array = dr.zeros(mi.SurfaceInteraction3f)
     si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
     _, weight = light.sample_direction(si, mi.Point2f(0.5))

@@ -61,7 +61,7 @@ class QuickImage:
 
 
 class QuickCamera:
-    """A camera for any MuJoCo model that works without OpenGL. It renders the model's Mitsuba scene in direct light.
+    """A camera that works without OpenGL, for any MuJoCo model. It renders the model's Mitsuba scene in direct light.
 
     model, spectra: see `sim.mirror`
     mirror: attribute, the Mitsuba scene that is a copy of the model (`sim.mirror`)
@@ -113,7 +113,7 @@ class QuickCamera:
         return image
 
     def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[QuickImage, np.ndarray]:
-        """Return an image in which each pixel has the colour of its middle.
+        """Return an image in which a pixel has the colour of its middle or of the nearest lattice pixel.
 
         Also return the linear sRGB values along the rays, (3, ray).
         """
@@ -138,7 +138,7 @@ def _displayed(linear: np.ndarray) -> np.ndarray:
 
 
 def _on_edges(picture: np.ndarray) -> np.ndarray:
-    """Return a mask (y, x) of the pixels that differ by more than 8 from a horizontal or vertical neighbour."""
+    """Return a mask (y, x) of pixels that differ by more than 8 sRGB levels from a horizontal or vertical neighbour."""
     across, along = _step(picture[:, 1:], picture[:, :-1]), _step(picture[1:], picture[:-1])
     found = np.zeros(picture.shape[:2], bool)
     found[:, 1:] |= across
@@ -149,6 +149,6 @@ def _on_edges(picture: np.ndarray) -> np.ndarray:
 
 
 def _step(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a mask (y, x) of the pixels in which two images (y, x, 3) uint8 differ by more than 8."""
+    """Return a mask (y, x) of the pixels in which two images (y, x, 3) uint8 differ by more than 8 sRGB levels."""
     seen = np.maximum(a, b) - np.minimum(a, b) > EDGE
     return np.asarray(seen[..., 0] | seen[..., 1] | seen[..., 2])

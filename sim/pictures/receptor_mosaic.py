@@ -26,7 +26,8 @@ class ReceptorMosaic:
     """Signals of an animal's receptors for a photograph.
 
     animal: name of the animal.
-    signals: signals (channel, row, column), from the top left of the visual field. A white surface gives 1.
+    signals: signals (channel, row, column), from the top left of the visual field. A surface that reflects
+        all light gives 1.
     peaks_nm: peak wavelength of each channel [nm], (channel,).
     width_deg: angular width of the photograph [degrees].
     hexagons: True for ommatidia. Every second row, beginning with the second, is then shifted to the right by half an
@@ -98,6 +99,7 @@ class ReceptorMosaic:
         """Write the signals to an OpenEXR file, with one pixel for each receptor; `sim.read_exr` reads it.
 
         Raises:
+            ValueError: `path` is not a path.
             OSError: the file cannot be written.
         """
         notes = {"animal": self.animal, "width_deg": self.width_deg, "odd_rows_shifted": self.hexagons}

@@ -1,4 +1,4 @@
-"""Rendering of all eyes in all worlds. Start with one_ray: the other renderers compute the same values faster.
+"""Rendering of all eyes in all worlds. Read one_ray first: the batched renderers compute the same values faster.
 
 one_ray             see: one world, one ray for each receptor
 eye_renderer        EyeRenderer: all eyes of all worlds of any scene as one wavefront

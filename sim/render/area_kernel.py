@@ -1,7 +1,7 @@
 """The kernel of area sampling.
 
 Results that several areas share are computed once, in advance: the light on the bodies of a world, and the walls at
-the borders of columns.
+the borders between columns of areas.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Rendering of all eyes in all worlds as one wavefront, by one frozen kernel, with any tracer.
+"""Rendering of all eyes in all worlds as one wavefront, by frozen kernels, with any tracer.
 
-Directions and wavelengths are fixed. A call only uploads poses and launches the kernel that the first call recorded.
+Directions and wavelengths are fixed. A call only uploads poses and launches the kernels that the first call recorded.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class EyeRenderer:
 
     @property
     def _samples_per_receptor(self) -> float:
-        """Number of samples per receptor. Behind a pupil, it includes areas around the receptors' squares."""
+        """Number of samples per receptor. Behind a pupil, areas around the receptors' squares are counted, too."""
         return len(self.sensor.directions) / float(np.prod(self.eye.resolution))
 
     def _check_memory(self, n_envs: int, samples_per_receptor: float) -> None:
@@ -140,8 +140,8 @@ class EyeRenderer:
         """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
         poses: poses of every world: a list of their MjData after mj_forward or mj_step, or `sim.Poses`, arrays stacked
-            over worlds. The MjData of a single world need not be in a list. For built-in worlds, a state is also
-            accepted
+            over worlds. The MjData of a single world need not be in a list. For built-in worlds, a
+            `WorldState` is also accepted
         light: factors of all lights of each world, (env, band); None: lights as in the model
 
         Raises:
@@ -162,11 +162,11 @@ class EyeRenderer:
         return self._launched(poses).then(lambda found: self._signals(found, factors))
 
     def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
-        """Start rendering only some of the worlds; the signals are (len(worlds), eye, channel, height, width).
+        """Start rendering some of the worlds; the signals are (len(worlds), eye, channel, height, width).
 
-        `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to 8 worlds
-        are rendered in separate buffers, so that a frame of all worlds may be pending at the same time. The errors are
-        those of `signals`, and a ValueError for an unknown world.
+        `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to 8 of more
+        than 8 worlds are rendered in separate buffers, so that a frame of all worlds may be pending at the same time.
+        Otherwise, all worlds are rendered. The errors are those of `signals`, and a ValueError for an unknown world.
         """
         worlds = world_indices("worlds", worlds, self.n_envs)
         if not len(worlds) <= FEW < self.n_envs:
@@ -186,7 +186,8 @@ class EyeRenderer:
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
         """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32.
 
-        The unit is that of `sim.mirror` (white facing a light of diffuse 1: D65, 1 at 560 nm). Errors: see `signals`.
+        The unit is that of `sim.mirror`: white that faces a light of diffuse 1 gives D65, which is 1 at 560 nm. Errors:
+        see `signals`.
         """
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())
@@ -195,7 +196,7 @@ class EyeRenderer:
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, len(self.mounts), height, width)
 
     def radiance(self, poses: Placed) -> np.ndarray:
-        """Return spectral radiance along every ray, (env, eye, ray, band) float32; unit as in `receptor_radiance`."""
+        """Return spectral radiance of all samples, (env, eye, sample, band) float32; unit as in `receptor_radiance`."""
         layers = self._components(self._launched(poses, self._rays).wait())
         rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
         return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)
@@ -222,7 +223,7 @@ class EyeRenderer:
         return self.labels.flow(poses, later)
 
     def brightest_in(self, light: np.ndarray) -> float:
-        """Return the largest signal of a white surface if lights are multiplied by these factors, (band,)."""
+        """Return the attribute `brightest` for lights that are multiplied by these factors, (band,)."""
         return float((self.eye.throughput * self.eye.spectral_bands.weights @ (self._white * light)).max())
 
     @property

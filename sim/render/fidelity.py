@@ -41,8 +41,9 @@ class Level:
 class Fidelity:
     """Accuracy with which a world is rendered for given eyes. `print` shows it as a table.
 
-    rays_per_receptor: average number of samples (rays or areas) per receptor, above 0 and at most 10⁷. Behind a pupil
-        it may be below 1, since receptors share rays and may share areas.
+    rays_per_receptor: average number of samples (rays or areas) per receptor, above 0 and at most 10⁷. With
+        samples="edges", it is the number for receptors at an edge. Behind a pupil it may be below 1, since receptors
+        share rays and may share areas.
     bands: number of spectral bands, 1 to 4096, used instead of the eye's own; an eye allows at most 64
     depth: distances for which the eye has a PSF
     light: "direct": light of lamps after one reflection; "bounce": also after two reflections; "all": after any number
@@ -51,8 +52,8 @@ class Fidelity:
         rectangles, and the mean light in each of them is computed in closed form. Behind a pupil, there are also
         rectangles around the receptors, and receptors share larger rectangles if rays_per_receptor is below 1. Areas
         need a world of upright walls, a floor and spheres. "edges" is adaptive edge sampling: four rays per receptor,
-        and rays_per_receptor rays if the signals of the four differ. It needs a perfect lens and direct light, and is
-        chosen automatically only for user models.
+        and rays_per_receptor rays if the signals of the four differ, or if a neighbouring receptor differs strongly. It
+        needs a perfect lens and direct light, and is chosen automatically only for user models.
     frames: number of rendered frames per action, for receptors with `dynamics`: a divisor of the number of physics
         steps per action, at most 10⁶. None: environments choose the fewest whose error is allowed
     tolerance: allowed error of a receptor's signal (root mean square), above 0; None if nothing was chosen. In adaptive

@@ -109,9 +109,9 @@ class Stages(Protocol):
 
 
 def cheapest(stages: Stages) -> Fidelity:
-    """Return the fidelity with the cheapest level of each stage whose predicted error is allowed.
+    """Return the fidelity with the eye's own bands, and the cheapest level with an allowed error of each other stage.
 
-    If a stage lacks such a level, a FidelityWarning states by how much the allowed error is exceeded.
+    If these levels exceed the allowed error, a FidelityWarning states by how much.
     """
     allowed, shares = stages.allowed, stages.shares
     depth, depth_level = stages.depth(allowed * (shares.depth if shares else 1))
