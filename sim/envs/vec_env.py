@@ -31,8 +31,7 @@ class EyesVecEnv(OneEnvironment):
     documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
     observation is then the first observation of the new episode, and info["terminal_observation"] is the last
     observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
-    episodes depend only on the seed, the world's index and its actions. Exceptions of a `sim.BatchTask` are raised
-    unchanged.
+    episodes depend only on the seed, the world's index and its actions. A `sim.BatchTask`'s exceptions are raised.
 
     simulation, renderers: the worlds, and renderers of every agent's eyes
     memory, render_mode: see `sim.make_vec_env`
