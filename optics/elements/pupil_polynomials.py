@@ -30,7 +30,8 @@ FEW_WAVES = 50.0  # choice: sum of all coefficients [waves] up to which float32 
 def powers_of(pupil: Pupil, wavelength: float, step: float) -> np.ndarray | None:
     """Return coefficients of the phase of relief and wavefront [waves], (power of y, power of x), without the constant.
 
-    Positions are in units of the pupil's radius. The result is None if a part is not a polynomial of moderate order.
+    Positions are in units of the pupil's radius. The result is None for reliefs other than a B-spline patch (unless
+    `step` is 0), and for wavefronts other than Zernike polynomials of orders up to HIGHEST_ORDER.
 
     wavelength: wavelength [m] in vacuum.
     step: difference of refractive indices at the relief.
@@ -61,10 +62,10 @@ def powers_of(pupil: Pupil, wavelength: float, step: float) -> np.ndarray | None
 
 
 def power_sum(coefficients: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return Σ c[i, j] y^i x^j by Horner's rule, (stack, y, x).
+    """Return Σ c[i, j] y^i x^j for each of many beams, (beam, y, x), by Horner's rule.
 
-    coefficients: c, (stack, power of y, power of x).
-    x, y: positions (stack, y, x) in units of the radius.
+    coefficients: c, (beam, power of y, power of x).
+    x, y: positions (beam, y, x) in units of the radius.
     """
     if np.abs(coefficients).sum(axis=(1, 2)).max() < FEW_WAVES:
         coefficients, x, y = (part.astype(np.float32) for part in (coefficients, x, y))

@@ -1,4 +1,4 @@
-"""Rim of a pupil that is known from samples: a circle, an ellipse, or a convex polygon."""
+"""Rim of a pupil that is known from samples: a circle, an oval (nearly an ellipse), or a convex polygon."""
 
 from __future__ import annotations
 
@@ -55,14 +55,14 @@ class Rim:
         return self.aperture.contains((x - self.middle[0]) * scale, (y - self.middle[1]) * scale)
 
     def onto_plane(self, distance: float) -> Rim:
-        """Return this rim, which is in sines of directions, on a plane at a distance [m] from the image.
+        """Convert this rim from sines of directions to positions on a plane at a distance [m] from the image.
 
         The result is centred on the origin.
         """
         return self._scaled(lambda r: distance * r / math.sqrt(1 - r * r))
 
     def in_sines(self, distance: float) -> Rim:
-        """Return this rim, which lies on a plane at a distance [m] from the image, in sines of directions.
+        """Convert this rim from positions on a plane at a distance [m] from the image to sines of directions.
 
         The result is centred on the origin.
         """
@@ -81,10 +81,11 @@ class Rim:
 def rim_around(lit: np.ndarray, dark: np.ndarray | None = None) -> Rim:
     """Return the rim of a convex pupil from the positions (2, n) of its illuminated samples.
 
-    Circle and oval are least-squares fits to all corners of the convex hull. On a grid with an even number of samples,
-    a single sample can lie on the rim, so it must not determine the fit. If neither fits, the rim is the hull. If there
-    are also dark samples, each edge of the hull is moved outwards: half way to the nearest dark sample or, if none is
-    near, to the circle or oval around all samples.
+    Circle and oval are least-squares fits to all corners of the convex hull. If a grid has an even number of samples
+    and one at the centre, it extends farther to one side, where a single sample may lie on the rim. This sample must
+    not determine the fit. If neither fits, the rim is the hull. If there are also dark samples, each edge of the hull
+    is moved outwards: half way to the nearest dark sample or, if none is near, to the circle or oval around all
+    samples.
 
     dark: positions (2, m) of samples without light. None: unknown.
 
@@ -124,8 +125,8 @@ def _hull(points: np.ndarray) -> Any:
 def _cut(hull: Any, dark: np.ndarray, apart: float) -> np.ndarray:
     """Return the hull's corners after its edges were moved half way to dark samples or out to the rim of all samples.
 
-    apart: distance between samples. A dark sample limits an edge if it lies outside the edge and at most NEXT times
-    this distance away.
+    apart: distance between samples. A dark sample limits an edge if it lies in front of the edge (not beyond its ends),
+        and less than NEXT times this distance away.
     """
     from scipy.spatial import HalfspaceIntersection
 
@@ -148,9 +149,10 @@ def _cut(hull: Any, dark: np.ndarray, apart: float) -> np.ndarray:
 
 
 def _round(hull: Any) -> tuple[np.ndarray, float, np.ndarray | None, float]:
-    """Return centre and radius of a circle, the vertices of an oval if it fits better (else None), and the residual.
+    """Return centre and radius of a circle, vertices of an oval if it fits much better (else None), and the residual.
 
-    The residual is that of the oval or, if there is none, of the circle. It is relative to the radius.
+    The residual is that of the oval or, if there is none, of the circle; infinite if the hull fills too little of the
+    circle. It is relative to the radius.
     """
     corners, area = hull.points[hull.vertices], hull.volume  # Qhull calls the area of a plane hull its volume
     middle, radius, ragged = _circle(corners)
@@ -177,8 +179,9 @@ def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
 def _oval(corners: np.ndarray) -> tuple[np.ndarray, float]:
     """Return a polygon with the area of an oval around the corners of a hull, and the relative residual of the fit.
 
-    The oval is an ellipse whose radius is multiplied by a Fourier series of the angle, because the image of a round
-    stop is an ellipse only to first order. The residual is infinite if the best conic is not an ellipse.
+    The oval is an ellipse. Its radius is multiplied by a Fourier series of the angle if this improves the fit much,
+    because the image of a round stop is an ellipse only to first order. The residual is infinite if the best conic is
+    not an ellipse.
     """
     origin = corners.mean(axis=0)
     x, y = (corners - origin).T

@@ -42,7 +42,7 @@ def all_slopes(pupil: HasPath, wavelength: float, distance: float, angle: tuple[
 
 
 def _grid(pupil: HasPath, n: int) -> Grid:
-    """Return a grid over the disk and its soft edge."""
+    """Return a grid of n² points over the pupil's disk and the soft edge around it."""
     return Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
 
 

@@ -1,8 +1,9 @@
-"""Field of polarised light along rays, just behind a pupil, expressed by masks.
+"""Field of polarised light just behind a pupil, computed for its rays and expressed as masks of the pupil.
 
 A ray is perpendicular to the wavefront, so its direction is s = ∇L/n, where L is the path from the source through the
-pupil. The electric field is rotated together with the ray, along the shortest arc. This is the effect of a lens that
-neither reflects nor absorbs (Richards & Wolf, Proc. R. Soc. A 253, 358, 1959, §2).
+pupil, and n the refractive index behind it. The electric field is rotated together with the ray, along the shortest
+arc. This is the effect of a lens that neither reflects nor absorbs (Richards & Wolf, Proc. R. Soc. A 253, 358, 1959,
+§2).
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def turned(field: Vector, before: Vector, after: Vector) -> Vector:
 
 
 def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
-    """Return the direction of light from a distant source, and its field if it is polarised along x (0) or y (1)."""
+    """Return the direction of a source's light, and its field: the unit vector x (0) or y (1), turned with it."""
     x, y = (math.tan(angle) for angle in source.angle)
     length = math.hypot(x, y, 1)
     along = (x / length, y / length, 1 / length)
@@ -48,9 +49,9 @@ def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
 
 
 def rays_behind(beam: Beam, x: Array, y: Array) -> Vector:
-    """Return the directions of rays that leave the pupil at points (x, y) [m]: unit vectors of arrays like x.
+    """Return directions (x, y, z) of rays that leave the pupil at points (x, y) [m], each component an array like x.
 
-    The z component is 0 for evanescent light.
+    They are unit vectors, except for evanescent light, whose z component is 0.
     """
     radius, bare = beam.pupil.radius, replace(beam.pupil, mask=None)
     step, per = like(x, STEP * radius), like(x, 1 / (2 * STEP * radius * beam.index))
@@ -102,7 +103,7 @@ class RayField(Mask):
     def bandwidth(self, level: float, radius: float) -> float:
         """Return a bandwidth that includes the path, the pupil's own mask and, behind a lens, the rays' directions.
 
-        These directions have singularities at the distances ±if from the axis, with the focal length f.
+        These directions have singularities at the imaginary distances ±i f from the axis, with the focal length f.
         """
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)

@@ -119,7 +119,8 @@ class BSplineRelief(Relief):
     def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
         """Return h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
 
-        With curvature = medium_n / ((n - object_n) f), it is the lens exp(-ik medium_n r²/2f) of a focal length f.
+        With curvature = medium_n / ((n - object_n) f), where the indices are those of a `Pupil`, it is a lens of the
+        focal length f, exp(-ik medium_n r²/2f).
 
         On uniform knots the polar form of x² has the control values X_i² - δ²/3, with the Greville abscissae X_i = (2i
         - 3) a, the knot spacing δ = 2a and the radius a.
@@ -153,7 +154,10 @@ class BSplineRelief(Relief):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True for a constant height or a paraboloid on the axis: the control points are then c₀ + c₁ (i² + j²)."""
+        """True for a constant height or a paraboloid on the axis: c[i, j] is then c₀ + c₁ ((2i - 3)² + (2j - 3)²).
+
+        False if the control points carry derivatives.
+        """
         if is_differentiable(self.control_points):
             return False  # a derivative depends on every control point
         points = self.control_points
@@ -171,7 +175,8 @@ class BSplineRelief(Relief):
 class HeightMap(Relief):
     """Heights [m] sampled at cell centres over the pupil's square, joined by cubic splines (not-a-knot ends).
 
-    samples: (rows, columns), (y, x). Beyond the outermost centres the spline continues for one cell, then linearly.
+    samples: (row, column); rows ascend with y, columns with x. Beyond the outermost centres the spline continues for
+        one cell, then linearly.
 
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
@@ -221,21 +226,21 @@ class HeightMap(Relief):
         return tensor_product(lambda i, j: gather(values, (row + i) * stride + column + j), across, along)
 
     def weighted(self, weights: Any, like_array: Array) -> Array:
-        """Return heights [m] at fixed points, flat, from the result of `spline_weights` for these points.
+        """Return a flat array of heights [m] at fixed points, from the result of `spline_weights` for these points.
 
         like_array: array of NumPy or PyTorch, which determines the library of the result.
         """
         return sparse_product(weights, self._values(like_array).reshape(-1))
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
-        """Return heights (y, x) at positions in units of the radius; NumPy arrays without derivatives."""
+        """Return heights (y, x) at the same positions [radii] along both axes; NumPy arrays without derivatives."""
         return np.asarray(self.height(at[None, :], at[:, None]))
 
     def bandwidth(self, level: float) -> float:
         return band_of(self._heights, level)
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return `Relief.detail` of a central square with the half side `part`, in cycles per length `part`."""
+        """Return `Relief.detail` of a central square, in cycles per half side; `part`: half side [radii], up to 1."""
         return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
     @property

@@ -1,13 +1,13 @@
 """Rays through a sphere whose refractive index depends on the distance from the centre.
 
 Lengths are relative to the sphere's radius, and indices n relative to the medium. A ray that would pass the centre at a
-distance h keeps n r sin i = h, where i is its angle to the radius (Bouguer's theorem). Between entry and exit, it turns
-about the centre by
+distance h if it were straight keeps n r sin i = h, where i is its angle to the radius (Bouguer's theorem). Between
+entry and exit, it turns about the centre by
 
     ψ(h) = 2 ∫ h dr / (r √(n² r² - h²)),
 
 integrated from the turning point, n r = h, to the surface. Its optical path is 2 ∫ n² r dr / √(n² r² - h²). Both
-integrals become smooth with r² = a² + y², where a is the turning point.
+integrals become smooth with r² = a² + y², where a is the radius of the turning point.
 
 Source: Luneburg, Mathematical Theory of Optics, 1964, §27.
 """
@@ -44,8 +44,8 @@ class SphericalIndex:
         """Interpolate a relative index, a function of the relative distance r/R, at Chebyshev points in (r/R)².
 
         Raises:
-            ValueError: n r decreases somewhere, at values below 1. Just outside the sphere it is 1, so light could stay
-                inside.
+            ValueError: n r decreases somewhere, at values below 1 (that just outside the sphere) and below that at the
+                surface. Light could then stay inside.
         """
         found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
         t = np.linspace(0, 1, 20 * TERMS)
@@ -80,8 +80,8 @@ class SphericalIndex:
     def power(self) -> float:
         """Return R/f of rays near the axis, with the sphere's radius R and the focal length f.
 
-        It is the limit of a ray's deviation, divided by its height relative to R: 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n²
-        d(r/R), with the index n at the distance r and t = (r/R)².
+        It is the limit, for small heights, of a ray's deviation divided by its height relative to R: 2 (1 - 1/n(R)) - 4
+        ∫ (dn/dt)/n² d(r/R), with the index n at the distance r and t = (r/R)².
         """
         u, weights = gauss_legendre(NODES)
         bend = self.index.deriv()(u * u) / self.index(u * u) ** 2
@@ -102,7 +102,7 @@ class SphericalIndex:
         """Return values at quadrature nodes along rays of relative height h, (*h.shape, node).
 
         The five values are y = √(r² - a²), where a is the radius of the ray's turning point; the largest y, √(1 - a²),
-        with the shape of h; the index n(r); the index n(a); and √(n² r² - h²).
+        with the shape of h; the index n(r); the index n(a), (*h.shape, 1); and √(n² r² - h²).
         """
         turn = self._turning_point(h)
         end, least = np.sqrt(1 - turn), self.index(turn)[..., None]
@@ -113,7 +113,7 @@ class SphericalIndex:
 
 
 def _solved(rising: Callable[[np.ndarray], np.ndarray], value: np.ndarray) -> np.ndarray:
-    """Return the arguments in [0, 1] at which a function reaches given values, by bisection."""
+    """Return the arguments in [0, 1] at which an increasing function reaches given values, by bisection."""
     low, high = np.zeros_like(value), np.ones_like(value)
     for _ in range(HALVINGS):
         middle = (low + high) / 2

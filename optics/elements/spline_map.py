@@ -53,7 +53,9 @@ def spline_basis(at: np.ndarray, n: int) -> np.ndarray:
 
 
 def spline_weights(x: np.ndarray, y: np.ndarray, rows: int, columns: int) -> Any:
-    """Return the products of both B-splines of all coefficients at points (x, y), a sparse matrix (point, coefficient).
+    """Return the weights of all spline coefficients at points (x, y), a sparse matrix (point, coefficient).
+
+    A weight is the product of a B-spline along x and one along y.
 
     x, y: positions, arrays of any shape. Coefficients are counted row by row.
     """
@@ -104,7 +106,10 @@ def _basis(at: bytes, n: int) -> np.ndarray:
 
 
 def _coefficients(samples: np.ndarray) -> np.ndarray:
-    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, also beyond both ends."""
+    """Return B-spline coefficients c = s - s''/6 of the cubic spline s through samples, along axis 0.
+
+    Beyond both ends, the first two coefficients have the same form, and the others continue linearly.
+    """
     from scipy.interpolate import make_interp_spline
 
     n, margin = len(samples), _margin(len(samples))

@@ -112,7 +112,7 @@ class MaskMap(Mask):
 
     The interpolation is that of HeightMap. For hard edges use apertures instead.
 
-    samples: (rows, columns), (y, x).
+    samples: (row, column); rows ascend with y, columns with x.
     reach: half side [m] of the square, at least the pupil's radius. None: equal to the pupil's radius.
 
     A Dr.Jit or PyTorch tensor may carry derivatives.
@@ -142,7 +142,7 @@ class MaskMap(Mask):
             )
 
     def _most(self) -> float:
-        """Return the largest amplitude of the mask within the circle."""
+        """Return the largest magnitude of the amplitude within the circle that the square encloses."""
         n = FINER * self._map.knots
         at = (np.arange(n) + 0.5) * 2 / n - 1
         return float(np.abs(self._map.on_grid(at)[np.hypot(*np.meshgrid(at, at)) <= 1]).max())
@@ -152,7 +152,7 @@ class MaskMap(Mask):
         return self._map.height(x * scale, y * scale)
 
     def on_grid(self, at: np.ndarray, radius: float) -> np.ndarray:
-        """Return amplitudes (y, x) at positions along either axis, without derivatives.
+        """Return amplitudes (y, x) at the same positions along both axes, without derivatives.
 
         at: positions in units of the pupil's radius.
         radius: radius of the pupil [m].

@@ -87,9 +87,10 @@ class TurbidMedium:
     def in_bands(self, bands: SpectralBands, receptors: Any) -> BandMedium:
         """Return the medium in spectral bands.
 
-        The coefficient of a band is a mean, weighted by the receptors' quantum catch in daylight. At short distances,
-        the change of every receptor's signal per metre is then exact for a white surface. At longer distances, the true
-        transmission of a band is not an exponential function, and `band_error` returns the error.
+        The coefficient of a band is a mean, weighted by the receptors' quantum catch in daylight. If there are at least
+        as many bands as receptor types, the change of every receptor's signal per metre is then exact for a white
+        surface at short distances. At longer distances, the true transmission of a band is not an exponential function,
+        and `band_error` returns the error.
 
         bands: the bands of an eye
         receptors: the receptors for which these bands were made
@@ -102,7 +103,7 @@ class TurbidMedium:
         return BandMedium(c, bands.band_values(_in_daylight(self.veil), receptors, nonnegative=True))
 
     def band_error(self, bands: int, receptors: Any) -> float:
-        """Return the largest error of a signal due to this number of bands, relative to that of white in daylight.
+        """Return the largest error that this number of bands causes, relative to a white surface's signal in daylight.
 
         The maximum is taken over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
         The reference is the integral over the spectrum in steps of 1 nm. Without attenuation the error is 0.
@@ -134,10 +135,10 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
     """Return sea water with the concentration C of chlorophyll [mg/m³], in [0, 30].
 
     Absorption and scattering follow the classic model of case 1 waters, with λ in nm. Absorption is a = a_w + a_p + 0.2
-    a_p(440) exp(-0.014 (λ - 440)), where pure water absorbs a_w, and phytoplankton absorbs a_p = 0.06 A(λ) C^0.65.
-    Scattering is b = b_w + 0.30 C^0.62 (550/λ). Pure sea water scatters b_w = 16.06 · 4.72e-4 (400/λ)^4.32. The veiling
-    light is ½ b/(a + b): water scatters light that comes from above, equally from all directions of the upper
-    hemisphere. The attenuation is c = a + b.
+    a_p(440) exp(-0.014 (λ - 440)), where pure water absorbs a_w, and phytoplankton absorbs a_p = 0.06 A(λ) C^0.65 with
+    the relative absorption A. Scattering is b = b_w + 0.30 C^0.62 (550/λ). Pure sea water scatters b_w = 16.06 ·
+    4.72e-4 (400/λ)^4.32. The veiling light is ½ b/(a + b): water scatters light that comes from above, equally from all
+    directions of the upper hemisphere. The attenuation is c = a + b.
 
     Sources: Gordon & Morel (1983), Remote Assessment of Ocean Color; Morel (1974); Mobley (1994), Light and Water,
     equations 3.27 and 3.40. The sources of the absorption are in `water_absorption` and `phytoplankton_absorption`.
@@ -176,7 +177,7 @@ MEDIA_OF_WORLDS = (AIR, "clear_ocean", "coastal_water", "fog")
 
 
 def turbid_medium(name: str) -> TurbidMedium | None:
-    """Return a medium of worlds by its name; None for clear air.
+    """Return a medium that fills a world, by its name; None for clear air.
 
     name: "air", "clear_ocean" (`sea_water(0.15)`), "coastal_water" (`sea_water(1)`) or "fog" (`fog(50)`)
 
@@ -194,7 +195,7 @@ def medium_of(name: str, value: Any) -> TurbidMedium | None:
     name: name of the argument, for the error message
 
     Raises:
-        ValueError: the argument is of another kind.
+        ValueError: the argument is of another kind, or the name is unknown.
     """
     if value is None or isinstance(value, str):
         return None if value is None else turbid_medium(one_of(name, value, MEDIA_OF_WORLDS))

@@ -191,7 +191,7 @@ class Zernike(Aberration):
         return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return 0, because a mode has only n/2 cycles. Its slopes cause higher frequencies, in proportion to n²."""
+        """Return 0: a mode has only n/2 cycles, and its slopes, in proportion to n², account for higher frequencies."""
         return 0.0
 
     @property
@@ -235,8 +235,9 @@ class Zernike(Aberration):
 class WavefrontMap(Aberration):
     """A wavefront W [m], sampled at cell centres over the square [-radius, radius]² and interpolated by cubic splines.
 
-    samples: W, (rows, columns), (y, x). Values are positive if the wavefront is ahead, as in Zernike: they are the
-        negative of an optical path difference. They must be unwrapped, and finite and smooth outside the pupil, too.
+    samples: W, (row, column); rows ascend with y, columns with x. Values are positive if the wavefront is ahead, as in
+        Zernike: they are the negative of an optical path difference. They must be unwrapped, and finite and smooth
+        outside the pupil, too.
     radius: half side [m] of the square, at least the pupil's radius. None: the pupil's radius.
 
     A Dr.Jit or PyTorch tensor may carry derivatives.

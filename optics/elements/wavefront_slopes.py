@@ -42,7 +42,7 @@ def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) 
 
     points: x, y, ∂L/∂x and ∂L/∂y of points of the pupil, where L is the optical path to the point.
     to: x and y of the target points.
-    bend: refractive index n and distance z [m] of the targets' plane.
+    bend: refractive index n behind the pupil, and distance z [m] of the targets' plane.
     """
     x, y, px, py = points
     dx, dy = x - to[0], y - to[1]

@@ -46,9 +46,9 @@ def _jacobi(order: int, highest: int, t: Any) -> Iterator[Any]:
 
 
 def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: np.ndarray, y: np.ndarray) -> Any:
-    """Return Σ w Z_n^m at (x, y) for weights w of the modes `named`, (n, m), as an array of the library of `weights`.
+    """Return Σ w Z_n^m at (x, y), one w for each mode (n, m) in `named`, as an array of the library of `weights`.
 
-    Unless they are too large, the polynomials are cached, since many wavefronts are evaluated at the same points.
+    The polynomials are cached unless they have too many values, since many wavefronts are evaluated at the same points.
 
     weights: array of NumPy or PyTorch, in float64.
     x, y: positions, float64.

@@ -33,8 +33,8 @@ def choose_bands(
     The number is a power of two. The error is relative to the signal that a white surface gives. It is the sum of two
     terms:
 
-    - The error for coloured surfaces, compared with bands of 1 nm. It is the largest error for reflectances (1 +
-        cos(2πλ/Λ + φ))/2 of any phase φ, where Λ is the width of the receptors' range of wavelengths.
+    - The error for coloured surfaces, compared with 64 bands. It is the largest error for reflectances (1 + cos(2πλ/Λ +
+        φ))/2 of any phase φ, where Λ is the width of the receptors' range of wavelengths.
     - The error of the kernels for white light: the largest difference, over all scenes, between the signals with n and
         with 2n bands.
 

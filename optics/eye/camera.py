@@ -98,14 +98,14 @@ def camera_image(
     samples_per_pixel: cells of the scene per pixel along each axis. Defocused edges need more than one.
     field_zones: number of PSFs along the longer side of the field, or "auto", see `Eye.sight`. 1: the PSF in the middle
         of the field is used everywhere.
-    rng: random generator of the noise. None: no noise; the result belongs to mean numbers of electrons.
+    rng: random generator of the noise. None: no noise, and the mean number of electrons.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
-        focuses an infinitely distant point.
+        focuses an infinitely distant point, or 240 µm without a lens.
     tolerance: relative error of the PSF, see `Eye`.
 
     Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons as float32. There is one channel with a
-    mosaic, and otherwise one for each type. If the pupil carries derivatives, which requires bits=None, the result is a
-    Dr.Jit tensor of electrons. For an eye, the result is that of `Eye.see`. For PyTorch, see
+    mosaic, and otherwise one for each type. If the pupil or `depth` carries derivatives, which requires bits=None, the
+    result is a Dr.Jit tensor of electrons. For an eye, the result is that of `Eye.see`. For PyTorch, see
     `optics.torch.camera_image`.
 
     Raises:

@@ -125,10 +125,10 @@ def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
 
 
 def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np.ndarray:
-    """Return integrals (place, B-spline) of B-splines from the first knot, integrated once or twice.
+    """Return single or double integrals of B-splines from the first knot to each place, (place, B-spline).
 
-    The integral of B_j is the sum of the B-splines of the next degree with index j or higher, times a fraction of the
-    width of B_j (de Boor, A Practical Guide to Splines, ch. X).
+    The integral of B_j is the sum of the B-splines of the next degree with index j or higher, times the width of B_j
+    divided by its degree plus 1 (de Boor, A Practical Guide to Splines, ch. X).
     """
     knots = np.concatenate([knots[:1]] * times + [knots] + [knots[-1:]] * times)
     found: np.ndarray = _bsplines(knots, degree + times, at).toarray()

@@ -63,9 +63,9 @@ class DepthRange:
 
 
 def layers_for(z: Any) -> tuple[str, tuple[float, ...]]:
-    """Return the `depth_layers` of `Eye.see` for a scene, "distinct" or "auto", and the distances [m] of its kernels.
+    """Return the `depth_layers` that `Eye.see` uses for a scene, and the distances [m] on which its kernels depend.
 
-    With "auto", these are the farthest and the nearest distance.
+    The layers are "distinct" or "auto". With "auto", the distances are the farthest and the nearest.
 
     z: distances [m] in the scene, a number or an array.
     """

@@ -58,8 +58,8 @@ class Eye(EyeSpec):
     receptors: types of receptor: "rgb" (three channels: red, green, blue), "lms" (human cones), "honeybee", "goldfish",
         "mouse", "fruit_fly", "blowfly", "dragonfly", "jumping_spider", peak wavelengths of pigments [nm], or
         `Receptors`, which can be a mosaic. This field then contains `Receptors`.
-    waveguide: rhabdom of each receptor. It stands in the middle of the receptor's square, points at the pupil's centre,
-        and accepts light in its guided modes (None: receptors absorb all light on their square).
+    waveguide: rhabdom of each receptor. It stands in the middle of the receptor, points at the pupil's centre, and
+        accepts light in its guided modes (None: receptors absorb all light on their area).
     microvilli: directions and dichroic ratios of the receptors' microvilli: one `Microvilli` for all receptors, or rows
         of `Microvilli`, repeated over the retina from its top left corner. Azimuths are measured in the visual field,
         from right towards up, in the plane perpendicular to the ray through the pupil's centre. Microvilli affect only
@@ -78,7 +78,7 @@ class Eye(EyeSpec):
         receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
 
-    All parameters of the pupil, fov_deg and distances z may be Dr.Jit arrays that carry derivatives. Results that
+    The pupil (see `Pupil`), fov_deg and distances z may contain Dr.Jit arrays that carry derivatives. Results that
     depend on such arrays are Dr.Jit tensors. All other results are NumPy arrays.
 
     Raises:
@@ -135,7 +135,7 @@ class Eye(EyeSpec):
 
         With waveguides, the kernel is the fraction of each scene cell's light that a receptor accepts, averaged over
         the cell. The cells lie around the receptor's direction. Signals are not averaged over the receptor. ky and kx
-        are even if samples_per_receptor is even. The kernel's sum is relative to a square that absorbs all light.
+        are even if samples_per_receptor is even. The sum is relative to receptors that absorb all light.
 
         Raises:
             ValueError: an argument is invalid, the waveguide has no mode, or it is combined with derivatives.
@@ -156,7 +156,7 @@ class Eye(EyeSpec):
         return Retina(self.retina_distance, wavelengths, cell, self.tolerance, *settings)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the fewest bands that meet the tolerance, see `choose_bands`. Errors: see `psf`."""
+        """Return the fewest bands that meet the tolerance. For errors, see `choose_bands` and `psf`."""
         retina = self._retina_of(np.empty(0), self.smallest_receptor, CELLS_FOR_BANDS)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
 
@@ -171,7 +171,7 @@ class Eye(EyeSpec):
     ) -> KernelBank:
         """Return the kernels for a scene with a range of distances and directions.
 
-        Printed, the result shows the chosen numbers of kernels with reasons.
+        When it is printed, the result shows the chosen numbers of kernels with reasons.
 
         z: distances [m] in the scene, a number or an array. Only the nearest and the farthest distance matter, except
             for "distinct" layers.
@@ -288,8 +288,8 @@ class Eye(EyeSpec):
         """Return a table of the eye's limits: see `summary.Description`.
 
         z: distance [m] of the scene.
-        direction_deg: angles (right, up) from the axis of the receptor that the table describes. None: the middle of
-            the field.
+        direction_deg: direction (right, up) [degrees] from the eye's axis, of the receptor that the table describes.
+            None: the middle of the field.
 
         Raises:
             ValueError: the direction is outside the field, or z is not positive.

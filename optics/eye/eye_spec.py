@@ -117,7 +117,7 @@ class EyeSpec:
 
     @property
     def sensor_distance(self) -> Scalar:
-        """Focal length f [m] that relates a distance x on the retina to the angle x/f.
+        """Focal length f [m]: the distance x on the retina from the axis corresponds to an angle with the tangent x/f.
 
         It equals the distance from pupil to retina if the same medium is in front of and behind the pupil.
         """
@@ -151,7 +151,7 @@ class EyeSpec:
 
     @property
     def lattice(self) -> ReceptorLattice | None:
-        """Rectangles of receptors with a `density`, in units of `receptor_size`. None: all receptors are alike."""
+        """Rectangles of the receptors, in units of `receptor_size`; None if no `density` is given."""
         if self.density is None or isinstance(self.density, ReceptorLattice):
             return self.density
         (width, height), middle = self._on_tangent_plane
@@ -211,7 +211,7 @@ class EyeSpec:
 
     @property
     def throughput(self) -> Scalar:
-        """Throughput: squared `relative_aperture`, times the disk's open fraction, times the mask's transmission."""
+        """Squared `relative_aperture`, times the open fraction of the pupil's disk, times the mask's transmission."""
         return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
 
     @property
@@ -224,7 +224,7 @@ class EyeSpec:
 
     @property
     def parallax(self) -> float:
-        """Shift of the image between opposite edges of the pupil, per unit of 1/distance [1/m].
+        """Shift between the images through opposite edges of the pupil, per difference of 1/distance [1/m].
 
         The unit of the shift is the shorter side of an average receptor. For the perfect lens, it is 0.
         """

@@ -79,7 +79,10 @@ def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) 
 
 
 def check_vertical(vertical_fov_deg: float | None, fov_deg: Scalar) -> None:
-    """Raise a ValueError unless the vertical field of view [degrees] is None or valid."""
+    """Raise a ValueError unless the vertical field of view [degrees] is None or valid.
+
+    Only None is valid if `fov_deg` carries a derivative.
+    """
     if vertical_fov_deg is None:
         return
     in_range("vertical_fov_deg", vertical_fov_deg, 1e-3, 170)

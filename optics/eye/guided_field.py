@@ -2,9 +2,9 @@
 
 A point source is imaged at the position v [m] relative to a waveguide. Let E(v) be the fraction of its light on the
 pupil that the waveguide accepts and absorbs. If a receptor occupies the area A of the retina, its kernel is E(v)/A,
-integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area. The
-waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. For a source
-imaged at u and a receptor at r, the kernel is a function of r - u = -v. It is therefore E rotated by 180°.
+integrated over cells. For comparison, the signal of a receptor that absorbs all light is the mean of the image over the
+area A. The waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. For a
+source imaged at u and a receptor at r, the kernel is a function of r - u = -v. It is therefore E rotated by 180°.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ CELL_DIGITS = 4.0  # choice: digits of integrals over cells
 class Guide:
     """A waveguide on a retina.
 
-    focal: f [m]. A receptor at the distance x from the axis sees the angle x/f.
+    focal: f [m]. A receptor at the distance x from the axis sees an angle with the tangent x/f.
     cells: number of cells along a receptor's side.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
     """
@@ -98,7 +98,7 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """Return the accepted fraction of a source's light, E, over the cells of a window.
+    """Return the accepted fraction of a source's light, E, integrated over the cells of a window.
 
     The window is widened until it contains all of E except for a fraction of at most the tolerance, but not beyond the
     half width of `spot` plus the radius of the waveguide's modes.
@@ -132,7 +132,10 @@ class _Cells:
     tolerance: float
 
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return tangents (cell, node) along the row, from its middle, and weights that sum to a cell's side."""
+        """Return tangents (cell, node) of quadrature nodes, from the middle of the row, and the weights of the nodes.
+
+        The weights sum to a cell's side.
+        """
         middle = (np.arange(self.count) - (self.count - 1) / 2) * self.side
         if not from_cell:
             return middle[:, None], np.array([self.side])

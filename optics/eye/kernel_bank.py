@@ -2,7 +2,8 @@
 
 A kernel depends on the position of the light source. Kernels are computed at nodes, and interpolated linearly between
 them (see `kernel_interpolation`). The nodes are evenly spaced over the tangent plane. Along depth they are evenly
-spaced in inverse distance 1/z, because defocus is linear in 1/z, or they are the distances of the scene itself:
+spaced in inverse distance 1/z, because defocus is linear in 1/z, or they are the distances of the scene itself. The
+signal is then
 
     signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
 
@@ -41,8 +42,8 @@ class KernelBank:
     kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
     choices: the chosen numbers of nodes, for depth and for the field.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
-    parallax: shift of the image [cells] between opposite edges of the pupil, per difference of 1/distance [1/m]. It
-        determines where near surfaces hide far ones. 0: no surface hides another, as in renderers whose rays all
+    parallax: shift [cells] between the images through opposite edges of the pupil, per difference of 1/distance [1/m].
+        It determines where near surfaces hide far ones. 0: no surface hides another, as in renderers whose rays all
         pass the middle of the pupil.
     """
 
@@ -70,7 +71,7 @@ class KernelBank:
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
     def check(self, shape: tuple[int, int], bands: int, *, averaged: bool) -> None:
-        """Raise a ValueError unless the bank fits a retina of `shape` cells, these bands and these receptors."""
+        """Raise a ValueError unless the retina's cells, the number of bands and `averaged` are those of the bank."""
         if (shape[0] / 2, shape[1] / 2) != self.field:
             made = " x ".join(f"{2 * half:g}" for half in self.field)
             raise ValueError(f"sight is for a retina of {made} cells: must be for {shape[0]} x {shape[1]}")

@@ -32,12 +32,8 @@ window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         several sources and wavelengths through one pupil, from the same samples
 pixel_nodes          nodes of pupils of pixels, for `low_rank` at coarse tolerances
 sampled_path         reliefs and wavefronts at samples of the pupil, from arrays that many pupils share
-<<<<<<< HEAD
-window_check         error of such PSFs, by a sum over other samples in a few places
-window_crossings     these places: crossings of rows and columns that are drawn with the light
-=======
-window_check         error of PSFs from the samples of `window_plan`, by a sum over other samples
->>>>>>> 77ce569b2d26949b19ee11e4bfa12cd07f6018f0
+window_check         error of PSFs from the samples of `window_plan`, by a sum over other samples in a few places
+window_crossings     places of `window_check`: crossings of rows and columns that are drawn with the light
 mirrored_matrix      products with matrices that do not change if rows and columns are mirrored
 window_sums          sums over the pupil for `window_sampling` and `window_stack`, and their adjoint
 far_field            one Fourier transform onto directions for each of a few nodes of the window

@@ -175,7 +175,8 @@ def white_psf(
 
     Raises:
         ValueError: an argument is invalid, or a type of receptor does not absorb the light.
-        AccuracyError: there are too few wavelengths (the message states a sufficient number). See also `optics.psf`.
+        AccuracyError: there are too few wavelengths (the message states a sufficient number or tolerance). See also
+            `optics.psf`.
         BackendError: see `optics.psf`.
     """
     by_itself = isinstance(waves, str) and waves == "auto"
@@ -194,13 +195,26 @@ def white_psf(
         if worst <= tolerance - within:
             return found
         if not by_itself or 2 * count - 1 > MOST_WAVES:
-            more = 2 * math.ceil(count * (1.2 * worst / within) ** 0.25 / 2) + 1
             raise AccuracyError(
                 f"tolerance = {tolerance:g}: {count} wavelengths resolve the spectrum to {worst:.2g}; use "
-                f"waves={more} or 'auto'"
+                f"{_remedy(count, worst, tolerance - within, tolerance)}"
             )
         count = 2 * count - 1
         result = _with_middles(result, psf(pupil, np.linspace(*ends, count)[1::2] * 1e-9, tolerance=within, **asked))
+
+
+def _remedy(count: int, worst: float, allowed: float, tolerance: float) -> str:
+    """Return what to change if `count` wavelengths are too few: their number, or the tolerance if it is the largest.
+
+    worst, allowed: error of the sum over wavelengths, and the largest error that is allowed
+    """
+    more = 2 * math.ceil(count * (1.2 * worst / allowed) ** 0.25 / 2) + 1
+    if more <= MOST_WAVES:
+        return f"waves={more} or 'auto'"
+    enough = tolerance * worst / allowed
+    if enough > 0.5:
+        return "a light or receptors with a smoother spectrum"
+    return f"tolerance={math.ceil(100 * enough) / 100:g}" if enough > 0.1 else f"tolerance={1.05 * enough:.2g}"
 
 
 def _weighed(result: PSFResult, catches: np.ndarray, ends: tuple[float, float]) -> WhitePSF:

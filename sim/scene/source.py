@@ -43,15 +43,15 @@ def specification(source: mujoco.MjSpec | str | Path) -> mujoco.MjSpec:
 
 
 def is_compiled(source: Source) -> bool:
-    """Return whether a source is a compiled model, which has no specification."""
+    """Return whether a source is an MjModel or the path of an MJB file, which have no specification."""
     return isinstance(source, mujoco.MjModel) or (isinstance(source, str | Path) and Path(source).suffix == ".mjb")
 
 
 def with_compiled_color_spaces(source: Source) -> Source:
-    """Return a source of the same model in which linear light is requested explicitly.
+    """Return a source of the same model whose textures request linear light explicitly, by `colorspace="linear"`.
 
-    The request is added to colour textures that the compiler resolves to linear light. A source without such textures
-    is returned unchanged.
+    The request is added to colour textures whose automatic colour space the compiler resolves to linear. A source
+    without such textures is returned unchanged.
 
     Raises:
         ValueError: the source has such textures but is a compiled model, or it does not give a model.

@@ -22,9 +22,10 @@ Spectra = Mapping[str, Spectrum]
 
 
 def resolve(model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None) -> Spectra:
-    """Return spectra by name. Names of tabulated spectra are replaced by the spectra.
+    """Return the spectra by the names of materials and lights.
 
-    Tabulated spectra are those of `optics.REFLECTANCES` and `optics.ILLUMINANTS`.
+    A value that is the name of a tabulated spectrum (`optics.REFLECTANCES`, `optics.ILLUMINANTS`) is replaced by this
+    spectrum.
 
     Raises:
         ValueError: a name is neither a material nor a light of the model, or is both; a value is not a spectrum; or a
@@ -54,13 +55,16 @@ def _resolved(name: str, value: Any, materials: list[str], lights: list[str]) ->
 
 
 def of_geom(model: mujoco.MjModel, geom: int, spectra: Spectra) -> Spectrum | None:
-    """Return the reflectance of a geom's material; None if it has only a colour."""
+    """Return the reflectance of a geom's material; None if the geom has no material or `spectra` do not contain it."""
     material = int(model.geom_matid[geom])
     return spectra.get(model.material(material).name) if material >= 0 else None
 
 
 def in_daylight(reflectance: Spectrum) -> Spectrum:
-    """Return the emission of a surface with this reflectance in unit daylight, at the wavelengths of both tables."""
+    """Return the emission of a surface with this reflectance in unit daylight.
+
+    It is tabulated every 5 nm from 300 to 780 nm, and at the wavelengths of the reflectance's table in this range.
+    """
     entries = {*np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1, 5.0), *reflectance.wavelengths_nm}
     nm = np.array([x for x in sorted(entries) if LIMITS_NM[0] <= x <= LIMITS_NM[1]])
     return Spectrum(tuple(nm), tuple(reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)))

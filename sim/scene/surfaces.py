@@ -35,7 +35,7 @@ def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
 def set_rgba(color: Sequence[float]) -> np.ndarray:
     """Return a colour (4,) for a geom.
 
-    The grey (0.5, 0.5, 0.5, 1), which MuJoCo interprets as unset, is replaced by the nearest grey.
+    The grey (0.5, 0.5, 0.5, 1), which MuJoCo interprets as unset, is replaced by the next lighter grey.
     """
     found = np.array(color, np.float32)
     if np.array_equal(found, UNSET_RGBA):
@@ -46,7 +46,7 @@ def set_rgba(color: Sequence[float]) -> np.ndarray:
 def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
     """Return the display-referred colour (4,) of a geom.
 
-    By MuJoCo's rule, it is the geom's own colour if set, else its material's colour.
+    By MuJoCo's rule, it is the geom's own colour if this is set or there is no material, else the material's colour.
     """
     own = model.geom_rgba[geom]
     material = model.geom_matid[geom]
@@ -59,7 +59,7 @@ def visible(model: mujoco.MjModel, groups: Sequence[int]) -> list[int]:
     """Return the ids of the visible geoms: all geoms in these groups that are not completely transparent.
 
     Raises:
-        ValueError: a group is not a whole number.
+        ValueError: `groups` is not a collection of whole numbers.
     """
     if not is_sized(groups) or not all(isinstance(g, int | np.integer) and not is_boolean(g) for g in groups):
         raise ValueError(f"groups = {shown(groups)}: must be numbers of geom groups, such as (0, 1, 2)")
@@ -67,7 +67,7 @@ def visible(model: mujoco.MjModel, groups: Sequence[int]) -> list[int]:
 
 
 def require_geoms(model: mujoco.MjModel, geoms: Sequence[int], where: str = "") -> None:
-    """Raise a ValueError if no geom can be mirrored, for example because MuJoCo has discarded the visuals of a URDF.
+    """Raise a ValueError if `geoms` is empty, for example because MuJoCo has discarded the visuals of a URDF.
 
     where: beginning of the error message
     """
@@ -94,9 +94,10 @@ def texture_id(model: mujoco.MjModel, geom: int) -> int:
 
 
 def texture_repeat(model: mujoco.MjModel, geom: int, size: np.ndarray) -> np.ndarray:
-    """Return the texture's repeats (u, v) over a geom.
+    """Return the numbers (u, v) of repetitions of the texture over a geom, (2,).
 
-    They are the material's repeats, multiplied by the geom's size along x and y if the material has `texuniform`.
+    They are the material's `texrepeat`. If the material has `texuniform`, they are multiplied by the geom's half sizes
+    along x and y, except where a half size is 0.
 
     size: half sizes of the geom, see `sim.scene.shapes.half_sizes`
     """
@@ -127,7 +128,7 @@ def image(model: mujoco.MjModel, texture: int) -> np.ndarray:
 
 
 def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray:
-    """Return a texture's image times a display-referred colour (3,), in linear light, (height, width, 3)."""
+    """Return a texture's image, multiplied by a display-referred colour (3,), as linear light, (height, width, 3)."""
     pixels = image(model, texture)
     return pixels * decode_srgb(color) if is_linear(model, texture) else decode_srgb(pixels * color)
 

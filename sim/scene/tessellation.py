@@ -111,7 +111,8 @@ def box(half_size: np.ndarray) -> Triangles:
 def strip(half_sides: np.ndarray) -> Triangles:
     """Return a horizontal rectangle, divided into pieces along its longer side.
 
-    Each piece is about as long as its distance from the middle. (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2).
+    The piece in the middle is a square. Each other piece is at most as long as its distance from the middle.
+    (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2).
 
     half_sides: half lengths (sx, sy) of the sides [m], (2,)
     """
@@ -129,7 +130,7 @@ def strip(half_sides: np.ndarray) -> Triangles:
 def ellipsoid(semi_axes: np.ndarray) -> Triangles:
     """Return an ellipsoid.
 
-    Its texture coordinates are u = azimuth / 2π and v = polar angle / π from +z, of the unit sphere before scaling.
+    Its texture coordinates are those of the unit sphere before scaling: u = azimuth / 2π, v = polar angle from +z / π.
 
     semi_axes: lengths of the semi-axes along x, y, z [m], (3,)
     """
@@ -181,8 +182,8 @@ def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
     """Return a mesh asset with one vertex per corner of each face.
 
     Vertices are not shared, because normals and texture coordinates have separate indices. In a mesh without texture
-    coordinates, a corner gets the normal of its face if the two normals differ by more than 37°, as in MuJoCo's
-    renderer.
+    coordinates, a corner whose normal differs from that of its face by more than 37° gets the face's normal, as in
+    MuJoCo's renderer.
     """
     faces = slice(model.mesh_faceadr[mesh_id], model.mesh_faceadr[mesh_id] + model.mesh_facenum[mesh_id])
     vertices = model.mesh_vert[model.mesh_face[faces].ravel() + model.mesh_vertadr[mesh_id]].astype(float)

@@ -37,10 +37,10 @@ def on_gpu() -> bool:
 
 
 def computed(*values: Any) -> None:
-    """Compute these values now if the device is a GPU.
+    """Compute these values now, in a separate kernel, if the device is a GPU.
 
-    OptiX supports one scene per kernel. It ignores further scenes, and reports them only by a line on stderr. On the
-    CPU, everything is computed in one kernel.
+    A kernel must contain only one scene, because OptiX ignores further scenes and reports them only by a line on
+    stderr. On the CPU, everything is computed in one kernel.
     """
     if on_gpu():
         dr.eval(values)
@@ -55,7 +55,7 @@ def variant(name: str | None = None) -> Iterator[None]:
     name: the variant; None: that of the device
 
     Raises:
-        optics.BackendError: LLVM is requested and cannot run.
+        optics.BackendError: LLVM is requested and cannot run, or `name` is None and the device is not available.
         ImportError: Mitsuba lacks the variant.
     """
     name = name or default_variant()

@@ -133,10 +133,10 @@ class Variation:
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Return the factors of `light` at all combinations of the ends of its ranges, (case, band).
+        """Return the lights' factors at all combinations of the ends of their ranges, (combination, band).
 
-        They include the largest factor over all bands. In a single band, values inside the ranges may give a larger
-        factor, which is up to a third larger for ranges from warm to cold light.
+        They are 1 if light does not vary. They include the largest factor over all bands. In a single band, values
+        inside the ranges may give a larger factor, which is up to a third larger for ranges from warm to cold light.
         """
         names = self.of_light
         ends = [self.ranges[name] for name in names]
@@ -158,7 +158,7 @@ _FORM = {
 
 
 def kind_of(name: str) -> str:
-    """Return the quantity of a range: "light", "color_temperature", "size", "color", "material" or "start".
+    """Return the quantity in a range's name: "light", "color_temperature", "size", "color", "material" or "start".
 
     Raises:
         ValueError: the quantity is unknown.
@@ -202,7 +202,7 @@ def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _corners(name: str, given: Any) -> np.ndarray | None:
-    """Return (low, high) as an array (2,) or (2, 3); None unless `given` is such a pair of finite numbers."""
+    """Return (low, high) as an array (2,) or (2, 3); None if `given` has another shape or is not finite."""
     given = full_precision(name, given)
     try:
         corners = np.asarray(given, float)

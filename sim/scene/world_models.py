@@ -36,8 +36,8 @@ class WorldModels:
     n: number of worlds
     variation: ranges of the quantities that differ between worlds; None: nothing differs
     models: models of the worlds; a single one for all, unless `own` is True
-    own: True if each world has its own model, because a quantity differs between worlds or a task changes the model
-        (`separate`). Each episode then starts from the compiled model.
+    own: True if each world has its own model, because sizes, colours or materials differ between worlds, or because
+        a task changes the model (`separate`). Each episode then starts from the compiled model.
     varied: names of the geoms whose size, colour or material differs, each with the materials that episodes may choose
 
     Raises:
@@ -79,7 +79,7 @@ class WorldModels:
         self._settings[world].restore(held)
 
     def differs(self) -> bool:
-        """Return whether the model that worlds share has changed since it was compiled."""
+        """Return whether the model that worlds share has changed since compilation; False if each world has its own."""
         return not self.own and self.get_state(0) != self._compiled
 
     def noted(self) -> bytes:
@@ -184,7 +184,8 @@ def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | 
     """Return the field of mjData that contains an object's place, and the indices in this field.
 
     Raises:
-        ValueError: the object is not one that can be placed between the ends of this range.
+        ValueError: the object is not a hinge or slide joint (for a range of numbers), nor a mocap body or a body with
+            a free joint (for a range of points).
     """
     assert variation is not None
     spatial = np.ndim(variation.ranges[name][0]) == 1

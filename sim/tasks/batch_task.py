@@ -50,9 +50,9 @@ class Agent:
 class BatchTask(TaskSettings):
     """A task whose methods receive all worlds at once.
 
-    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task` without `others`,
-    together with those listed below. Arrays have one row for each world. The argument `worlds` of the methods is the
-    object that `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays
+    A subclass must define `model`, `mounts`, and `rewards` or `judge`. The settings are those of `sim.Task` without
+    `others`, together with those listed below. Arrays have one row for each world. The argument `worlds` of the methods
+    is the object that `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays
     (`worlds.qpos`, `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task`
     tests whether a task follows this description.
 
@@ -66,8 +66,8 @@ class BatchTask(TaskSettings):
         not listed has no limits
     ramped: terms of the reward whose weight `evolve` reduces at the beginning of training if the setting
         `learning.contact_ramp` is above 0
-    counted: titles of rows in a report's table of an episode, by reward term. A row shows the number of actions in
-        which the term is not 0
+    counted: titles by reward term. For each of these terms, reports show the number of actions in an episode in which
+        the term is not 0, in a row with this title
     compared_light: level of light (see `Fidelity`) with which `evolve` compares eyes, for example "direct"; None: the
         level in `fidelity`
     """
@@ -208,7 +208,7 @@ class BatchTask(TaskSettings):
         return (Agent(label, n_actions, kinds_of(self), auxiliary, first),)
 
     def streams(self, seed: Any, n: int) -> RandomStreams:
-        """Return the random streams of the worlds.
+        """Return the random number generators ("streams") of the worlds.
 
         seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
         """
@@ -228,7 +228,7 @@ class BatchTask(TaskSettings):
         failed: the worlds that have already failed, each with the reason
 
         Raises:
-            ValueError: `act` returned something else than a mapping from indices of worlds, or None.
+            ValueError: `act` returned neither None nor a mapping from indices of worlds.
         """
         broken = self.act(worlds, actions)
         if broken is None:

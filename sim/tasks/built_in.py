@@ -119,7 +119,7 @@ class AgentTask(BatchTask):
         return (Command("speed", "m/s", MAX_SPEED / 2, 1.0), Command("turn", "°", np.degrees(MAX_TURN)))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
-        """Return whether the first object that the agent reached was a goal; None before it reaches any."""
+        """Return whether a goal (or the goal region) was reached before any adversary; None if neither was reached."""
         if before is not None:
             return before
         if info.get("adversary_first"):

@@ -1,4 +1,4 @@
-"""Several animals in one world, each with its own task. Some learn; others have fixed policies."""
+"""Several animals in one world, each with its own task. Each animal learns or has a fixed policy."""
 
 from __future__ import annotations
 

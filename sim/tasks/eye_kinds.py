@@ -42,7 +42,7 @@ def several(task: TaskSettings) -> bool:
 
 
 def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
-    """Return the kinds of eyes of a task, in the order of the task's dictionary.
+    """Return the kinds of eyes of a task, in the order of the task's dictionary, or the single kind "eyes".
 
     Raises:
         ValueError: `eye`, `mounts` and `fidelity` define different kinds, or a name or a value is invalid.

@@ -17,7 +17,7 @@ NOWHERE = np.empty(0, int)
 
 
 class RewardTerms:
-    """The named terms of the reward for each row.
+    """The named terms of the reward for each learning agent in each world (a "row").
 
     If one agent learns, the rows are the worlds. If several agents learn, the rows of the first agent in all worlds
     come first, then those of the second agent. Terms are stored in one array (term, row). `of_rows`, where rows may
@@ -27,7 +27,7 @@ class RewardTerms:
     terms: values of the terms, (term, row)
 
     Raises:
-        ValueError: `names` is not a sequence of names, or `terms` is not an array of numbers with a row for each name.
+        ValueError: `names` is not a sequence of names, or `terms` is not a 2-D array of numbers, (name, row).
     """
 
     def __init__(self, names: Sequence[str], terms: np.ndarray) -> None:
@@ -93,7 +93,7 @@ class Outcome:
     terminated: True if the task ends the episode, (row,) bool
     success: True if the task is accomplished, (row,) bool
     failure: the worlds that could not continue, by index, each with the reason; their episodes end
-    over: True if a world's episode ends although no row is terminated, for example because of an animal that does not
+    over: True if a world's episode ends even if no row is terminated, for example because of an animal that does not
         learn, (world,) bool; None: False in all worlds
     changed: indices of the worlds in which the task moved bodies after the action, (k,) int
     info: additional entries of each row's `info`; None: no additions

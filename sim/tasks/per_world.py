@@ -195,9 +195,9 @@ def _in_mode(task: Task, mode: str) -> Task:
 
 
 def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
-    """Return the entry "feels", with one row for each world; rows of worlds without new values (None) are NaN.
+    """Return an animal's proprioception as {"feels": (world, value)}.
 
-    The result is empty if no world has values.
+    Rows of worlds without new values (None) are NaN. The result is empty if no world has values.
     """
     size = next((len(row) for row in felt if row is not None), 0)
     if not size:
@@ -206,7 +206,7 @@ def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
 
 
 def _message(error: BaseException) -> str:
-    """Return the message of an error, with function and line if it was raised in the user's file.
+    """Return the message of an error, with the function and line of the user's code in which it occurred, if any.
 
     The error may be a SystemExit or another exception that would end the program. Only Ctrl-C is raised again.
     """

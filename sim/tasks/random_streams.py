@@ -86,7 +86,9 @@ class StreamsByPurpose:
 
 
 class StreamsByWorld:
-    """One generator for each world, which draws all random numbers of its episodes. User tasks use this scheme.
+    """One generator for each world, for all random numbers of the world's episodes except the receptors' noise.
+
+    User tasks use this scheme. The noise follows from `noise_keys`.
 
     seed, n: see `StreamsByPurpose`
     kinds: number of kinds of eyes of each agent

@@ -39,8 +39,8 @@ TERMS = ("progress", "goal", "adversary", "contact")
 class RewardWeights:
     """Weights of the terms.
 
-    Progress is weighted per metre, goal and adversary per reached object, and contact per action in which the agent
-    touched a wall.
+    Progress is weighted per metre. The other terms are weighted per action in which a goal or the goal region is
+    reached, an adversary is reached, or a wall is touched.
     """
 
     progress: float

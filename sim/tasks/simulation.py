@@ -149,7 +149,7 @@ class Simulation:
         """Compute the second half of a step: its outcome. The task may move bodies to new positions.
 
         Raises:
-            ValueError: the task returns an array of the wrong shape.
+            ValueError: the task returns an invalid outcome, for example an array of the wrong shape.
             RuntimeError: the task changes the model that worlds share.
         """
         outcome = self.task.judge(self.physics, failed)
@@ -179,7 +179,10 @@ class Simulation:
         )
 
     def _any_learner(self, rows: np.ndarray) -> np.ndarray:
-        """Return whether a condition (row,) is true for at least one learner of each world, (n,) bool."""
+        """Return, for each world, whether a condition is true for at least one of its learners, (n,) bool.
+
+        rows: the condition for every learner and world, learners first, (learners · n,)
+        """
         return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 
     def poses(self) -> Poses:

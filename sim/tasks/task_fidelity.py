@@ -73,7 +73,7 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
 
 
 def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
-    """Return the fidelities of one agent's eyes, chosen in scenes that contain the other agents.
+    """Return the fidelities of one agent's eyes; "auto" is resolved in scenes that contain the other agents.
 
     number: index of the agent
 
@@ -88,9 +88,9 @@ def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
 
 
 def resolve_other_fidelities(task: Task) -> Task:
-    """Return a copy of the task in which the eyes of its `others` have definite fidelities instead of "auto".
+    """Return a copy of the task whose `others` with a policy have definite fidelities of eyes instead of "auto".
 
-    Environments then need not choose these fidelities again.
+    Environments then need not choose these fidelities again. They do not render the eyes of animals without a policy.
 
     Raises:
         ValueError: see `fidelities_of`.

@@ -32,12 +32,12 @@ class TaskSettings:
     Environments raise a ValueError if a setting is missing or invalid.
 
     model: an MjModel, or a source from which `sim.mirror` can compile one
-    eye: an `optics.Eye`, the optics and retina of every eye, or a `sim.CompoundEye`
+    eye: optics and retina of every eye, an `optics.Eye`; or a compound eye, a `sim.CompoundEye`
     mounts: places of the eyes, one or more `sim.Mount`. If an animal has several kinds of eyes, `eye` and `mounts` are
         dictionaries, such as {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of
         "eyes".
     fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
-        from a few scenes of the task's episodes. Several kinds of eyes have a common value or a dictionary.
+        from a few scenes of the task's episodes. Several kinds of eyes have one fidelity or a dictionary.
     substeps: physics steps per action, 1 to 10⁹
     episode_steps: number of actions after which an episode is truncated, 1 to 10⁹
     spectra: spectra of materials and lights, by name, which replace their colours
@@ -49,8 +49,8 @@ class TaskSettings:
         and inertia, so `model` must not be an MjModel or an MJB file.
         "GEOM.color": colour of a geom. Red, green and blue are each drawn between their values in two colours. The
         colour multiplies a texture.
-        "GEOM.material": one of two or more materials of the model, given by their names, with its texture, colour and
-        emission. The geom must not have an rgba of its own.
+        "GEOM.material": names of materials of the model. The geom gets the texture, colour and emission of one of
+        them. The geom must not have an rgba of its own.
         "JOINT.start": initial position of a hinge [rad] or a slide [m].
         "BODY.start": initial position between two points (x, y, z) [m], of a mocap body or a body with a free joint.
         Except for "light" and "color_temperature", values are set in the world's data or in `data.model`, of which each

@@ -35,10 +35,10 @@ def batched(task: Task | BatchTask | Encounter) -> BatchTask:
 
 
 def require_rewards(task: Task | BatchTask) -> None:
-    """Check that the task of a learner defines rewards.
+    """Check that the task of a learner defines `rewards` or, as a BatchTask, `judge`.
 
     Raises:
-        ValueError: the task defines no rewards.
+        ValueError: the task defines neither.
     """
     judges = isinstance(task, BatchTask) and type(task).judge is not BatchTask.judge
     if getattr(task.rewards, "__func__", None) in (Task.rewards, BatchTask.rewards) and not judges:

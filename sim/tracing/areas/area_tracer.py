@@ -133,11 +133,11 @@ class AreaTracer:
         return left, right
 
     def buffers(self, n_envs: int) -> SphereRows:
-        """Return buffers for the rows of `n_envs` worlds."""
+        """Return a buffer for the centres of the spheres in `n_envs` worlds."""
         return self.rays.buffers(n_envs)
 
     def bodies(self, rows: Array, world: Array, stand: Array) -> list[Array]:
-        """Return the centres of the bodies in a lane's world; stand: position of the eyes' own body."""
+        """Return the centres of all bodies in each lane's `world`; stand: position of the eyes' own body."""
         return self.rays.all_bodies(centres_in(rows, len(self.rays.world.spheres), world), stand)
 
     @property
@@ -237,9 +237,9 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(self, area: Area, sphere: LitSphere, strip: Strip) -> list[Array]:
-        """Return the fraction of a strip that no other sphere hides, and the strip's light.
+        """Return the fraction of a strip of a sphere that no other sphere hides, and the strip's light per component.
 
-        The light is multiplied by the fraction of the area that the strip fills, per component.
+        The light is multiplied by the fraction of the area that the strip fills.
         """
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
         texture = self._sphere_textures[k]
@@ -264,7 +264,7 @@ class AreaTracer:
         return total
 
     def _not_hidden(self, area: Area, k: int, slice_: Slice, now: FrameState) -> Array:
-        """Return the fraction of a slice that no other sphere hides, if hidden parts overlap at random."""
+        """Return the fraction of a slice of sphere k that no nearer sphere hides, if hidden parts overlap at random."""
         way = now.bodies[k] - area.origin
         bare = mi.Float(1)
         for j, other in enumerate(self._visible_bodies(now)):
@@ -288,7 +288,8 @@ def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
     """Return eight numbers per face, flat, from which the kernel finds the texture at a point.
 
-    They are the texel's column as an affine function of (x, y, z), the texture's first texel and its number of columns.
+    They are the four coefficients of the texel's column as an affine function of (x, y, z), the texture's first texel,
+    its number of columns, and two zeros.
     """
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows

@@ -1,10 +1,10 @@
 """The walls behind an area: the faces at its left and right borders, and the edge between them.
 
 The coordinate a runs across an area (`sim.tracing.areas.patch.Area`). An upright eye at the height z sees a wall in
-column a at the distance t, in units of the horizontal part of the direction. The foot of the wall is visible at the
-slope (floor - z)/t, and its top at (top - z)/t. The inverse distance 1/t is linear in a, so the fractions of the area
-that floor, wall and sky fill have closed forms. If rays at the two borders of the area hit different walls, a corner or
-an edge lies between them. Its column is computed from the ends of the walls.
+column a at the distance t. The unit of t is the length of the direction's horizontal part. The foot of the wall is
+visible at the slope (floor - z)/t, and its top at (top - z)/t. The inverse distance 1/t is linear in a, so the
+fractions of the area that floor, wall and sky fill have closed forms. If rays at the two borders of the area hit
+different walls, a corner or an edge lies between them. Its column is computed from the ends of the walls.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class Columns:
         self.face_ends = floats(_face_ends(walls))
 
     def pieces(self, area: Area, faces: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
-        """Return the left and the right piece. If one wall fills all columns, the right piece is empty.
+        """Return the left and the right piece. If both borders have the same face, the right piece is empty.
 
         faces: indices of the faces at the area's left and right border, see `first_faces`
         """
@@ -141,8 +141,7 @@ class Columns:
     def _edge(self, area: Area, left: Face, right: Face) -> Array:
         """Return the column of the edge between two walls: an end of the nearer wall, or their common corner.
 
-        If both walls end in the area, the surface between them is unknown, and the edge is put in the middle of the
-        gap.
+        If there is a gap between the walls, the surface in the gap is unknown, and the edge is put in the gap's middle.
         """
         ends = dr.minimum(_column_of(area, left.right, 1.0), 0.5)
         begins = dr.maximum(_column_of(area, right.left, -1.0), -0.5)

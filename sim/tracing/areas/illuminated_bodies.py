@@ -30,9 +30,9 @@ Reflected = Callable[[Array, Array, Array], list[Array]]
 class IlluminatedBodies:
     """Computation and lookup of the light on the moving bodies of all worlds.
 
-    A row of the table contains the fractions of the lights at a place, in groups of four ("fours"). The first rows of
-    each body also contain the spherical harmonics of the reflected light around the body, one group of four per
-    component.
+    A row of the table belongs to a place on a body. It contains the fraction of each light that reaches the place, in
+    groups of four ("fours"). The first four rows of a body also contain sixteen spherical harmonics of the reflected
+    light around the body: each row contains four harmonics per component.
 
     shadows: shadows of walls
     directions: directions towards the lights
@@ -49,9 +49,9 @@ class IlluminatedBodies:
         return PLACES * len(self._radii)
 
     def table(self, place: Array, bodies: list[Array], walls_around: Array | None, reflected: Reflected) -> list[Array]:
-        """Return the fraction of each light that reaches a place on a body, followed by the harmonics.
+        """Return rows of the table: the fraction of each light that reaches a place on a body, then four harmonics.
 
-        Both are in groups of four.
+        The fractions are in groups of four. There are four harmonics per component.
 
         Walls block the light at all places. Other bodies block it only at places on a side, not at the place that
         represents the whole body.

@@ -86,7 +86,7 @@ class Illumination:
         self.bodies = IlluminatedBodies(self._shadows, self._directions, self._radii)
 
     def irradiance(self, patch: Patch, now: FrameState) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos(angle of incidence) · visibility over lights."""
+        """Return the irradiance per component: the sum over lights of level · cos(angle of incidence) · visibility."""
         return self.arriving(patch.normal, self.visibility(patch, now))
 
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
@@ -102,7 +102,7 @@ class Illumination:
         return self._for_bodies(past, self._shadows.visibility(patch, self._directions, now.inputs.around))
 
     def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos(angle of incidence) · fraction over the lights.
+        """Return the irradiance per component: the sum over lights of level · cos(angle of incidence) · fraction.
 
         lit: fraction of each light that arrives
         """
@@ -208,7 +208,7 @@ class Illumination:
 
 
 def _mean_colour(rays: ClosedForm, place: np.ndarray) -> np.ndarray:
-    """Return the mean reflectance of a texture with one row, (component,), in the components of reflected light.
+    """Return the mean reflectance of a texture that has one row, for each component of reflected light, (component,).
 
     place: place of the texture in the atlas, see `Atlas.places`
     """

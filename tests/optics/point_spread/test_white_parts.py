@@ -166,7 +166,7 @@ def test_wavelengths_are_doubled_until_the_spectrum_is_resolved(planned):
     assert [len(waves) for waves, _ in asked] == [5]
 
 
-@pytest.mark.parametrize(("waves", "worst"), [(5, 0.06), (21, 0.8), (513, 0.051)])
+@pytest.mark.parametrize(("waves", "worst"), [(5, 0.06), (21, 0.8), (257, 0.051)])
 def test_advice_on_wavelengths_assumes_the_fourth_power(planned, waves, worst):
     planned(worst)
     more = waves * (1.2 * worst / 0.05) ** 0.25
@@ -181,6 +181,16 @@ def test_the_most_wavelengths_are_513(planned):
     asked = planned(*[1.0] * 6, 0.01)
     assert len(optics.white_psf(LENS, receptors=GREEN, tolerance=0.1).waves) == 513
     asked = planned(*[1.0] * 7)
-    with pytest.raises(AccuracyError, match="513 wavelengths resolve the spectrum to 1;"):
+    with pytest.raises(AccuracyError, match="513 wavelengths resolve the spectrum to 1; use a light or receptors"):
         optics.white_psf(LENS, receptors=GREEN, tolerance=0.1)
     assert len(asked) == 7
+
+
+@pytest.mark.parametrize("waves", [513, "auto"])
+@pytest.mark.parametrize(("tolerance", "worst", "enough"), [(0.1, 0.0701, 0.15), (1e-3, 6e-4, 1.3e-3)])
+def test_if_more_than_513_wavelengths_are_needed_the_advice_is_a_tolerance(planned, waves, tolerance, worst, enough):
+    planned(*[worst] * 7)
+    with pytest.raises(AccuracyError, match=rf"resolve the spectrum to {worst:.2g}; use tolerance={enough}$"):
+        optics.white_psf(LENS, receptors=GREEN, tolerance=tolerance, waves=waves)
+    planned(*[worst] * 7)
+    optics.white_psf(LENS, receptors=GREEN, tolerance=enough, waves=waves)
