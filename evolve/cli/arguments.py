@@ -255,7 +255,10 @@ def _add_output(command: argparse.ArgumentParser) -> None:
 
 
 def _add_tables(commands: Commands) -> None:
-    """Add the commands that list tasks, presets, genes or settings, check results, or print a completion script."""
+    """Add the commands that list tasks, presets, genes and settings, or check results and the installation.
+
+    Also add the command that prints a completion script for a shell.
+    """
     validate = _command(
         commands, "validate", "validate.validate", "run validation scripts (in a checkout of the repository)"
     )
