@@ -255,10 +255,7 @@ def _add_output(command: argparse.ArgumentParser) -> None:
 
 
 def _add_tables(commands: Commands) -> None:
-    """Add the commands that list tasks, presets, genes and settings, or check results and the installation.
-
-    Also add the command that prints a completion script for a shell.
-    """
+    """Add the commands that print lists, settings or a completion script, or check results or the installation."""
     validate = _command(
         commands, "validate", "validate.validate", "run validation scripts (in a checkout of the repository)"
     )
@@ -280,10 +277,7 @@ def _add_tables(commands: Commands) -> None:
 def _command(
     commands: Commands, name: str, home: str, meaning: str, directory: bool = False
 ) -> argparse.ArgumentParser:
-    """Add a command and return its parser.
-
-    home: function in `evolve.cli.commands` that runs the command, as "module.function"
-    """
+    """Add a command, which the function `home` runs ("module.function" in `evolve.cli.commands`); return its parser."""
     parser = commands.add_parser(
         name,
         help=meaning,
