@@ -30,8 +30,8 @@ NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the 
 def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = None) -> tuple[int, Level]:
     """Return the smallest number of bands with an allowed error for surfaces of any colour, and its `Level`.
 
-    If no number is accurate enough for the surfaces, return the eye's own number. If some numbers are, but none of
-    them is accurate enough for the medium, return 64.
+    If no number is accurate enough for the surfaces, return the eye's own number. If some numbers are accurate enough
+    for the surfaces, but none of them for the medium, return 64.
 
     allowed: allowed error of a signal
     medium: if it is given, the error for white and black in it must also be allowed
@@ -56,7 +56,8 @@ def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = 
 def own_bands(world: World, eye: optics.Eye) -> Level:
     """Return the level for the eye's own bands, with the error for measured reflectances and for the medium.
 
-    The error for the medium is that for white and black. For RGB colours in clear air, the error is unknown.
+    The error for the medium is that of white and black surfaces seen through it. For RGB colours in clear air, the
+    error is unknown.
     """
     spectra = measured(world.model, world.spectra)
     errors, cases = [], []
@@ -74,9 +75,9 @@ def own_bands(world: World, eye: optics.Eye) -> Level:
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
     """Return the smallest number of depth layers with an allowed error, and its `Level`.
 
-    It is a single PSF for infinity for a perfect lens, or if the bound below is allowed. Otherwise, the errors of
-    several numbers of layers are computed in random views. If none is accurate enough, the result is the largest
-    number. If the PSF cannot be computed for them, it is one PSF for the mean depth.
+    For a perfect lens, or if the bound below is allowed, the result is a single PSF for light from infinity. Otherwise,
+    the errors of several numbers of layers are computed in random views. If none is accurate enough, the result is the
+    largest number. If the PSFs of the layers cannot be computed, the result is one PSF for the mean depth.
 
     Consider light that passes the pupil at the position p. On the retina, light from a point at the distance z is
     displaced by (Δx, Δy) = f p/z relative to light from infinity, with the focal length f. The means of |Δx| and |Δy|
@@ -108,8 +109,8 @@ def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Leve
     """Return the level "direct" if a second reflection adds little, otherwise "bounce", with two reflections.
 
     In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
-    further reflection to the previous one is assumed to be the ratio of the second reflection to direct light. If the
-    tracer cannot follow a second reflection, the result is direct light with an unknown error.
+    further reflection to the previous one is assumed to be the ratio of the second reflection to direct light, but at
+    most 1/2. If the tracer cannot follow a second reflection, the result is direct light with an unknown error.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

@@ -1,8 +1,8 @@
-"""Trials of sampling methods in views of a world, before any kernel is recorded.
+"""Trials of sampling methods in views of a world, before a renderer of the world is built.
 
-A trial renders some of an eye's receptors and compares their signals with signals from many more rays. Errors are
-computed for the populations in `sim.render.populations`. All draws have fixed seeds, so the same world and eyes give
-the same result.
+A trial renders some of an eye's receptors and compares their signals with signals from many more rays. The errors of
+rays and areas are computed for the populations in `sim.render.populations`, those of depth layers only for random
+receptors. All draws have fixed seeds, so the same world and eyes give the same result.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class FidelityTrials:
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Return a function that maps rays per receptor to the root mean square error of signals.
 
-        The result is the largest error of the one or two populations of receptors (`sim.render.populations`).
+        If there are two populations of receptors (`sim.render.populations`), the larger of their errors is returned.
 
         Raises:
             NoRaysError: raised by the returned function if a receptor has no rays.
@@ -93,7 +93,7 @@ class FidelityTrials:
         return error
 
     def have_areas(self, *lights: str) -> bool:
-        """Return whether area sampling is possible in this world for all of these levels of light."""
+        """Return whether this eye and this world permit area sampling with all of these levels of light."""
         if self._eye.lattice is not None:
             return False
         try:
@@ -104,10 +104,7 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """Return a function that maps areas per receptor to errors, see `errors`.
-
-        The errors include the noise of the reference.
-        """
+        """Return a function that maps areas per receptor to errors, with the reference's noise; see `errors`."""
         populations = self._populations(sampling)
         truths = [
             self._signals(self._truth(sampling, p.receptors), sampling.depth, light, p.views, TRUE_RAYS)
@@ -144,7 +141,7 @@ class FidelityTrials:
         return own.trial(rays / np.prod(self._eyes.resolution), receptors)
 
     def reflected_more_often(self, sampling: EyeSampling) -> float:
-        """Return the root mean square of the signals due to more than two reflections, with areas."""
+        """Return the root mean square of the signals due to more than two reflections, computed with area sampling."""
         trial = self._scene.area_trial(sampling, 1, self._receptors)
         twice, all_ = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS[1:])
         return _rms(all_ - twice)
@@ -165,9 +162,9 @@ class FidelityTrials:
         return max(found)
 
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
-        """Return the root mean square error of signals with n instead of the finest layers, for each n in `counts`.
+        """Return, for each n in `counts`, the root mean square error of signals with n depth layers.
 
-        The rays are the same for all numbers of layers. The n layers must be among the finest layers.
+        The reference has the `finest` layers, and the n layers must be among them. The rays are always the same.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -215,10 +212,11 @@ class FidelityTrials:
         return _summed(weights, layers)
 
     def _factors(self, light: str, trial: Trial) -> np.ndarray:
-        """Return the contribution of a component k in band b to channel c: mixing[c, b] basis[k, b].
+        """Return the contribution of component k of the light in band b to channel c: mixing[c, b] basis[k, b].
 
-        The shape is (channel, component, band). With weights W of ray p, receptor r and depth layer l, the signals are
-        signal_c[r] = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p] light_lk[p].
+        The shape is (channel, component, band). `mixing` is the weight of a band, times the aperture's throughput. With
+        weights W of ray p, receptor r and depth layer l, the signals are signal_c[r] = sum_b mixing[c, b] sum_l sum_k
+        basis[k, b] sum_p W_lb[r, p] light_lk[p].
         """
         basis = (self._scene.areas if trial.extent else self._scene.tracers.tracer_for)(light).basis
         return self._eye.aperture_throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)

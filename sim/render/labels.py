@@ -27,7 +27,7 @@ class Labels:
 
     scene: the model and its eyes; Mitsuba traces all rays
 
-    All methods raise a ValueError for poses that `EyeRenderer.signals` refuses.
+    `depth`, `ids` and `flow` raise a ValueError for poses that `EyeRenderer.signals` refuses.
 
     Raises:
         ValueError: the eye is a compound eye, which has no flat retina on which depth and flow are defined.
@@ -56,7 +56,7 @@ class Labels:
         self._distances, self._hits = FrozenKernel(distances), FrozenKernel(hits)
 
     def depth(self, poses: Placed) -> np.ndarray:
-        """Return the depth of each receptor centre's hit point along the eye's axis [m].
+        """Return the depth [m], along the eye's axis, of the point that each receptor's centre sees.
 
         The shape is (env, eye, height, width), float32. The depth is infinite without a hit.
         """
@@ -70,7 +70,7 @@ class Labels:
         return np.concatenate([scene.movers.geoms, geoms])[found].astype(np.int32)
 
     def flow(self, poses: Placed, later: Placed) -> np.ndarray:
-        """Return the optic flow between two moments, to the right and down [receptors].
+        """Return the optic flow between two moments: its components to the right and down [receptors].
 
         It is the motion on the retina of the point that each receptor's centre sees: (env, eye, 2, height, width)
         float32. It is NaN without a hit, or if the point is not in front of the eye at the later moment.
@@ -81,7 +81,7 @@ class Labels:
         return flow_between(self.eye, self.depth(moments[0]), self.ids(moments[0]), moments, frames)
 
     def eye_frames(self, poses: Placed) -> EyeFrames:
-        """Return the pupils [m], (env, eye, 3), and the eyes' frames, (env, eye, 3, 3), in the world."""
+        """Return positions of the pupils [m], (env, eye, 3), and the eyes' frames, (env, eye, 3, 3), in the world."""
         return self.scene.places.frames(self.scene.placed(poses))
 
     @property

@@ -40,7 +40,7 @@ class LightFactors:
 
     @property
     def level(self) -> np.ndarray:
-        """Common factor of all bands in each world, in the shape of signals (env, eye, channel, height, width)."""
+        """Common factor of all bands in each world, (env, 1, 1, 1, 1), to multiply signals."""
         return self.bands[:, :1, None, None, None]
 
     def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:

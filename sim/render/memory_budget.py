@@ -30,8 +30,8 @@ class Demand:
     worlds: number of worlds
     eyes: number of eyes of one agent
     resolution: receptors (height, width) of an eye
-    planes: number of components of light times number of depth layers, which are stored for every ray
-    weights: number of bands times number of depth layers, for each of which weights are stored; 0 without a pupil
+    planes: number of values that are stored for every ray: components of light times depth layers
+    weights: number of sets of weights that are stored: bands times depth layers; 0 without a pupil
     """
 
     rays_per_receptor: float
@@ -78,9 +78,10 @@ def check_memory(demand: Demand) -> None:
 
 
 def available() -> float:
-    """Return the bytes that are available without swapping, in the machine and in its container.
+    """Return the bytes that are available without swapping: the smaller number of the machine and its container.
 
-    The result is infinite if the system does not report them.
+    If the system does not report the machine's available bytes, its total memory is used; infinity if that is unknown,
+    too.
     """
     return min(_of_machine(), _of_container(CGROUPS))
 

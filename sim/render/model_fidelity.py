@@ -2,8 +2,8 @@
 
 A moment is a set of poses. Each moment is rendered with increasing numbers of rays, and with many rays as a reference.
 A receptor with a uniform field needs only one ray. If most receptors have a uniform field, they would hide the error of
-the others. The error is therefore computed only over the other receptors, whose error with the smallest number of rays
-exceeds a tenth of the allowed error.
+the others. The error is therefore computed only over receptors whose error with the smallest number of rays exceeds a
+tenth of the allowed error.
 """
 
 from __future__ import annotations

@@ -30,12 +30,12 @@ def flow_between(
 ) -> np.ndarray:
     """Return how far the point that each receptor sees moves in the image, (world, eye, 2, height, width) float32.
 
-    The motion is to the right and down [receptors], from the first to the second moment. It is NaN if there is no such
-    point, or if the point is not in front of the eye at the second moment.
+    The components are to the right and down [receptors], from the first to the second moment. They are NaN if there is
+    no such point, or if the point is not in front of the eye at the second moment.
 
     depth, ids: depth and geom that each receptor's centre sees at the first moment, (world, eye, height, width)
     moments: poses at both moments
-    frames: eyes' frames at both moments
+    frames: positions of the pupils, and eyes' frames, at both moments
     """
     worlds, eyes = depth.shape[:2]
     geoms, far = ids.reshape(worlds, eyes, -1), depth.reshape(worlds, eyes, -1, 1)

@@ -45,13 +45,13 @@ class PreparedScene:
     varied: names of geoms whose size, colour or material may differ between worlds, see `sim.ModelRenderer`
     tracer: "mitsuba", "closed_form" or "auto", see `sim.BatchedRenderer`
     stand: the body that carries the eyes, if all eyes stand upright on one body; None: derived from the mounts
-    medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the facets of a compound
-        eye keep the index in front of them. None: clear air
+    medium: water or air that fills the world; under water, an `optics.Eye` is immersed, but the refractive index in
+        front of the facets of a compound eye does not change. None: clear air
 
     Raises:
         ValueError: the model lacks the part on which an eye is mounted, an eye is inside a geom in the model's
-            reference pose, or the renderer refuses the model or the tracer (see `sim.BatchedRenderer` and
-            `sim.ModelRenderer`).
+            reference pose (checked if `stand` is None), or the renderer refuses the model or the tracer (see
+            `sim.BatchedRenderer` and `sim.ModelRenderer`).
     """
 
     def __init__(

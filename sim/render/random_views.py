@@ -64,7 +64,7 @@ class RandomViews:
 
 
 def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Return views in random directions from places near the start cells of agents and objects.
+    """Return views in random directions from random places in the start cells of agents and objects.
 
     Objects are on cells in which objects may start. The views are the same at every call, because the seed is fixed.
     """

@@ -119,7 +119,7 @@ class RayKernel:
         return KernelInputs(counted(lanes), counts, one_number(lanes), along, self.tracer.inputs, more, weights)
 
     def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
-        """Return sums over groups of `reduced` adjacent lanes, flat (layer, component, world, eye, sum).
+        """Return sums of the light over groups of `reduced` adjacent lanes, flat (layer, component, world, eye, sum).
 
         lanes: total number of lanes
         """

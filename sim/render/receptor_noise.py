@@ -1,10 +1,10 @@
-"""Receptor noise for all worlds at once: standard normal numbers by Philox, in one frozen kernel.
+"""Receptor noise for many worlds at once: frozen kernels draw standard normal numbers with the generator Philox.
 
 A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
 world's noise therefore depends on the world's own seed and history, and not on other worlds.
 
-This noise has the same mean, variance and third moment as the noise of `optics.Eye.see`, which is drawn as numbers of
-photons (`optics.eye.photoreceptor`).
+This noise has the same mean, and nearly the same variance and third moment, as the noise of `optics.Eye.see`, which is
+drawn as numbers of photons (`optics.eye.photoreceptor`).
 """
 
 from __future__ import annotations
@@ -74,14 +74,14 @@ class Normals:
         return drawn
 
     def _frame(self, parts: list[Array], n: int) -> np.ndarray:
-        """Return the numbers of the first n worlds from the kernel's parts, each flat (world, draw)."""
+        """Return the numbers of the first n worlds from the kernel's output arrays, each flat (world, draw)."""
         ends = (max(self._size - k * self._draws, 0) for k in range(len(parts)))  # columns of each part in use
         used = [part.numpy().reshape(-1, self._draws)[:n, :end] for part, end in zip(parts, ends, strict=True)]
         return np.concatenate(used, axis=1).reshape(n, *self._shape)
 
 
 class _Kernel:
-    """A kernel that is recorded once per width, with its own buffers of keys and of indices of frames.
+    """A kernel for a fixed number of worlds, with its own buffers of keys and of indices of frames.
 
     worlds: number of worlds
     draws: number of draws in each world
@@ -154,15 +154,15 @@ class NoiseModel:
         return shot, NoiseModel(self.sigma) if self.sigma > 0 else None
 
     def largest(self, brightest: float) -> float:
-        """Return the standard deviation of the noise in a signal of 2 * `brightest`."""
+        """Return the largest standard deviation, over receptors, of the noise in a signal of 2 * `brightest`."""
         shot = 0.0 if self.photons is None else 2 * brightest / float(self.photons.min())
         return math.sqrt(self.sigma**2 + shot)
 
     def __call__(self, signals: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Return noisy signals (n, ...) from standard normal numbers z of the same shape, which may be overwritten.
 
-        For each signal s, V is the variance of its noise, and N the number of photons for a signal of 1.
-        Shot noise agrees with the Poisson distribution up to the third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish &
+        For each signal s, V is the variance of its noise, and N the number of photons for a signal of 1. Shot noise
+        nearly agrees with the Poisson distribution up to the third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish &
         Fisher 1938). The third moment matters below a hundred photons.
         """
         if self.photons is None:

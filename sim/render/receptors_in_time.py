@@ -1,7 +1,8 @@
 """Filters between the renderer and the observation: the dynamics of receptors (`optics.ReceptorDynamics`).
 
-A signal is treated as constant within a frame. The filters are exact for such signals, for any length of the frames.
-The state of all filters of a world is one array, so that it can be stored and restored.
+The input of each filter is treated as constant within a frame. For such inputs, the filters are exact for any length of
+the frames; only the latency is rounded to whole frames. The state of all filters of a world is one array, so that it
+can be stored and restored.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ MOST_DELAYED = 1000  # chosen: largest number of frames of latency
 
 
 class ReceptorsInTime:
-    """Receptors of `n` worlds.
+    """Temporal filters of the receptors' signals in `n` worlds.
 
-    dynamics: their temporal properties
+    dynamics: temporal properties of the receptors
     n: number of worlds
     shape: shape of one world's signals, (eye, channel, height, width)
     seconds: duration of a frame [s]

@@ -38,7 +38,8 @@ class ReferenceRenderer:
 
     world, eyes: as in `sim.BatchedRenderer`
     integrator: Mitsuba's integrator: "path", "direct", or a description such as {"type": "path", "max_depth": 3}
-    spp: samples per pixel of an image, 1 to 2³¹ - 1; a cell is one pixel if receptors are square, and several otherwise
+    spp: samples per pixel of an image, 1 to 2³¹ - 1; a cell (see below) is one pixel if receptors are square, and
+        several otherwise
     samples_per_receptor: cells along a receptor's side, 1 to 64; None: 1 for a perfect lens, 4 behind a pupil, and more
         for narrow rhabdoms
     depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is

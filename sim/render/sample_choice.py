@@ -30,9 +30,10 @@ HARDLY_MORE = 1.1  # errors up to this multiple of the smallest error count as c
 def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: Allowed) -> Samples:
     """Return the cheapest samples whose error, including the error due to light that they omit, is allowed.
 
-    If there are none, return the cheapest samples whose error is close to the smallest error.
+    Areas are not tried if a few rays are enough. If no samples are accurate enough, return the cheapest samples whose
+    error is close to the smallest error.
 
-    light: level of light for rays
+    light: level of light (number of reflections) if rays are used
     """
     errors = cache(trials.errors(sampling, light.level))
     perfect = isinstance(sampling, BoxSampling)

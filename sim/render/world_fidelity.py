@@ -66,7 +66,7 @@ def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fideli
 
 
 def _moments(scene: WorldScene) -> Poses:
-    """Return poses from random places and, if there are objects, near one, for trials of compound eyes."""
+    """Return poses at random places and, if there are objects, near an object, for trials of compound eyes."""
     drawn = [random_views, near_views] if scene.world.objects else [random_views]
     views = [draw(scene.world, scene.eyes, MOMENTS) for draw in drawn]
     return Poses.joined(*(scene.poses_at(view.position, view.heading, view.objects) for view in views))

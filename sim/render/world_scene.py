@@ -55,7 +55,7 @@ class WorldScene(PreparedScene):
         self._turns = self._reference.poses.xmat[:, bodies[:1]]
 
     def camera_sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
-        """Return `sampling` for eyes that are not compound eyes."""
+        """Return the result of `sampling`; the eyes must not be compound eyes."""
         found = self.sampling(depth, tolerance)
         assert not isinstance(found, OmmatidialSampling)
         return found
@@ -69,7 +69,7 @@ class WorldScene(PreparedScene):
         return self.poses_at(state.position, state.heading, state.objects)
 
     def poses_at(self, position: np.ndarray, heading: np.ndarray, objects: np.ndarray) -> MovedBodies:
-        """Return the poses of agents and objects.
+        """Return the poses of worlds with agents and objects at these places.
 
         Agents have positions (world, 2) [m] and headings (world,) [rad], and objects have centres (world, object, 3)
         [m].

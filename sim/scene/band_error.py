@@ -24,9 +24,9 @@ def lights_in_bands(
     """Return measured spectra, with lights converted to an eye's bands, and messages about inaccurate lights.
 
     The values of lights at the bands' centres are chosen such that each receptor type has the correct quantum catch
-    from white (`SpectralBands.band_values`). Sampling at the centres would include a spectral line only by chance.
-    Spectra of materials are unchanged. A message names each light for which the bands give a receptor type a wrong
-    quantum catch.
+    from white, as far as values of at least 0 permit this (`SpectralBands.band_values`). Sampling at the centres would
+    include a spectral line only by chance. Spectra of materials are unchanged. A message names each light for which the
+    quantum catch of a receptor type is wrong by more than 0.001 times that of white in daylight.
     """
     materials = {model.material(i).name for i in range(model.nmat)}
     found, off = dict(spectra), []

@@ -80,7 +80,7 @@ def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset
 
 
 def require_finite(model: mujoco.MjModel, name: str) -> None:
-    """Refuse a model with a position, orientation, size or colour that is not finite.
+    """Refuse a model in which a geom, a body, the pose of a light or the colour of a material is not finite.
 
     Raises:
         ValueError: a value is not finite; the message names its element.
@@ -103,7 +103,7 @@ def _copies(element: ElementTree.Element) -> float:
 
 
 def _count(text: str | None) -> float:
-    """Return the number in an attribute; 0 for any other text, which MuJoCo refuses."""
+    """Return the number in an attribute; 0 without the attribute, or for any other text, which MuJoCo refuses."""
     try:
         number = float(text or 0)
     except ValueError:

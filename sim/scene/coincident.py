@@ -1,8 +1,8 @@
 """Geoms whose surfaces coincide. As in MuJoCo, the geom that is defined last is visible.
 
 If two surfaces are in the same place, rounding would decide which of them a ray hits. All renderers therefore move the
-surface of the later geom outwards by a few rounding steps of float32. Coincidence is decided once, in the given pose.
-Planes are moved to their front, so the earlier of two planes is visible from behind.
+surface of the later geom outwards by a small distance, which exceeds the rounding errors of float32. Coincidence is
+decided once, in the given pose. Planes are moved to their front, so the earlier of two planes is visible from behind.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom:
 def _ray_distance(
     data: mujoco.MjData, geom: int, kind: mujoco.mjtGeom, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
 ) -> float:
-    """Return the distance [m] of a geom along a ray, and write the normal there to `normal`; negative for a miss.
+    """Return the distance [m] of a geom along a ray, negative for a miss, and write the normal there to `normal`.
 
     kind: type of the geom
     start, direction: start of the ray [m], and its direction, a unit vector, in the world's frame, (3,)

@@ -1,10 +1,11 @@
 """Cube textures: six square images around a geom, mapped to its triangles.
 
 MuJoCo looks up a cube texture by direction. The direction consists of a point's coordinates in the geom's frame. On
-primitives, these coordinates are divided by the geom's half sizes, unless the texture is uniform. Mitsuba has no such
-texture. Triangles are therefore cut along the seams between faces of the cube. Their texture coordinates refer to one
-image in which the six faces are stacked vertically, in MuJoCo's order R L U D F B: R/L = +x/-x, U/D = +y/-y, F/B =
-+z/-z. The directions of each face's own axes are OpenGL's (table 3.19 of its 2.1 specification).
+primitives, these coordinates are divided by the geom's half sizes (see `directions` for the caps of capsules), unless
+the texture is uniform. Mitsuba has no such texture. Triangles are therefore cut along the seams between faces of the
+cube. Their texture coordinates refer to one image in which the six faces are stacked vertically, in MuJoCo's order R L
+U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The directions of each face's own axes are OpenGL's (table 3.19 of its
+2.1 specification).
 """
 
 from __future__ import annotations
@@ -44,7 +45,8 @@ def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uni
     kind: type of the geom
     uniform: True if the material has `texuniform`
     size: half sizes (3,) along x, y, z; for a capsule, those of its cylindrical side. On a capsule's caps, z becomes
-        ±(1 + d / radius), where d [m] is the distance along z beyond the end of this side.
+        ±(1 + d / radius), where d [m] is the distance along z beyond the end of this side. If `uniform`, this is
+        multiplied by the half size.
     """
     if kind in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_HFIELD):
         found = vertices.copy()
@@ -109,7 +111,8 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
     """Return the triangles, cut into two or three if `side` changes its sign within a triangle.
 
     pieces: values at the corners of each triangle, (triangle, corner, value), interpolated where a triangle is cut
-    side: linear function that is 0 on the seam and changes its sign there, at the corners, (triangle, corner)
+    side: values at the corners, (triangle, corner), of a linear function that is 0 on the seam and changes its sign
+        there
     """
     side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
     crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)

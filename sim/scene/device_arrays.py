@@ -46,7 +46,7 @@ class Divisor:
     """A whole number from 1 to 2³² - 1 by which a kernel divides; all fields are arrays of one element.
 
     Processors have no instruction that divides several whole numbers at once. A kernel would divide lane by lane, which
-    takes as long as a seventh of the rendering of the built-in worlds. `quotient` therefore multiplies and shifts (fig.
+    takes a seventh of the time in which it renders a built-in world. `quotient` therefore multiplies and shifts (fig.
     4.1 in Granlund and Montgomery 1994). The number is an input of kernels, so one kernel serves all numbers.
 
     number: the divisor
@@ -101,9 +101,9 @@ def as_whole_numbers(values: Any) -> np.ndarray:
 
 
 def counted(n: int) -> Array:
-    """Return 0 ... n - 1 in separate memory, which sets the width of a frozen kernel that reads it lane by lane.
+    """Return 0 ... n - 1 in separate memory; a frozen kernel that reads this array lane by lane has n lanes.
 
-    If a kernel reads only tables, Dr.Jit 1.5 derives the kernel's width from one of them. Which table it uses depends
+    If a kernel reads only tables, Dr.Jit 1.5 derives the number of lanes from one of them. Which table it uses depends
     on the state of the process. In one case, Dr.Jit replayed 126 of 128 lanes, and left the last receptors dark without
     a message. tests/test_parameters.py repeats each training run and detects this error.
     """

@@ -1,4 +1,4 @@
-"""Descriptions of a model's features that have no counterpart in its mirror, so that every omission is reported."""
+"""Descriptions of a model's features that its Mitsuba scene (`mirror`) lacks, so that every omission is reported."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NAMED = 4  # largest number of elements of one kind that a message names; it on
 
 
 def left_out(model: mujoco.MjModel, geoms: Sequence[int], groups: Sequence[int]) -> list[str]:
-    """Return messages about features that have no counterpart in a model's mirror.
+    """Return messages about features of a model that have no counterpart in its Mitsuba scene.
 
     The features of visible geoms, of their materials, and of other elements that MuJoCo draws in these groups are
     considered.

@@ -1,4 +1,4 @@
-"""MuJoCo's lights as Mitsuba emitters with the spectrum of daylight.
+"""MuJoCo's lights as Mitsuba emitters with the spectrum of daylight, or with measured spectra.
 
 Units: a light of diffuse 1 gives the irradiance π · daylight(λ) on a surface that faces it. A white Lambertian surface
 there has radiance daylight(λ): D65, 1 at 560 nm. Mitsuba's own `d65` is scaled differently (1.0101 at 560 nm), and its
@@ -37,7 +37,7 @@ _UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 
 
 @dataclass(frozen=True)
 class Emitter:
-    """A light whose position and direction follow mjData.
+    """A light of a scene. If it is one of the model's lights, its position and direction follow mjData.
 
     name: name in Mitsuba's scene
     light: id in the model; -1: not one of the model's lights (the camera's headlight, the sky)
@@ -52,7 +52,7 @@ class Emitter:
 
     @property
     def described(self) -> Description:
-        """Description for a scene of the active variant; it has no shadows if the light casts none."""
+        """Description of the light for a scene of the active variant; without shadows if the light casts none."""
         return self.description if self.casts_shadow else shadowless(self.description)
 
     @property
@@ -119,7 +119,7 @@ def _evaluate(texture: MitsubaObject, nm: Array) -> np.ndarray:
 
 
 def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tuple[list[Emitter], list[str]]:
-    """Return all active lights and the sky, and messages about properties of lights that cannot be mirrored."""
+    """Return emitters of active lights, the headlight and the sky, and messages about omitted features."""
     found, left_out = [], []
     for light in range(model.nlight):
         if not model.light_active[light]:

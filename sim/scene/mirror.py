@@ -1,7 +1,8 @@
 """`mirror(model)`: any MuJoCo model as a spectral Mitsuba scene that follows mjData.
 
-The scene contains all geoms with their materials and textures, lights, the skybox, and cameras. Faces are visible from
-the same side as in MuJoCo, so a camera inside a body sees through its surface. A MirrorWarning lists omitted features.
+The scene contains the visible geoms with their materials and textures, lights, the skybox, and cameras. Faces are
+visible from the same side as in MuJoCo, so a camera inside a body sees through its surface. A MirrorWarning lists
+omitted features.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ VISIBLE_GROUPS = (0, 1, 2)  # groups that MuJoCo draws by default
 
 
 class MirrorWarning(UserWarning):
-    """Warning that names the features of a model that its mirror lacks."""
+    """Warning that names the features of a model that its Mitsuba scene lacks or shows inaccurately."""
 
 
 def mirror(
@@ -49,13 +50,15 @@ def mirror(
     groups: visible geom groups; a geom with alpha 0 is never visible
     variant: a spectral Mitsuba variant; None: the default for this machine. "scalar_spectral" is slow but needs no LLVM
     spectra: reflectances of materials and emission of lights by name, instead of their colours. Each is an
-        `optics.Spectrum` or a name of `optics.reflectance` or `optics.illuminant`. The camera's light is "headlight".
+        `optics.Spectrum` or a name of `optics.reflectance` or `optics.illuminant`. The name of the camera's light is
+        "headlight".
 
     A MirrorWarning lists features that have no counterpart.
 
     Raises:
         ValueError: the model does not compile or has no visible geoms, a body is unknown, `sync` would refuse the data,
-            the variant has no spectra, or `spectra` names an unknown material or one with a coloured texture.
+            the variant has no spectra, or `spectra` names an unknown material or light, or a material with a coloured
+            texture.
         ImportError: Mitsuba lacks the variant, or cannot run it.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
@@ -158,7 +161,7 @@ class Mirror:
         camera: name or id of a camera of the model, or a Viewpoint
         width, height: size of the image [pixels], whole numbers from 1 to 65,536
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}.
-            "direct" shows only emitters behind a transparent geom; a MirrorWarning names such geoms once.
+            Behind a transparent geom, "direct" shows only emitters; a MirrorWarning names such geoms once.
         spp: number of samples per pixel, 1 to 2³¹ - 1
         seed: seed of the samples, 0 to 2¹²⁸
         sampler: "independent", or "multijitter", whose images have less noise
@@ -196,7 +199,7 @@ class Mirror:
         return self._first_hits(camera, width, height)[0]
 
     def render_depth(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
-        """Return the depth along the camera's axis [m] at pixels' centres, (y, x) float32; infinite for no geom.
+        """Return the depth along the camera's axis [m] at pixels' centres, (y, x) float32; infinite without a hit.
 
         Errors: see `render`.
         """

@@ -1,7 +1,7 @@
-"""Fields of a model that physics uses, as bytes, to detect changes at every step and to undo them.
+"""Most fields of a model (and of its `opt` and `stat`) as bytes, to detect changes at every step and to undo them.
 
-Names and large fields (textures, meshes and heights) are not included: changes of these are neither detected nor
-undone.
+Names, texts, large fields (such as textures, meshes, skins and heights) and the fields of `vis` are not included:
+changes of these are neither detected nor undone.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _STRUCTS = ("opt", "stat")
 
 
 class ModelSettings:
-    """Current settings of one model: the values of all fields that physics uses (see the module's docstring)."""
+    """Current settings of one model: the values of the fields that the module's docstring describes."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         fields = [("", model), *((f"{name}.", getattr(model, name)) for name in _STRUCTS)]

@@ -1,4 +1,4 @@
-"""Copy of all poses in mjData at one moment, independent of later simulation."""
+"""Copy of the poses of geoms, cameras and lights in mjData at one moment, independent of later simulation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PoseSnapshot:
 
 
 def checked_data(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """Return the data if they belong to this model and all their poses are finite; otherwise raise a ValueError."""
+    """Return the data if they fit this model and contain finite poses of all geoms; otherwise raise a ValueError."""
     of_kind("mirror: data", data, mujoco.MjData, "mujoco.MjData(model)")
     if data.geom_xpos.shape != (model.ngeom, 3) or data.xpos.shape != (model.nbody, 3):
         raise ValueError(

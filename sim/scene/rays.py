@@ -1,4 +1,4 @@
-"""Rays of a sensor through a scene, as in Mitsuba's film, but at given wavelengths and pixel centres.
+"""Rays of a sensor through a scene: radiance at given wavelengths, and first hits at the pixels' centres.
 
 Faces that MuJoCo does not draw are skipped. The functions use the types of the active variant: whole wavefronts, or one
 ray at a time in a scalar variant.
@@ -80,7 +80,8 @@ class Camera:
         It is the mean over `spp` random positions in each pixel.
 
         sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel, so that images have
-            less noise. Multijitter is not available in scalar variants, or for an spp that it would round.
+            less noise. Multijitter is not available in scalar variants, or if it would round the number of samples in a
+            pass (large images need several passes).
 
         Raises:
             ValueError: the integrator or the sampler is unknown, Mitsuba would apply one of them incorrectly, or `spp`
@@ -155,7 +156,7 @@ class Camera:
     def _sum_of_samples(
         self, method: MitsubaObject, spectrum: list[float], sampler: MitsubaObject, seed: int
     ) -> np.ndarray:
-        """Return the sum of the sampler's samples per pixel, (4 lanes, pixels)."""
+        """Return, for each pixel, the sum of the radiance of all samples, (4 wavelengths, pixels)."""
         width, height = self.size
         n = sampler.sample_count()
         if _is_scalar():

@@ -1,8 +1,8 @@
 """Geoms as Mitsuba shapes.
 
 Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle, sphere, cylinder, disk). Geoms
-for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated, and so are long planes and spheres with
-cube textures. Ellipsoids are tessellated, too, because Mitsuba intersects its own ellipsoids in float32, with wrong hit
+for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated, and so are spheres with cube textures, and
+long planes. Ellipsoids are tessellated, too, because Mitsuba intersects its own ellipsoids in float32, with wrong hit
 points on small, flat or distant ellipsoids.
 """
 
@@ -81,7 +81,10 @@ def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
 
 
 def has_shape(model: mujoco.MjModel, geom: int) -> bool:
-    """Return whether a geom's kind can be mirrored and its asset exists. (A user-defined SDF has no mesh.)"""
+    """Return whether a geom's kind can be mirrored, and its asset exists if it needs one.
+
+    (A user-defined SDF has no mesh.)
+    """
     kind = surfaces.geom_type(model, geom)
     return kind in _PRIMITIVES or (kind in _ASSETS and model.geom_dataid[geom] >= 0)
 
