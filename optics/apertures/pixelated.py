@@ -47,6 +47,11 @@ class PixelatedAperture(Aperture):
     borders: tuple[float, ...] | None = None
     fixed: int | None = None
 
+    @staticmethod
+    def squares(opening: Aperture, count: int) -> PixelatedAperture:
+        """Return the opening with square pixels. Many pupils share the result with its masks of cut pixels."""
+        return _squares(opening, count)
+
     @classmethod
     def between(cls, opening: Aperture, borders: tuple[float, ...], fixed: int | None = None) -> PixelatedAperture:
         """Return the opening with pixels between these borders."""
@@ -177,6 +182,11 @@ class PixelatedAperture(Aperture):
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         raise TypeError("jumps between pixels have no band limit: a soft edge does not make a grid accurate")
+
+
+@lru_cache(maxsize=16)
+def _squares(opening: Aperture, count: int) -> PixelatedAperture:
+    return PixelatedAperture(opening, count)
 
 
 @lru_cache(maxsize=8)

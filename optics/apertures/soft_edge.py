@@ -4,6 +4,9 @@ The kernel is a jinc function multiplied by a Kaiser window along the radius. Co
 aperture's spectrum unchanged up to the frequency `passband` and makes it 0 beyond `stopband`, in both cases to within
 `ripple`. The kernel is 0 beyond the radius `reach`. The transmittance therefore stays 1 or 0 at larger distances from
 the edge. Lengths are in units of the pupil's radius R, frequencies in cycles per R.
+
+Jumps between pixels are softened by the product of one kernel along x and one along y (`SoftEdge.line`), with the same
+Kaiser window and the same frequencies.
 """
 
 from __future__ import annotations
@@ -72,6 +75,35 @@ class SoftEdge:
         `reach` is 1.
         """
         return np.asarray(self._odd_series(np.minimum(r, self.reach)))
+
+    def line(self, x: np.ndarray) -> np.ndarray:
+        """Return the kernel along one axis at positions x, in units of 1/R; 0 beyond `reach`. Its integral is 1."""
+        found, inside = np.zeros(np.shape(x)), np.abs(x) < self.reach
+        found[inside] = self._bare_line(x[inside]) / self._line_integral
+        return found
+
+    def line_response(self, frequencies: np.ndarray) -> np.ndarray:
+        """Return the spectrum of `line` at frequencies from -`stopband` to `stopband`; 1 at frequency 0."""
+        nodes, weights = self._line_nodes
+        wave: np.ndarray = np.cos(2 * pi * np.multiply.outer(frequencies, nodes))
+        found: np.ndarray = wave @ (weights * self._bare_line(nodes)) / self._line_integral
+        return found
+
+    @cached_property
+    def _line_nodes(self) -> tuple[np.ndarray, np.ndarray]:
+        nodes, weights = np.polynomial.legendre.leggauss(int(24 + 8 * self.cycles + self.beta))
+        return nodes * self.reach, weights * self.reach
+
+    @cached_property
+    def _line_integral(self) -> float:
+        nodes, weights = self._line_nodes
+        return float(weights @ self._bare_line(nodes))
+
+    def _bare_line(self, x: np.ndarray) -> np.ndarray:
+        """Return the result of `line` without normalisation."""
+        window = np.i0(self.beta * np.sqrt(np.maximum(1 - (x / self.reach) ** 2, 0)))
+        found: np.ndarray = np.sinc((self.passband + self.stopband) * x) * window
+        return found
 
     @cached_property
     def _odd_series(self) -> Chebyshev:

@@ -47,7 +47,7 @@ class Beam:
     def aperture(self) -> Aperture:
         """Aperture of the pupil, divided into the pixels of its relief if they bend the light."""
         pixels = self.pupil.pixels if self.pupil.bends(self.wavelength) else 0
-        return PixelatedAperture(self.pupil.aperture, pixels) if pixels else self.pupil.aperture
+        return PixelatedAperture.squares(self.pupil.aperture, pixels) if pixels else self.pupil.aperture
 
     def waves(self, x: Array, y: Array) -> Array:
         """Return the optical path at points (x, y) [m], in vacuum wavelengths. For the arrays, see `Relief.height`."""

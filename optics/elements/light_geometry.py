@@ -14,9 +14,10 @@ import numpy as np
 
 from optics.numerics.read_only import read_only
 
-__all__ = ["FEW", "MANY", "LightGeometry", "disk_points", "light_geometry"]
+__all__ = ["FEW", "MANY", "RIM", "LightGeometry", "disk_points", "light_geometry"]
 
 FEW, MANY = 21, 53  # choices: points across the pupil at which slopes are evaluated, without and with fine detail
+RIM, ANGLES = 0, 48  # stands for points on the rim, see `disk_points`; choice: number of these points
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,13 @@ def _kept(beam: tuple[float, ...]) -> LightGeometry:
 
 @lru_cache(maxsize=4)
 def disk_points(across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return positions along an axis, and points (x, y) of the square grid inside the unit disk."""
+    """Return positions along an axis, and points (x, y) of the square grid inside the unit disk.
+
+    across: number of points across the disk. RIM: points on the rim instead, and no positions along an axis.
+    """
+    if across == RIM:
+        angle = 2 * np.pi * np.arange(ANGLES) / ANGLES
+        return read_only(np.empty(0)), read_only(np.cos(angle)), read_only(np.sin(angle))
     grid = np.linspace(-1, 1, across)
     x, y = np.meshgrid(grid, grid)
     inside = np.hypot(x, y) <= 1

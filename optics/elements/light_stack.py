@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.elements.light_geometry import FEW, MANY, LightGeometry, disk_points, light_geometry
+from optics.elements.light_geometry import FEW, MANY, RIM, LightGeometry, disk_points, light_geometry
 from optics.elements.pupil_path import relief_height, wavefront_ahead
 from optics.elements.pupil_polynomials import power_sum, powers_of
 from optics.numerics.autodiff import number
@@ -22,6 +22,8 @@ __all__ = ["LightStack", "StackSlopes"]
 SPHERE_POINTS = (
     8  # choice: number of Chebyshev points across the pupil for spheres, in addition to those of polynomials
 )
+STEEP_POWERS = 5  # choice: number of powers from which on polynomials are much steeper at the rim than elsewhere
+TILT_STEP = 1e-3  # choice: step [radii] of the slopes of oblique waves
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,11 @@ class LightStack:
         mine = [k for k, place in enumerate(places) if int(place) in chosen.intersection(others)]
         found.__dict__["_polynomials"] = read_only(coefficients[np.asarray(places, int)]), mine
         return found
+
+    @cached_property
+    def level(self) -> LightStack:
+        """The light of the same pupils without reliefs."""
+        return LightStack(tuple(replace(beam, pupil=beam.pupil.level) for beam in self.beams))
 
     @cached_property
     def geometry(self) -> LightGeometry:
@@ -195,17 +202,20 @@ class LightStack:
                 found[place] = beam.pupil.amplitude(x[place] / radius, y[place] / radius)
         return found
 
+    def mask_cycles(self, levels: np.ndarray) -> np.ndarray:
+        """Return the cycles per radius above which the masks vary by less than these levels, (beam,)."""
+        return np.array([
+            0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(level, radius) * radius
+            for beam, radius, level in zip(self.beams, self.radius, levels.tolist(), strict=True)
+        ])  # fmt: skip
+
     @cached_property
     def slopes(self) -> StackSlopes:
         """Slopes of the wavefronts at some points of the disks, which may miss the steepest point."""
-        coefficients, others = self._polynomials
+        others = self._polynomials[1]
         pieces = {place: self.beams[place].pupil.pieces(self.beams[place].wavelength) for place in others}
         across = MANY if any(4 * count > FEW for count in pieces.values()) else FEW
-        grid, x, y = disk_points(across)
-        by_x, by_y = _power_slopes(across, coefficients.shape[1])
-        flat, scale = coefficients.reshape(len(coefficients), -1), (self.vacuum_wavelength / self.radius)[:, None]
-        spheres_x, spheres_y = self.geometry.slopes(across)
-        along_x, along_y = flat @ by_x * scale + spheres_x, flat @ by_y * scale + spheres_y
+        (grid, x, y), (along_x, along_y) = disk_points(across), self._smooth_slopes(across)
         for place in range(len(self.beams)):
             if place in others or self._tilted[place]:
                 inside = np.hypot(grid[None, :], grid[:, None]) <= 1
@@ -218,6 +228,31 @@ class LightStack:
                     )
                     along[place] += ((ahead - behind) / (2 * step))[inside]
         return StackSlopes(across, x, y, along_x, along_y)
+
+    @cached_property
+    def rim_slopes(self) -> StackSlopes | None:
+        """Slopes at points on the rim, where polynomials of high order are steepest.
+
+        None if there are no such polynomials. Slopes of maps are omitted.
+        """
+        if self._polynomials[0].shape[1] < STEEP_POWERS:
+            return None
+        _, x, y = disk_points(RIM)
+        along_x, along_y = self._smooth_slopes(RIM)
+        for place in np.flatnonzero(self._tilted):
+            source, index, radius = self.beams[place].source, self._indices[place][1], self.radius[place]
+            for along, (dx, dy) in ((along_x, (TILT_STEP, 0.0)), (along_y, (0.0, TILT_STEP))):
+                ahead, behind = (source.path((x + s * dx) * radius, (y + s * dy) * radius) for s in (1, -1))
+                along[place] += index * (ahead - behind) / (2 * TILT_STEP * radius)
+        return StackSlopes(RIM, x, y, along_x, along_y)
+
+    def _smooth_slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the slopes of polynomials and of spheres about the axis at `disk_points`, along x and along y."""
+        coefficients = self._polynomials[0]
+        by_x, by_y = _power_slopes(across, coefficients.shape[1])
+        flat, scale = coefficients.reshape(len(coefficients), -1), (self.vacuum_wavelength / self.radius)[:, None]
+        spheres_x, spheres_y = self.geometry.slopes(across)
+        return flat @ by_x * scale + spheres_x, flat @ by_y * scale + spheres_y
 
 
 def _powers(values: np.ndarray, count: int) -> np.ndarray:

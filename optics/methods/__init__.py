@@ -27,9 +27,11 @@ window_sampling      `low_rank` at coarse tolerances, for one PSF
 window_plan          as few samples of several pupils as the light in a window needs, at coarse tolerances
 window_geometry      the part of a `window_plan` that does not depend on reliefs and wavefronts
 window_edges         soft edges and densities of the samples of `window_plan`; smoothed waves of wide pupils
+window_bands         frequencies of the light and of these soft edges
 window_rank          rank of the slow factor for the samples of `window_plan`
 window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         several sources and wavelengths through one pupil, from the same samples
+stack_operation      these PSFs as one operation of PyTorch, with the derivatives by the phase of the pupil
 pixel_nodes          nodes of pupils of pixels, for `low_rank` at coarse tolerances
 sampled_path         reliefs and wavefronts at samples of the pupil, from arrays that many pupils share
 window_check         error of PSFs from the samples of `window_plan`, by a sum over other samples in a few places

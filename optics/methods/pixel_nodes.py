@@ -8,7 +8,7 @@ lens, wavefront and path requires for an average point of the window. Light behi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -16,22 +16,23 @@ import numpy as np
 
 from optics.apertures.pixelated import MOST_NODES
 from optics.elements.beam import Beam
-from optics.elements.light_stack import LightStack
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PixelSamples
 from optics.methods.remaining_factor import RemainingFactor
 from optics.methods.sine_samples import SineSamples
 from optics.methods.sine_stack import SineStack
 from optics.methods.slow_factor import RANKS, Path
-from optics.methods.window_geometry import window_geometry
+from optics.methods.window_geometry import half_window, window_geometry
 from optics.methods.window_plan import MOST_ENTRIES, plan_costs
 from optics.methods.window_rank import MOST_RANK, PLACES, RANK_OF_DISTANCE, RANK_SHARE, interpolation_errors
 from optics.numerics.array_library import turned
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.kept_values import cached_arrays
 from optics.numerics.precision import Precision
 from optics.numerics.quadrature import gauss_legendre
+from optics.numerics.read_only import read_only
 
 __all__ = ["PixelNodes", "PixelPlan", "WindowSamples", "pixel_plan"]
 
@@ -39,6 +40,7 @@ QUADRATURE_SHARE = 0.7  # choice: part of the tolerance that quadrature errors m
 PARTS = 0.25, 0.5, 0.75  # choice: open parts of pixels that the edge of the aperture cuts
 LARGEST = 50.0  # largest phase [rad] of the table of errors, for which all numbers of nodes are too small
 PHASES = np.linspace(0, LARGEST, 4001)
+MOST_BYTES = 64e6  # choice, limited by memory: all nodes that are cached
 POINTS = 40  # choice: number of points of the pupil that determine the rank
 
 
@@ -74,13 +76,13 @@ class PixelNodes:
     @property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
         """Nodes (x, y) [m], (y, x)."""
-        x, y = np.meshgrid(self.nodes.at, self.nodes.at)
+        x, y, _ = self.layout
         return x, y
 
     @property
     def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Nodes x and y [m], and their weights [m²], (y, x)."""
-        return *self.points, self.nodes.aperture.weights(self.nodes.across) * self.nodes.radius**2
+        return _layout(self.nodes)
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (x, y) [m] of the pupil in directions (s, t)."""
@@ -128,7 +130,7 @@ class PixelStack(SineStack):
 
     @cached_property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
-        x, y = np.meshgrid(self.nodes.at, self.nodes.at)
+        x, y, _ = _layout(self.nodes)
         return x[None], y[None]
 
     def _cosine2(self, dtype: str = "float64") -> np.ndarray:
@@ -140,6 +142,13 @@ class PixelStack(SineStack):
     def _new_sizes(self, dtype: str) -> np.ndarray:
         weight = self.nodes.aperture.weights(self.nodes.across)[None] * np.square(self.radius[0])
         return np.asarray(weight * self._cosine2() / self.distance[0], dtype)
+
+
+@cached_arrays(MOST_BYTES, lambda layout: sum(part.nbytes for part in layout))
+def _layout(nodes: PixelSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return `PixelNodes.layout`, which many pupils share."""
+    x, y = np.meshgrid(nodes.at, nodes.at)
+    return read_only(x), read_only(y), read_only(nodes.aperture.weights(nodes.across) * nodes.radius**2)
 
 
 WindowSamples = SineSamples | PixelNodes
@@ -170,12 +179,12 @@ def pixel_plan(problem: Problem) -> PixelPlan | None:
         PixelNodes(PixelSamples(aperture, count, problem.radius), problem.window.centre, problem.distance)
         for count in (across, across + 1)
     )
-    rank = _rank(problem, pupil)
+    rank = _rank(pupil, Path.from_problem(problem), problem.tolerance, RANK_OF_DISTANCE if problem.moves else 1)
     inner = 0 if rank is None else rank * len(pupil.at)
     if rank is None or max(inner, len(finer.at)) > math.sqrt(MOST_ENTRIES):
         return None
     seconds, needed = plan_costs(problem.window, rank, len(pupil.at), len(finer.at))
-    return PixelPlan(pupil, finer, rank, window_geometry(problem.stack, problem.window).half, seconds, needed)
+    return PixelPlan(pupil, finer, rank, half_window(problem.window), seconds, needed)
 
 
 def _across(problem: Problem) -> int | None:
@@ -185,7 +194,7 @@ def _across(problem: Problem) -> int | None:
     MOST_NODES or more nodes would be necessary.
     """
     assert problem.pixelated is not None
-    level = LightStack((replace(problem.light, pupil=problem.light.pupil.level),))
+    level = problem.stack.level
     slopes, geometry = level.slopes, window_geometry(level, problem.window)
     path = geometry.to_middle(slopes.across)
     rays = np.stack([slopes.along_x + path.along_x, slopes.along_y + path.along_y]).ravel() * path.cycles[0, 0]
@@ -215,21 +224,25 @@ def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
     return found[0], np.mean(found[1:], axis=0)
 
 
-def _rank(problem: Problem, pupil: PixelNodes) -> int | None:
-    """Return the rank that is sufficient on average over pupil and window; None if it is too large."""
-    half = window_geometry(problem.stack, problem.window).half
+@lru_cache(maxsize=64)
+def _rank(pupil: PixelNodes, path: Path, tolerance: float, least: int) -> int | None:
+    """Return the rank that is sufficient on average over pupil and window; None if it is too large.
+
+    least: smallest rank.
+    """
+    half = half_window(path.window)
     # Points on a spiral cover a disk evenly.
     turn, r = np.arange(POINTS) * (math.sqrt(5) - 1), np.sqrt((np.arange(POINTS) + 0.5) / POINTS)
-    x, y = (problem.radius * r * part(np.pi * turn) for part in (np.cos, np.sin))
-    stack, path = pupil.stack(), Path.from_problem(problem)
+    x, y = (pupil.nodes.radius * r * part(np.pi * turn) for part in (np.cos, np.sin))
+    stack = pupil.stack()
     s, t = stack.directions(x[None, None, :], y[None, None, :])
     factor = RemainingFactor(path, stack, (s, t))
     side = half * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
     across, down = (at.reshape(1, -1, 1) for at in np.meshgrid(side, side))
     place = across, down
-    exact, least = factor.at(place), RANK_OF_DISTANCE if problem.moves else 1
+    exact = factor.at(place)
     for rank in (each for each in RANKS if least <= each <= MOST_RANK):
         nodes = half * chebyshev_points(rank)
-        if interpolation_errors(factor, place, np.ones(1), nodes, exact)[0] < RANK_SHARE * problem.tolerance / 2:
+        if interpolation_errors(factor, place, np.ones(1), nodes, exact)[0] < RANK_SHARE * tolerance / 2:
             return rank
     return None

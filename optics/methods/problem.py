@@ -250,7 +250,7 @@ class Problem:
     def steepest_sine(self) -> float:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
         straight = self.radius / math.hypot(self.radius, self.distance)
-        slopes = self.slopes.steepest_inside if self.pixelated is not None else float(self.stack.slopes.steepest[0])
+        slopes = float((self.stack if self.pixelated is None else self.stack.level).slopes.steepest[0])
         if SLOPE_MARGIN * slopes >= straight * self.medium_n:
             return straight  # all slopes and finer detail can only increase the sine of light that leaves the pupil
         band = SLOPE_MARGIN * slopes / self.light.wavelength + self.detail

@@ -179,9 +179,8 @@ class _CheckSums:
         u, v = factor.rounded(x[columns][:, None, None, None, :]), factor.rounded(y[rows][:, None, None, :, None])
         if len(self.samples.at) > 1:
             return factor.at((u, v))
-        across, down = (
-            np.moveaxis(part[..., at], -2, 1) for part, at in zip(self._along, (columns, rows), strict=True)
-        )
+        places = zip(self._along, (columns, rows), strict=True)
+        across, down = (part[..., at].transpose(0, 4, 1, 2, 3, 5) for part, at in places)
         return factor.divided((u, v), [across, down.swapaxes(-1, -2)])
 
 

@@ -21,8 +21,9 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH, SoftAperture
 from optics.apertures.circular import Annulus, Circle
 from optics.apertures.soft_edge import SoftEdge
-from optics.elements.light_stack import LightStack
+from optics.elements.light_stack import LightStack, StackSlopes
 from optics.elements.wavefront import Zernike
+from optics.methods.window_bands import EDGES, Bands, in_steps, medians
 from optics.methods.window_geometry import WindowGeometry
 from optics.methods.window_rank import Derivatives
 
@@ -41,13 +42,15 @@ NEAR_CYCLES, SPREAD_CYCLES = 6.5, 2.0
 # tolerance of 0.01, the same relative to those of the rays at the edge, and exponent of the tolerance.
 MAPPED_CYCLES, MAPPED_RIM_CYCLES, MAPPED_EXPONENT = 4.0, 3.0, -0.4
 RIM_CYCLES = 1.2  # choice: cycles of most of the rays of the edge, relative to their median
+# Choices for polynomials of high order: share of the points on the rim whose rays may be steeper than assumed, at a
+# tolerance of 0.01, and exponent of the tolerance.
+RIM_MISSED, MISSED_EXPONENT = 0.1, 0.6
 # Choices for PSFs that carry derivatives, to which points near the edge contribute as much as others. The soft edge is
 # then narrow: ripples as above, passband relative to the stopband; cycles per radius at a tolerance of 0.01, the same
 # relative to those of the rays at the edge, exponent of the tolerance, and cycles per cell between knots.
 CARRIED_RIPPLES, CARRIED_PASSBAND = (0.03, 0.002), 0.35
 CARRIED_CYCLES, CARRIED_RIM_CYCLES, CARRIED_EXPONENT, CELL_CYCLES = 7.6, 5.7, -0.4, 0.375
 CARRIED_STEPS = 6  # choice: densities of such samples per octave; equal ones share all arrays
-EDGES = 4  # choice: number of sharpnesses of the edge per octave; equal ones share tables
 SMOOTHED_RIPPLE = 0.1  # choice: ripple for smoothed waves, whose brightest light it affects, relative to others
 # Choices: step of the curvature in cycles per radius, so that pupils share tables, and the least useful curvature.
 CURVATURE_STEP, LEAST_CURVATURE = 1.0, 3.0
@@ -80,6 +83,11 @@ class WindowEdges:
         """Numbers of samples per radius, which are also the numbers of cycles per radius that they resolve, (beam,)."""
         return self._choice[1].density
 
+    @property
+    def stepped(self) -> np.ndarray:
+        """True for beams whose densities have steps, (beam,): those whose densities vary most between pupils."""
+        return self.stack.mapped | (self.stack.rim_slopes is not None)
+
     @cached_property
     def edges(self) -> list[SoftAperture]:
         """Soft apertures of the samples, (beam,)."""
@@ -111,24 +119,19 @@ class WindowEdges:
         return [one if is_map else other for is_map, one, other in zip(mapped.tolist(), narrow(), wide(), strict=True)]
 
     @cached_property
-    def _choice(self) -> tuple[np.ndarray, _Bands]:
+    def _choice(self) -> tuple[np.ndarray, Bands]:
         """Curvatures of the smoothed waves, and the bands of the light."""
         none = np.zeros(len(self.tolerance))
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
             return none, flat
-        able = self._round & ~self.stack.mapped
+        able = [isinstance(beam.pupil.aperture, Circle | Annulus) for beam in self.stack.beams] & ~self.stack.mapped
         curvature = np.where(able & (np.abs(self._rim_curvature) >= LEAST_CURVATURE), self._rim_curvature, 0)
         if not curvature.any():
             return none, flat
         curved = self._bands(curvature)
         chosen = (curvature != 0) & (curved.density < WORTH * flat.density)
         return np.where(chosen, curvature, 0), curved.where(chosen, flat)
-
-    @cached_property
-    def _round(self) -> np.ndarray:
-        """True for apertures that are disks or rings, (beam,)."""
-        return np.array([isinstance(beam.pupil.aperture, Circle | Annulus) for beam in self.stack.beams])
 
     @cached_property
     def _rim_curvature(self) -> np.ndarray:
@@ -139,19 +142,17 @@ class WindowEdges:
         outward = ((along_x * slopes.x + along_y * slopes.y)[:, rim] / r2[rim]).mean(axis=1)
         return np.asarray(np.rint(outward / CURVATURE_STEP) * CURVATURE_STEP)
 
-    def _bands(self, curvature: np.ndarray) -> _Bands:
+    def _bands(self, curvature: np.ndarray) -> Bands:
         """Return the bands of waves that are smoothed with these curvatures, (beam,)."""
         slopes, bend, cycles, mapped = self.stack.slopes, curvature[:, None], self.geometry.cycles, self.stack.mapped
         along, curved = self._along, bool(curvature.any())
-        rest, rim = along, self.geometry.to_middle(slopes.across).rim
-        if curved:
-            off = [np.abs(part - bend * at) for part, at in zip(self._to_middle, (slopes.x, slopes.y), strict=True)]
-            rest = np.maximum(*off)
-        at_rim = _medians(rest[:, rim])
+        rest = _unbent(self._to_middle, slopes, curvature) if curved else along
+        at_rim = medians(rest[:, rim := self.geometry.to_middle(slopes.across).rim])
         if self.derivatives is not None:
             return self._carried(at_rim, cycles + self._reach(along))
         # Light from the edge matters near the middle of the window, and other light in the whole window.
-        near = np.where(curvature != 0, cycles, np.minimum(cycles, NEAR_CYCLES)) + RIM_CYCLES * at_rim
+        steep = np.maximum(RIM_CYCLES * at_rim, self._steepest(curvature))
+        near = np.where(curvature != 0, cycles, np.minimum(cycles, NEAR_CYCLES)) + steep
         passband = near + EDGE_CYCLES * (self.tolerance / 0.01) ** EXPONENT
         if curved:
             bent = np.abs(bend) * np.hypot(slopes.x, slopes.y)
@@ -160,14 +161,14 @@ class WindowEdges:
         reach = self._reach(np.where(bent > stopband[:, None], 0, along) if curved else along)
         spread: np.ndarray | float = SPREAD_CYCLES
         if mapped.any():
-            detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * _medians(along[:, rim])
+            detail = MAPPED_CYCLES + MAPPED_RIM_CYCLES * medians(along[:, rim])
             spread = np.where(mapped, detail * (self.tolerance / 0.01) ** MAPPED_EXPONENT, SPREAD_CYCLES)
         density = self._masks + np.maximum(cycles + reach + spread, near + stopband)
         if mapped.any():
             density = np.maximum(density, np.where(mapped, self._widest, 0))
-        return _Bands(density, passband, near)
+        return Bands(density, passband, near).stepped(self.stepped)
 
-    def _carried(self, rim: np.ndarray, direct: np.ndarray) -> _Bands:
+    def _carried(self, rim: np.ndarray, direct: np.ndarray) -> Bands:
         """Return the bands of light that carries derivatives.
 
         rim: median cycles per radius of the rays at the edge, (beam,).
@@ -181,7 +182,7 @@ class WindowEdges:
         sharp = sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT
         density = np.maximum(direct + sharp + self._masks, self._widest)
         density = 2.0 ** (np.ceil(CARRIED_STEPS * np.log2(density) - 1e-9) / CARRIED_STEPS)
-        return _Bands(density, np.zeros_like(density), np.zeros_like(density))
+        return Bands(density, np.zeros_like(density), np.zeros_like(density))
 
     @property
     def _widest(self) -> np.ndarray:
@@ -192,10 +193,7 @@ class WindowEdges:
     @cached_property
     def _masks(self) -> np.ndarray:
         """Cycles per radius of the masks, (beam,)."""
-        return np.array([
-            0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(min(tolerance, 0.1), radius) * radius
-            for beam, radius, tolerance in zip(self.stack.beams, self.stack.radius, self.tolerance, strict=True)
-        ])  # fmt: skip
+        return self.stack.mask_cycles(np.minimum(self.tolerance, 0.1))
 
     def _reach(self, along: np.ndarray) -> np.ndarray:
         """Return the cycles per radius up to which nearly all light reaches, (beam,).
@@ -205,18 +203,29 @@ class WindowEdges:
         share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
         last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
         ordered = np.partition(along, sorted({*last.tolist()}), axis=1)
-        found: np.ndarray = ordered[np.arange(len(last)), last]
-        return found
+        return np.asarray(ordered[np.arange(len(last)), last])
 
     @cached_property
     def _along(self) -> np.ndarray:
         """Cycles per radius of the paths to the middle of the window, the larger of both axes, (beam, ray)."""
         return np.asarray(np.maximum(*map(np.abs, self._to_middle)))
 
+    def _steepest(self, curvature: np.ndarray) -> np.ndarray | float:
+        """Return the cycles per radius of nearly all rays at the rim behind polynomials of high order, (beam,)."""
+        slopes = self.stack.rim_slopes
+        if slopes is None:
+            return 0.0
+        ordered = np.sort(_unbent(self._paths(slopes), slopes, curvature), axis=1)
+        missed = np.minimum(RIM_MISSED * (self.tolerance / 0.01) ** MISSED_EXPONENT, 1.0)
+        place = np.ceil((1 - missed) * (ordered.shape[1] - 1)).astype(int)
+        return np.where(self.stack.mapped, 0.0, ordered[np.arange(len(place)), place])
+
     @cached_property
     def _to_middle(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
-        slopes = self.stack.slopes
+        return self._paths(self.stack.slopes)
+
+    def _paths(self, slopes: StackSlopes) -> tuple[np.ndarray, np.ndarray]:
+        """Return cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
         path = self.geometry.to_middle(slopes.across)
         return (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
 
@@ -235,7 +244,7 @@ class WindowEdges:
 
     def _wide(self, passband: np.ndarray, ripples: np.ndarray) -> list[SoftAperture]:
         """Return soft apertures that leave frequencies up to `passband` unchanged, and are as wide as possible."""
-        passband = 2.0 ** (np.ceil(EDGES * np.log2(passband) - 1e-9) / EDGES)
+        passband = in_steps(passband)
         return self._soft(passband, passband + _transitions(ripples), ripples)
 
     def _narrow(self, density: np.ndarray, ripple: float) -> list[SoftAperture]:
@@ -250,31 +259,10 @@ class WindowEdges:
         return [beam.pupil.aperture.with_edge(*edge) for beam, *edge in beams]
 
 
-@dataclass(frozen=True, eq=False)
-class _Bands:
-    """Frequencies in cycles per radius, (beam,).
-
-    density: frequencies that the samples must resolve.
-    passband: passband of the soft edge.
-    around: distance between the frequencies of the edge and those of the light that it sends into the window.
-    """
-
-    density: np.ndarray
-    passband: np.ndarray
-    around: np.ndarray
-
-    def where(self, chosen: np.ndarray, other: _Bands) -> _Bands:
-        """Return these bands for chosen beams, and others for all other beams."""
-        pairs = (self.density, other.density), (self.passband, other.passband), (self.around, other.around)
-        return _Bands(*(np.where(chosen, own, their) for own, their in pairs))
-
-
-def _medians(values: np.ndarray) -> np.ndarray:
-    """Return the medians of rows; `np.median` takes several times as long."""
-    last = values.shape[1] // 2
-    first = (values.shape[1] - 1) // 2
-    ordered = np.partition(values, sorted({first, last}), axis=1)
-    return np.asarray((ordered[:, first] + ordered[:, last]) / 2)
+def _unbent(paths: tuple[np.ndarray, np.ndarray], slopes: StackSlopes, curvature: np.ndarray) -> np.ndarray:
+    """Return cycles per radius of paths without the curvature of smoothed waves, the larger of both axes."""
+    parts = zip(paths, (slopes.x, slopes.y), strict=True)
+    return np.asarray(np.maximum(*(np.abs(part - curvature[:, None] * at) for part, at in parts)))
 
 
 def _transitions(ripples: np.ndarray) -> np.ndarray:

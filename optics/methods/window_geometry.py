@@ -19,7 +19,7 @@ from optics.methods.slow_factor import Path
 from optics.numerics.grid import Grid
 from optics.numerics.kept_values import KeptValues
 
-__all__ = ["PathSlopes", "PlannedRays", "WindowGeometry", "window_geometry"]
+__all__ = ["PathSlopes", "PlannedRays", "WindowGeometry", "half_window", "window_geometry"]
 
 RAYS = 100  # choice: number of rays that determine the rank
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
@@ -70,7 +70,7 @@ class WindowGeometry:
     @cached_property
     def half(self) -> float:
         """Distance [m] from the middle of the window within which interpolation points lie."""
-        return max(self.window.own_half_width, self.window.dx)
+        return half_window(self.window)
 
     @cached_property
     def path(self) -> Path:
@@ -140,6 +140,11 @@ class WindowGeometry:
     def known(self) -> KeptValues:
         """Cached values that depend on the geometry and on their key."""
         return KeptValues(KEPT)
+
+
+def half_window(window: Grid) -> float:
+    """Return the distance [m] from the middle of a window within which interpolation points lie."""
+    return max(window.own_half_width, window.dx)
 
 
 def window_geometry(stack: LightStack, window: Grid) -> WindowGeometry:

@@ -65,8 +65,9 @@ class WindowPlan:
         needed = np.where(suitable, across / self._pitch(self.edges.density), 0)
         within = suitable & (needed < MOST_ACROSS)
         least = np.ceil(np.where(within, needed, 1) - 1e-9)
-        # The densities that derivatives need have steps already.
-        step = 1 if self.derivatives is not None else np.maximum(1, 2 ** np.floor(np.log2(least / STEPS)))
+        # Some densities have steps already.
+        stepped = self.edges.stepped | (self.derivatives is not None)
+        step = np.where(stepped, 1, np.maximum(1, 2 ** np.floor(np.log2(least / STEPS))))
         found = np.where(within, np.ceil(least / step) * step, 0).astype(int)
         finer = 2 * self.finer_count(found) + 1
         fits = np.maximum(self.ranks * (2 * found + 1), finer) <= math.sqrt(MOST_ENTRIES)

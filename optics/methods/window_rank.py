@@ -98,15 +98,8 @@ def window_ranks(
     half, path, directions = geometry.half, factor.path, factor.directions
     # The relative error of the intensity is twice that of the amplitude. A gradient contains the error of the amplitude
     # and that of its derivative, which are independent of each other.
-    tests = [(factor, rays.window, rays.weight, RANK_SHARE * tolerance / 2)]
-    if derivatives is not None:
-        side = half * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
-        across, down = (at.reshape(1, -1, 1) for at in np.meshgrid(side, side))
-        s, t = directions
-        most = RANK_SHARE * DERIVATIVE_ERROR * tolerance / math.sqrt(2)
-        anywhere = RemainingFactor(path, factor.samples, (s[:, None, :], t[:, None, :]))
-        tests.append((anywhere, (across, down), np.ones(1), most))
-    exact = [own.at(at) for own, at, *_ in tests]
+    most, exact = RANK_SHARE * tolerance / 2, factor.at(rays.window)
+    most_anywhere = RANK_SHARE * DERIVATIVE_ERROR * tolerance / math.sqrt(2)
     found, least = np.zeros(len(tolerance), int), RANK_OF_DISTANCE if derivatives and derivatives.moves else 1
     crossed = np.zeros(len(tolerance), bool)
     for rank in RANKS:
@@ -115,16 +108,30 @@ def window_ranks(
         if rank < least:
             continue
         nodes = half * chebyshev_points(rank)
-        pairs = zip(tests, exact, strict=True)
-        fits = [interpolation_errors(*test[:3], nodes, whole) < test[3] for test, whole in pairs]
-        found[(found == 0) & np.all(fits, axis=0)] = rank
+        fits = interpolation_errors(factor, rays.window, rays.weight, nodes, exact) < most
+        if derivatives is not None and fits.any():
+            fits &= _errors_anywhere(geometry, factor, nodes) < most_anywhere
+        found[(found == 0) & fits] = rank
         if rank == 1 and derivatives is None and not found.all():
             a, b = cross_term(path, factor.samples, directions, rays.window)
-            crossed = (found == 0) & (
-                _rms(exact[0] - 1 - a * b, rays.weight) < tests[0][3] * (CROSSED_SHARE / RANK_SHARE)
-            )
+            crossed = (found == 0) & (_rms(exact - 1 - a * b, rays.weight) < most * (CROSSED_SHARE / RANK_SHARE))
             found[crossed] = 1
     return found, crossed
+
+
+def _errors_anywhere(geometry: WindowGeometry, factor: RemainingFactor, nodes: np.ndarray) -> np.ndarray:
+    """Return `interpolation_errors` on average over the window, (beam,). They do not depend on the light."""
+
+    def computed() -> np.ndarray:
+        side = geometry.half * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
+        across, down = (at.reshape(1, -1, 1) for at in np.meshgrid(side, side))
+        s, t = factor.directions
+        anywhere = RemainingFactor(factor.path, factor.samples, (s[:, None, :], t[:, None, :]))
+        place = across, down
+        return interpolation_errors(anywhere, place, np.ones(1), nodes, anywhere.at(place))
+
+    found: np.ndarray = geometry.known.get(("anywhere", factor, len(nodes)), computed)
+    return found
 
 
 def interpolation_errors(

@@ -19,6 +19,7 @@ from optics.methods.pixel_nodes import WindowSamples
 from optics.methods.sampled_path import sampled_height, sampled_wavefront
 from optics.methods.single_stack import single_stack
 from optics.methods.slow_factor import Path
+from optics.methods.stack_operation import is_single, stack_images
 from optics.methods.window_check import window_errors
 from optics.methods.window_crossings import WindowCrossings
 from optics.methods.window_sampling import WindowSampling
@@ -57,8 +58,8 @@ class WindowStack:
 
     def intensity(self, sampling: WindowSampling) -> Array:
         """Return the PSFs |U|² / (pupil area) [1/m²], (source, wavelength, y, x), with derivatives."""
-        lights = zip(self._paths, self._light(sampling.pupil), strict=True)
-        images = [self._image(light, sampling, path) for path, light in lights]
+        lights = zip(self._paths, self._factors(sampling.pupil), strict=True)
+        images = [self._image(size, waves, sampling, path) for path, (size, waves) in lights]
         return library(images[0]).stack(images, 1) / self.pupil.area
 
     def errors(self, sampling: WindowSampling, images: Array, tolerance: float) -> Array:
@@ -70,9 +71,9 @@ class WindowStack:
         seen, finer = (images * self.pupil.area).swapaxes(0, 1), single_stack(sampling.finer)
         crossings, count = WindowCrossings.from_images(seen.reshape(-1, *seen.shape[2:])), len(self.sources)
         found = []
-        for place, (path, light) in enumerate(zip(self._paths, self._light(sampling.finer), strict=True)):
+        for place, (path, factors) in enumerate(zip(self._paths, self._factors(sampling.finer), strict=True)):
             own = crossings.part(slice(place * count, (place + 1) * count))
-            arriving = light * self.convert(finer.to_middle(path.wavelength, self.dtype))
+            arriving = _product(*factors, self.dtype) * self.convert(finer.to_middle(path.wavelength, self.dtype))
             found.append(window_errors(finer, path, arriving, own, tolerance))
         return library(images).stack(found, 1)
 
@@ -81,20 +82,24 @@ class WindowStack:
         waves = [wavelength / self.pupil.index_behind(wavelength) for wavelength in self.wavelengths]
         return [Path(wave, number(self.distance), self.window) for wave in waves]
 
-    def _light(self, samples: WindowSamples) -> Iterator[Array]:
-        """Yield the light behind the pupil times the areas of the samples, (source, η, ξ), for each wavelength."""
-        pupil, (x, y, _) = self.pupil, samples.layout
+    def _factors(self, samples: WindowSamples) -> Iterator[tuple[Array, Array | None]]:
+        """Yield factors of the light behind the pupil for each wavelength, see `_product`.
+
+        The first factor is the light without relief and wavefront times the areas of the samples, (source, η, ξ). The
+        second is the phase of relief and wavefront [waves], (η, ξ); None without these.
+        """
+        pupil = self.pupil
         height, ahead = (found(pupil, samples, self.convert) for found in (sampled_height, sampled_wavefront))
         if pupil.mask is not None:
+            x, y, _ = samples.layout
             amplitude = pupil.amplitude(self.convert(x / pupil.radius), self.convert(y / pupil.radius))
         for wavelength in self.wavelengths:
-            light = self._straight(samples, wavelength)
+            size = self._straight(samples, wavelength)
             path = None if height is None else like(height, pupil.index_step(wavelength)) * height
             if ahead is not None:
                 path = -ahead if path is None else path - ahead
-            if path is not None:
-                light = light * turned(1.0, path / wavelength, self.dtype)
-            yield light if pupil.mask is None else light * like(light.real, amplitude)
+            size = size if pupil.mask is None else size * like(size.real, amplitude)
+            yield size, None if path is None else path / wavelength
 
     def _straight(self, samples: WindowSamples, wavelength: float) -> Array:
         """Return the waves behind the ideal lens times the areas of the samples, (source, η, ξ).
@@ -108,16 +113,24 @@ class WindowStack:
             return lens.waves(*map(self.convert, samples.layout))
         return self.convert(_fixed_waves(lens.plain, samples))
 
-    def _image(self, light: Array, sampling: WindowSampling, path: Path) -> Array:
-        """Return |U|² over the window, (source, y, x), from the light behind the pupil."""
+    def _image(self, size: Array, waves: Array | None, sampling: WindowSampling, path: Path) -> Array:
+        """Return |U|² over the window, (source, y, x), from the factors of the light behind the pupil."""
         sums = sampling.sums(path, self.dtype)
+        many = max(1, int(MOST_ENTRIES / sums.down.shape[-1] / sums.across.shape[-1]))
+        if is_single(size, waves) and not carries_derivative(self.distance):
+            return stack_images(size, waves, sums, self.dtype, many)
+        light = _product(size, waves, self.dtype)
         kernel, down, across = (self.convert(part) for part in (sums.kernel, sums.down, sums.across))
         if carries_derivative(self.distance):
             kernel = kernel + (self.distance - number(self.distance)) * self.convert(sums.by_distance())
-        many = max(1, int(MOST_ENTRIES / down.shape[-1] / across.shape[-1]))
         parts = [light[first : first + many] for first in range(0, len(light), many)]
         images = [intensity_of(window_field(part, kernel, down, across)) for part in parts]
         return images[0] if len(images) == 1 else library(light).concatenate(images)
+
+
+def _product(size: Array, waves: Array | None, dtype: str) -> Array:
+    """Return the light from its factors: `size` times e^{2πi waves}."""
+    return size if waves is None else size * turned(1.0, waves, dtype)
 
 
 @dataclass(frozen=True)

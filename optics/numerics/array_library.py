@@ -177,6 +177,8 @@ def turned(size: Any, waves: Array, dtype: str) -> Array:
     else:
         angle = ((waves - own.round(waves)) * (2 * np.pi)).to(getattr(own, dtype))
         found = own.complex(own.cos(angle), own.sin(angle))
+    if isinstance(size, float) and size == 1.0:
+        return found
     return found * (size.to(getattr(own, dtype)) if hasattr(size, "to") else size)
 
 

@@ -9,6 +9,7 @@ system              propagate_through: propagation through pupils and free space
 system_elements     FreeSpace; checks of the elements, and the light in front of them
 stack_result        StackResult: the field behind a system
 planes              samples of pupils
+soft_pixels         pupils of pixels, filtered for samples on a grid
 plane_step          steps between the planes of a system
 field_derivatives   derivatives of fields through steps
 misalignment        Misaligned: decentred and tilted pupils

@@ -20,7 +20,7 @@ from optics.elements.beam import Beam
 from optics.elements.derivative_knots import carries_derivatives
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
-from optics.numerics.accuracy import AccuracyError
+from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError
 from optics.numerics.autodiff import Scalar, carries_derivative, number
 from optics.numerics.field import Field
 from optics.numerics.fourier import fast_length
@@ -138,6 +138,11 @@ class StepSettings:
     def edge_ripple(self) -> float:
         """Relative ripple of the light behind soft edges, at least LEAST_RIPPLE because of rounding errors."""
         return max(self.ripple, LEAST_RIPPLE)
+
+    @property
+    def edge_error(self) -> float:
+        """Relative error of the intensity behind a soft edge, including rounding errors."""
+        return 8 * self.edge_ripple + 4 * FLOAT_NOISE[self.dtype]
 
     def reaching(self, half_widths: float, distance: float) -> float:
         """Return the highest frequency [1/m] of light that `propagate` carries to the next plane: the end of its fade.

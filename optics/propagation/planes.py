@@ -26,6 +26,7 @@ from optics.numerics.precision import precision
 from optics.propagation.misalignment import Alignment, path_to_tilted_plane, seen_from
 from optics.propagation.plane_step import PlaneField, StepSettings, Stop
 from optics.propagation.propagate import lit_part
+from optics.propagation.soft_pixels import SoftPixels
 
 __all__ = ["PupilSampling"]
 
@@ -39,6 +40,7 @@ SPLINE_PART = 3.0
 class PupilSampling:
     """Samples of a pupil, its soft aperture, and the frequencies [1/m] that they transmit (see PlaneField).
 
+    soft: soft aperture; for a relief of pixels, the opening and the pixels together.
     source: source relative to the pupil's centre, which illuminates the pupil if no field arrives.
     path: path [m] of the source's light to the pupil's centre, minus that to the axis.
     """
@@ -46,7 +48,7 @@ class PupilSampling:
     pupil: Pupil
     source: PointSource
     grid: Grid
-    soft: SoftAperture
+    soft: SoftAperture | SoftPixels
     band: float
     rays: float
     kept: float | None
@@ -67,15 +69,13 @@ class PupilSampling:
             frequencies are then part of the pupil's phase.
 
         Raises:
-            ValueError: the pupil has a relief of pixels.
+            ValueError: the pupil has a relief of pixels, and its radius carries a derivative or the output lies in its
+                plane.
             AccuracyError: more samples are necessary than the limit allows.
         """
         pupil = stop.pupil
         assert pupil is not None
-        if pupil.pixels:
-            raise ValueError(
-                "elements: a PixelRelief has jumps, which the grids between planes cannot represent: use psf for it"
-            )
+        pixels = pupil.pixels > 0 and pupil.bends(settings.wavelength)
         path = 0.0
         if field is None:
             source, path = seen_from(source, stop.alignment.centre)
@@ -87,16 +87,20 @@ class PupilSampling:
             reaching = settings.reaching(widths, stop.distance)
             arriving, rays = min(field.band, reaching), min(field.rays, reaching)
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
-        turns += _derivative_band(pupil, settings)
+        turns += _derivative_band(pupil.level if pixels else pupil, settings)
         widths = stop.half_width + following.half_width + following.apart(stop.alignment)
         band, kept = settings.reaching(widths, following.distance), None
+        if math.isinf(band) and pixels:
+            raise ValueError("elements: a PixelRelief lies in the plane of the output: put FreeSpace between them")
         if math.isinf(band):
             band = turns  # coinciding planes: the edge is as soft as the finest detail
         rays += inside + pupil.scatter(settings.wavelength, settings.ripple)
         limit = rays + settings.margin / pupil.radius
         if (1 + FADE) * limit < band:
             band, kept = (1 + FADE) * limit, limit
-        soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH)
+        soft: SoftAperture | SoftPixels
+        passed = (turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH
+        soft = SoftPixels.from_pupil(pupil, *passed, stop.alignment) if pixels else pupil.aperture.soften(*passed)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         grid = Grid.square(2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1, pitch)
         if field is not None:
@@ -108,6 +112,10 @@ class PupilSampling:
             )
         return cls(pupil, source, grid, soft, band, rays, kept, stop.alignment, path)
 
+    def error(self, settings: StepSettings) -> float:
+        """Return the relative error of the intensity behind the pupil due to its soft edge, its pixels and rounding."""
+        return settings.edge_error + (self.soft.error(settings.dtype) if isinstance(self.soft, SoftPixels) else 0.0)
+
     def transmitted(self, arrived: PlaneField | None, settings: StepSettings) -> PlaneField:
         """Return the field on the grid times the pupil's transmittance, or its conjugate in backward propagation.
 
@@ -115,8 +123,11 @@ class PupilSampling:
         """
         types = precision(settings.dtype)
         beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)
-        x, y = self.alignment.on_element(*self.grid.coordinates(types), types)
-        found = beam.at(self.soft, x, y, self.grid, types)
+        if isinstance(self.soft, SoftPixels):
+            found = self.soft.behind(beam, self.grid, types)
+        else:
+            x, y = self.alignment.on_element(*self.grid.coordinates(types), types)
+            found = beam.at(self.soft, x, y, self.grid, types)
         if settings.backward:
             found = Field(found.re, -found.im, self.grid, types)
         transmittance = found.numpy()

@@ -61,8 +61,8 @@ def propagate_through(
 
     Raises:
         ValueError: an argument is invalid (named with its value and valid range), u, the source or a misalignment
-            carries derivatives, two pupils touch, a relief has pixels, or the medium is dispersive or differs between
-            elements.
+            carries derivatives, two pupils touch, the radius of a pupil of pixels carries a derivative, the output lies
+            in the plane of such a pupil, or the medium is dispersive or differs between elements.
         AccuracyError: no sampling meets the tolerance, or a tilt is too large for it.
         BackendError: see `optics.psf`.
     """
@@ -226,7 +226,8 @@ def _passed(
 ) -> _Passed:
     """Return the field behind the last stop."""
     steps: list[SystemStep] = []
-    complete, tilted = True, 0.0
+    edges: list[float] = []
+    complete, tilted, edge = True, 0.0, settings.edge_error
     for i, stop in enumerate(stops):
         if stop.window is None:
             at = source if field is None else PointSource()
@@ -236,20 +237,22 @@ def _passed(
             out, tracked = settings.carried(field, stop, sampling.grid if stop.window is None else stop.window)
             arrived = PlaneField(out.u, out.dx, field.band, field.rays, tracked=tracked)
             steps.append(SystemStep(stop.distance, out.plan, field.power, arrived.power, out.evanescent_power))
+            edges.append(edge)
             field = arrived
         if stop.window is None:
-            field = sampling.transmitted(field, settings)
+            field, edge = sampling.transmitted(field, settings), sampling.error(settings)
             tilted += stop.alignment.error(settings.steep(field))
     assert field is not None
-    return _Passed(field, tuple(steps), _error(steps, tolerance, settings, tilted), complete, settings.margin)
+    return _Passed(field, tuple(steps), _error(steps, edges, tolerance, tilted), complete, settings.margin)
 
 
-def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings, tilted: float) -> float:
-    """Return the sum of the errors of the steps and of the soft edges between them.
+def _error(steps: list[SystemStep], edges: list[float], tolerance: float, tilted: float) -> float:
+    """Return the sum of the errors of the steps, of the soft edges in front of them, and of tilts.
 
     Errors are relative to the light at their step. If only a fraction of this light arrives at the end, the relative
     error of the result is larger, so each error is divided by the square root of this fraction.
 
+    edges: errors of the soft edge in front of each step.
     tilted: sum of the errors due to tilts.
 
     Raises:
@@ -259,8 +262,9 @@ def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings, ti
     if last == 0:
         return 0.0
     error = sum(step.plan.predicted_error * math.sqrt(max(step.power_out / last, 1)) for step in steps)
-    edges = 8 * settings.edge_ripple + 4 * FLOAT_NOISE[settings.dtype]
-    error += tilted + sum(edges * math.sqrt(max(step.power_in / last, 1)) for step in steps)
+    error += tilted + sum(
+        edge * math.sqrt(max(step.power_in / last, 1)) for edge, step in zip(edges, steps, strict=True)
+    )
     if not error <= tolerance:
         raise AccuracyError(
             f"tolerance = {tolerance:g}: the error reaches {above(error, tolerance)}, because too little of the light "

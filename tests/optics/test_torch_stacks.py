@@ -8,7 +8,7 @@ import optics
 import optics.torch
 from optics import BSplineRelief, GaussianMask, HeightMap, MaskMap, PixelRelief, Pupil, WavefrontMap, Zernike
 from optics.elements.torch_numbers import torch_numbers, with_numbers
-from optics.methods import window_edges
+from optics.methods import window_edges, window_stack
 from optics.methods.window_rank import DERIVATIVE_ERROR
 from optics.point_spread.light_batch import LightBatch
 from validation.reference import relative_l2
@@ -143,3 +143,20 @@ def test_radii_and_other_methods_are_left_to_dr_jit(monkeypatch):
     ):
         with pytest.raises(Reached):
             optics.torch.psf(pupil, WAVES, 1.03e-3, **VIEW, **view)
+
+
+@pytest.mark.parametrize("many", [1, 1e9])
+def test_one_operation_computes_the_same_as_separate_ones(only_stacks, monkeypatch, many):
+    """Also if memory limits the number of sources whose sums are computed together."""
+    found = []
+    for single in (True, False):
+        monkeypatch.setattr(window_stack, "MOST_ENTRIES", many)
+        if not single:
+            monkeypatch.setattr(window_stack, "is_single", lambda *_: False)
+        heights, modes = asking(ROUGH), asking(MODES)
+        pupil = lens(height=HeightMap(heights), wavefront=Zernike(modes), mask=MaskMap(AMPLITUDES))
+        images = optics.torch.psf(pupil, WAVES, 1.03e-3, DEPTHS, tolerance=1e-2, **VIEW)
+        (images**2).mean().backward()
+        found.append((images.detach(), heights.grad, modes.grad))
+    for one, other in zip(*found, strict=True):
+        torch.testing.assert_close(one, other, rtol=1e-4, atol=1e-5 * float(other.abs().max()))

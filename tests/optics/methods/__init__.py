@@ -17,10 +17,12 @@ window_crossings: test_window_crossings.py
 window_rank: test_window_sampling.py, test_torch_stacks.py
 window_sampling: test_window_sampling.py
 window_edges: test_window_edges.py
+window_bands: test_window_edges.py
 window_geometry: test_kept_plans.py, test_window_sampling.py
 window_plan: test_window_sampling.py, point_spread/test_coarse_batch.py
 window_images: test_sine_stack.py, point_spread/test_coarse_batch.py
 window_stack: test_torch_stacks.py
+stack_operation: test_torch_stacks.py
 mirrored_matrix: test_mirrored_matrix.py
 window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py

@@ -82,3 +82,14 @@ def test_a_differentiable_radius_moves_the_pixels_so_other_methods_are_used():
     dr.enable_grad(radius)
     beam = Beam(Pupil(radius, PixelRelief(ROUGH), thin_lens_focal_length=FOCUS), optics.PointSource(), WAVE, FOCUS)
     assert window_sampling(Problem.from_beam(beam, Grid((23, 20), 1.5e-6), 1e-2, "float32")) is None
+
+
+def test_pupils_share_nodes_and_ranks():
+    """Neither depends on the heights, and both take longer than the PSF of a few pixels."""
+    (_, one), (_, other) = (problem_of("focus", 1e-2, relief) for relief in (ROUGH, ROUGH[::-1]))
+    assert one.aperture is other.aperture
+    ranks = pixel_nodes._rank.cache_info().misses
+    plans = [window_sampling(problem) for problem in (one, other)]
+    assert pixel_nodes._rank.cache_info().misses - ranks <= 1
+    assert all(a is b for a, b in zip(*(plan.pupil.layout for plan in plans), strict=True))
+    assert one.stack.level.beams[0].pupil.height is None

@@ -9,8 +9,10 @@ from optics.apertures.curved_disk import curved_ring
 from optics.elements.beam import Beam
 from optics.elements.light_stack import LightStack
 from optics.methods import sine_stack
+from optics.methods.problem import Problem
 from optics.methods.window_images import window_image_errors, window_images
 from optics.methods.window_plan import WindowPlan
+from optics.methods.window_sampling import window_sampling
 from validation.reference import relative_l2
 
 Z, LAMBDA = 240e-6, 550e-9
@@ -107,3 +109,35 @@ def test_the_check_finds_a_ripple_of_narrow_edges():
     exact = optics.psf(pupil, [LAMBDA], z, **view, tolerance=1e-5, method="rayleigh_sommerfeld").psf[0]
     found = optics.psf(pupil, [LAMBDA], z, **view, tolerance=2.25e-3, method="low_rank")
     assert relative_l2(found.psf[0], exact) <= found.plan.predicted_error
+
+
+@pytest.mark.fast_cases(1)
+@pytest.mark.parametrize("tolerance", [1e-2, 3e-2, 3e-3])
+@pytest.mark.parametrize("order", [9, 6])
+def test_the_first_plan_suffices_for_polynomials_of_high_order(order, tolerance):
+    """Some of their rays are far steeper at the rim than the median. A former plan for the median was not accurate."""
+    rng, count = np.random.default_rng(1), (order + 1) * (order + 2) // 2
+    window, focus = Grid((65, 65), 1.4e-6), 10e-3
+    for _ in range(2):
+        modes = 0.1 * rng.standard_normal(count) / np.sqrt(np.arange(1, count + 1))
+        pupil = optics.Pupil(1e-3, wavefront=optics.Zernike(modes), thin_lens_focal_length=focus)
+        beam = Beam(pupil, PointSource(), LAMBDA, focus)
+        problem = Problem.from_beam(beam, window, tolerance)
+        sampling = window_sampling(problem)
+        image = sampling.plain_intensity(beam, problem) / pupil.area
+        exact = optics.psf(pupil, [LAMBDA], focus, dx=window.dx, shape=window.shape, tolerance=1e-4).psf
+        assert relative_l2(image, exact.ravel()) < sampling.error(beam, problem, image) < tolerance
+
+
+def test_slopes_at_the_rim_include_oblique_light():
+    """The slopes of an oblique source and of the path to its image cancel, so the density is that on the axis."""
+    wavefront, angle = optics.Zernike({(5, 1): 0.2}), (0.02, -0.01)
+    pupil = optics.Pupil(1e-3, wavefront=wavefront, thin_lens_focal_length=10e-3)
+
+    def edges(at, centre):
+        stack = LightStack((Beam(pupil, PointSource(angle=at), LAMBDA, 10e-3),))
+        return WindowPlan(stack, Grid((33, 33), 1.4e-6, centre), np.array([1e-2])).edges
+
+    straight, oblique = edges((0.0, 0.0), (0.0, 0.0)), edges(angle, tuple(10e-3 * np.tan(angle)))
+    assert oblique.density == pytest.approx(straight.density, rel=0.05)
+    assert LightStack((Beam(optics.Pupil(1e-3), PointSource(), LAMBDA, 1e-2),)).rim_slopes is None

@@ -63,6 +63,7 @@ def test_the_check_finds_light_that_samples_miss(monkeypatch):
     """Light that belongs outside the window appears in it, because half of the rays are neglected."""
     monkeypatch.setattr(module, "NEGLECTED", 0.5)
     monkeypatch.setattr(module, "RIM_CYCLES", 0.0)
+    monkeypatch.setattr(module, "RIM_MISSED", 1.0)
     pupil = lens(wavefront=modes(6, 0.6))
     beam = Beam(pupil, PointSource(), WAVE, FOCUS)
     problem = Problem.from_beam(beam, Grid(WINDOW["shape"], WINDOW["dx"]), 1e-2)

@@ -31,6 +31,16 @@ def of_zernike(values):
     return lens(wavefront=optics.Zernike({mode: values[i] for i, mode in enumerate(ZERNIKES)}))
 
 
+def tilted_pixels(heights):
+    """Return a system with pixels that are tilted about both axes."""
+    return [
+        lens(),
+        FreeSpace(1e-3),
+        Misaligned(lens(height=optics.PixelRelief(heights)), tilt=(0.02, 0.01)),
+        FreeSpace(2e-3),
+    ]
+
+
 # Name: system of the parameters, their values, and a step for differences.
 INPUTS = {
     "flat relief": (lambda v: system(lens(height=v)), np.zeros((6, 6)), 2e-9),
@@ -43,6 +53,9 @@ INPUTS = {
     "radius": (lambda v: system(Pupil(v[0], thin_lens_focal_length=2e-3)), np.array([RADIUS]), 1e-9),
     "distances": (lambda v: system(lens(), gap=v[0], back=v[1]), np.array([1e-3, 1.5e-3]), 1e-7),
     "distances and tilt": (lambda v: system(lens(), 0.01, v[0], v[1]), np.array([1e-3, 1.5e-3]), 1e-7),
+    "pixels": (lambda v: system(lens(height=optics.PixelRelief(v))), 40e-9 * MAP, 2e-9),
+    "pixels and tilt": (lambda v: tilted_pixels(v), 40e-9 * MAP, 2e-9),
+    "index of pixels": (lambda v: system(lens(height=optics.PixelRelief(0.1e-6 * MAP), n=v[0])), np.array([1.5]), 1e-4),
     "index": (lambda v: system(lens(height=0.1e-6 * MAP, n=v[0])), np.array([1.5]), 1e-4),
 }
 
