@@ -108,9 +108,7 @@ class Candidate:
         return self if free else replace(self, fitness=self.fitness - costs, costs=self.costs + costs)
 
     def recordable(self) -> Candidate:
-        """Return the candidate as a record restores it; for example, infinity in a list becomes NaN.
-
-        Text is escaped, and long text is shortened.
+        """Return the candidate as a record restores it: with escaped, shortened text, and NaN for infinity in a list.
 
         If a value of the outcome has the wrong type or is outside the range that a record allows, the candidate counts
         as failed. Of its outcome, only the reason remains, and seconds and episode failures if they can be recorded.
