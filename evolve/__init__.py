@@ -1,6 +1,6 @@
 """evolve: evolution of eyes and brains in the worlds of `sim`.
 
-run, resume                     start of a run and its completion; completion of an interrupted run
+run, resume                     functions that start and complete a run, and complete an interrupted run
 Run                             an opened run directory: candidates, tables, figures, reports and replays
 Candidate                       a genome, its animal, and the outcome of training and evaluation
 RunConfig                       all settings of a run, with the sections EyeConfig, SearchConfig, LearningConfig,

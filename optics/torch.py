@@ -77,15 +77,15 @@ def psf(
         samples of `optics.psf`.
     requires_grad: True to raise a ValueError if no tensor requires a gradient.
     device: device of the result, and of the computation if no tensor requires a gradient. None: the device of the
-        tensors that require gradients, or the CPU without any.
+        tensors that require gradients, or the CPU if there are none.
     view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.
 
     Returns a tensor (pupil, distance, wavelength, y, x) [1/m²], float32 unless dtype="float64". It has an axis of
     pupils only if a sequence of pupils is passed, and an axis of distances only if a distance is a row. Each gradient
     has the device and the precision of its tensor. Only first derivatives are available.
 
-    At tolerances of 3e-4 or more, the source distances and wavelengths of a pupil share a plan and samples. One call
-    for all of them is then much faster than separate calls. It computes on the device of the tensors.
+    At tolerances of 3e-4 or more, the PSFs of a pupil for several source distances and wavelengths can be computed from
+    the same samples, on the device of the tensors. One call for all of them is then much faster than separate calls.
 
     A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
 
@@ -130,7 +130,7 @@ def _images(
     view: Mapping[str, Any],
     place: torch.device,
 ) -> torch.Tensor:
-    """Return the PSFs of all members of a batch, (member, wavelength, y, x).
+    """Return the PSFs of all members of the batch `light`, (member, wavelength, y, x); see `LightBatch.members`.
 
     At coarse tolerances, PyTorch computes members with the same pupil and sensor distance as one stack, on the device
     `place`. Dr.Jit computes all other members.
@@ -208,7 +208,7 @@ def eye_signals(
 
 
 def _operation(compute: Callable[[Any], Any], element: Any, device: Any) -> torch.Tensor:
-    """Return the result of a function of an element as a tensor with gradients to the tensors in the element."""
+    """Return compute(element) as a tensor, with gradients to the tensors in `element`, such as a pupil."""
     numbers = torch_numbers(element)
     place = torch.device(device) if device is not None else common_device(numbers)
     if not numbers or not torch.is_grad_enabled():
@@ -222,7 +222,7 @@ def _operation(compute: Callable[[Any], Any], element: Any, device: Any) -> torc
 
 
 def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
-    """Return the pupil of a call that passes heights and arguments of `Pupil`; ValueError without a radius."""
+    """Return the pupil for the former arguments of `psf`; ValueError if heights are passed without a radius."""
     if heights is None and given.keys() == {"pupil"}:
         return given["pupil"]
     heights = of_kind("heights", given.get("heights", heights), torch.Tensor, "torch.zeros(4, 4)")
@@ -250,10 +250,11 @@ def _guessed(heights: torch.Tensor, stacklevel: int) -> Relief:
 
 
 class PointSpread(torch.nn.Module):
-    """Module with a learnable relief: forward() returns the pupil's PSF, (wavelength, y, x).
+    """Module with a learnable relief: forward() returns the pupil's PSF, with the axes of `psf`.
 
     radius, n: radius [m] of the pupil, and refractive index of its relief.
-    wavelengths, sensor_distance, dx, shape, ...: arguments of `psf`, which are checked by forward().
+    wavelengths, sensor_distance, dx, shape, ...: arguments of `psf`. The constructor checks the wavelengths, and
+        forward() checks the others.
     heights: initial relief, a `BSplineRelief`, `HeightMap` or `PixelRelief`. None: a flat `BSplineRelief`. A tensor of
         heights [m] is interpreted as control points if it is 4 x 4, and otherwise as samples of a `HeightMap`.
     unit: length [m] of one unit of the learnt parameter, not 0. Optimisers work best if the parameter is near 1.

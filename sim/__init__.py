@@ -19,7 +19,7 @@ check_batch_task                    test whether a batch task follows the protoc
 Outcome, RewardTerms                return value of a batch task's `judge`, and the reward terms that it contains
 Physics                             protocol of the physics of a batch of worlds
 ArrayWorlds, SlidingAgents          two implementations of Physics: for any MuJoCo model, and for the built-in agent
-Encounter, Frozen                   several animals in one world that see each other
+Encounter, Frozen                   several animals in one world that see each other, and an animal that does not learn
 make_parallel_env                   PettingZoo environment of an Encounter
 make_vec_env, make_env              environments of many worlds in one batch, or of a single world
                                     (or gymnasium.make("rhabdom/Detection-v0"), "rhabdom/Maze-v0" ...)

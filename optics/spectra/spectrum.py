@@ -72,7 +72,7 @@ class Spectrum:
 
     @property
     def peak_nm(self) -> float:
-        """Wavelength of the largest value [nm]; the shortest one if several values are equal."""
+        """Wavelength of the largest value [nm]; the shortest one if this value occurs several times."""
         return self.wavelengths_nm[int(np.argmax(self.values))]
 
     def at(self, wavelengths: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ def _spectrum(nm: np.ndarray, values: np.ndarray) -> Spectrum:
 
 @lru_cache(maxsize=6)
 def _table(name: str) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the names of all columns of a CSV file but the first, and all values (column, wavelength).
+    """Return the names of all columns except the first in a CSV file, and the values of all columns, (column, row).
 
     The first column contains wavelengths [nm].
     """
@@ -128,7 +128,7 @@ def daylight(wavelengths: np.ndarray) -> np.ndarray:
 def cie_1931(wavelengths: np.ndarray) -> np.ndarray:
     """Return the CIE 1931 2° colour matching functions x̄, ȳ, z̄, (wavelength, 3).
 
-    wavelengths: wavelengths [m] in 300-780 nm. The functions are 0 below 360 nm.
+    wavelengths: wavelengths [m] in 300-780 nm. The functions are 0 up to 355 nm.
 
     Raises:
         ValueError: a wavelength is outside its range.
@@ -155,7 +155,7 @@ ILLUMINANTS = ("A", "D50", "D55", "D65", "D75", "E", "FL2", "FL11", "LED-B3")
 def illuminant(name: str) -> Spectrum:
     """Return the relative spectral power of a CIE illuminant on 300-780 nm. It is 1 at 560 nm.
 
-    name: "A", "D50", "D55", "D65", "D75", "E", "FL2", "FL11" or "LED-B3". The last three are dark below 380 nm.
+    name: "A", "D50", "D55", "D65", "D75", "E", "FL2", "FL11" or "LED-B3". The last three are 0 up to 375 nm.
 
     Raises:
         ValueError: the name is unknown.
@@ -192,7 +192,7 @@ def reflectance(name: str) -> Spectrum:
 
 
 def srgb_basis() -> tuple[Spectrum, Spectrum, Spectrum]:
-    """Return the reflectances of red, green and blue surfaces. In daylight, their mixtures have all colours of sRGB.
+    """Return the reflectances of red, green and blue surfaces, whose weighted sums have all sRGB colours in daylight.
 
     A surface with the linear sRGB values (r, g, b) has the reflectance r red + g green + b blue. The three reflectances
     add up to 1. Infinitely many other spectra have the same colours. The tables cover 380-780 nm, and values are

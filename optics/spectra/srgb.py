@@ -22,9 +22,9 @@ def decode_srgb(display: np.ndarray | float) -> np.ndarray:
 
 
 def ink_radiance(bands: SpectralBands, receptors: Any, uv: float = 1.0) -> np.ndarray:
-    """Return the radiance in each band of red, green and blue surfaces in daylight, (band, 3).
+    """Return the radiance of red, green and blue surfaces in daylight, in each spectral band, (band, 3).
 
-    If uv is 1, the three add up to white, see `srgb_basis`.
+    If uv is 1, the sum of the three is the radiance of a white surface, see `srgb_basis`.
 
     uv: factor on the reflectances below 400 nm, about which an sRGB image contains no information.
     """

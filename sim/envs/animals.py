@@ -154,7 +154,7 @@ class Animals:
             senses.set_state(now)
 
     def launch(self, worlds: np.ndarray | None = None) -> Pending:
-        """Launch the rendering of these worlds (None: all) for the eyes of all agents, without waiting for results."""
+        """Launch the rendering of these worlds (None: all) for all agents in `seeing`, without waiting for results."""
         poses = self.simulation.poses()
         return [senses.launch(poses, worlds) for senses in self.seeing]
 

@@ -87,10 +87,10 @@ def make_vec_env(
     mode: "training", "evaluation" or "test". In evaluation of a built-in task, objects that the agent reached reappear
         elsewhere, and reward terms have the weights of the fitness. "test" is an evaluation for final results. It
         equals "evaluation", unless a user task uses other worlds in this mode.
-    rays_per_receptor: number of rays traced for each receptor, in direct light only. "auto": the cheapest fidelity
-        whose error is small compared with the receptors' noise. This fidelity includes light that was reflected twice
-        if this light changes signals noticeably. `sim.choose_fidelity(world, eyes, bands="own")` returns the same
-        fidelity.
+    rays_per_receptor: number of rays traced for each receptor; reflected light is then ignored. "auto": the cheapest
+        fidelity whose error is small compared with the receptors' noise. This fidelity includes light that was
+        reflected twice if this light changes signals noticeably. `sim.choose_fidelity(world, eyes, bands="own")`
+        returns the same fidelity.
     fidelity: a complete `sim.Fidelity` instead of rays_per_receptor, or "auto", which has the same meaning as
         rays_per_receptor="auto". A `sim.Fidelity` may also be passed as rays_per_receptor.
     world_seed, mazes, course, layouts, wall_height: the layout that all worlds share, see `sim.build_world`
@@ -105,7 +105,7 @@ def make_vec_env(
         to its signal, see docs/tasks.md
     render_mode: content of the images that the environment renders for human viewers. "rgb_array": the agent from
         behind, or the model of a user task, with the fields of view of the eyes; "eyes": the signals of all eyes, side
-        by side; None: no images
+        by side, with a row for each kind of eyes; None: no images
 
     Physics uses the same number of threads as Dr.Jit, but at most one for each world. drjit.set_thread_count limits
     both. A FidelityWarning states that the fidelity is less accurate than allowed. A MirrorWarning lists features of
@@ -150,7 +150,8 @@ def make_parallel_env(
 ) -> EncounterEnv:
     """Return a PettingZoo parallel environment of several animals in one world; see `sim.Encounter`.
 
-    seed: seed of episodes and noise, a whole number of at least 0, until `reset` receives one; None: a random seed
+    seed: seed of episodes and noise until `reset` receives another seed, a whole number of at least 0; None: a random
+        seed
     memory: number of frames in an observation, 1 to 1,000,000
     render_mode: "rgb_array": the model with all animals' eyes; "eyes": the signals of their eyes, one image for each
         animal; None: no images
@@ -205,7 +206,7 @@ def _require_eyes(eyes: Any) -> None:
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
-    """Refuse arguments whose values a user task defines, and a user task that sets its own mode."""
+    """Refuse arguments that a user task defines itself, and a mode that is neither the default nor the given one."""
     parameters = inspect.signature(make_vec_env).parameters
     for name, why in OF_TASKS.items():
         if given[name] != parameters[name].default:
@@ -220,7 +221,7 @@ def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
 def _fidelity_of(
     rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | str | None, eyes: Eyes | Mapping[str, Eyes]
 ) -> Fidelity | None:
-    """Return the fidelity that one of the two arguments specifies; None if it is to be chosen automatically."""
+    """Return the fidelity that `rays_per_receptor` or `fidelity` specifies; None if it is chosen automatically."""
     chosen = isinstance(fidelity, str) and fidelity == AUTO
     if not (fidelity is None or chosen or isinstance(fidelity, Fidelity)):
         raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity, {AUTO!r} or None")

@@ -61,9 +61,9 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 
 
 def _actions(simulation: Simulation, steps: int) -> list[np.ndarray]:
-    """Return random actions (world, value) for each step, which are the same in any number of worlds.
+    """Return random actions for each step, (world, value).
 
-    All worlds take the same actions, which have a fixed seed.
+    All worlds take the same actions. These have a fixed seed, and do not depend on the number of worlds.
     """
     size = sum(agent.n_actions for agent in simulation.agents)
     random = np.random.default_rng(SEED)

@@ -20,7 +20,7 @@ NOT_BEGUN = "the worlds have not begun: call reset first"
 class CallOrder:
     """The calls that an environment accepts next.
 
-    The worlds have begun if a reset was completed. After `expect_wait`, an action is pending until `take`. After
+    The worlds have begun if the last reset was completed. After `expect_wait`, an action is pending until `take`. After
     `close`, only another `close` is accepted.
     """
 

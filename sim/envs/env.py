@@ -21,7 +21,8 @@ _OF_BATCHES = {"seed": IN_RESET, "n_envs": "this is one world: make_vec_env has 
 class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     """One agent with eyes in one world. Spaces, rewards, endings and `info` are documented in docs/tasks.md.
 
-    task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its `alone`
+    task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its method
+        `alone`
     eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, course, layouts, wall_height, least_return,
         episode_steps, spectra, medium, vary, auxiliary, render_mode: see `sim.make_vec_env` and `sim.build_world`
 

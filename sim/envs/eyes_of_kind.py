@@ -26,7 +26,7 @@ class EyesOfKind:
     renderer: renderer of the eyes
     keys: keys of the random generators of the noise, one for each world
     memory: number of frames in an observation
-    space: space of these signals in one world's observation
+    space: attribute, space of the eyes' signals in one world's observation
     """
 
     def __init__(self, simulation: Simulation, renderer: EyeRenderer, keys: np.ndarray, memory: int) -> None:
@@ -78,8 +78,8 @@ class EyesOfKind:
     ) -> PendingFrame:
         """Launch the last frame of an action, after the receptors have seen its earlier frames.
 
-        If only some worlds are rendered, and they do not begin an episode, the new frame replaces the frame that was
-        last rendered in these worlds.
+        There are no earlier frames if these worlds begin an episode. If only some worlds are rendered, and they do not
+        begin an episode, the new frame replaces the frame that was last rendered in these worlds.
         """
         light = self._simulation.light(self._wavelengths)
         first, chosen = fresh or worlds is not None, self._everyone if worlds is None else worlds
@@ -141,7 +141,7 @@ class EyesOfKind:
         return spaces.Box(low, high, frames, np.float32)
 
     def _brightest(self) -> float:
-        """Return the signal of a white surface that faces all directional lights at once.
+        """Return the largest signal of a white surface that faces all directional lights at once, or of veiling light.
 
         If light varies, this is the largest signal at the ends of its ranges (`Variation.extremes`).
         """

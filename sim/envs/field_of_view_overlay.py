@@ -57,7 +57,7 @@ class _Field:
     pixels, depth: as in _Level, (n,)
     opacity: opacity of the overlay, (n,)
     distance: distance of the pixel's point from the eye [m], (n,)
-    ray: index of the fan's ray that is next to the pixel's point on its right, (n,)
+    ray: index of the fan's first ray to the right of the pixel's point, (n,)
     share: angular position of the point between this ray (0) and the next ray to the left (1), (n,)
     """
 
@@ -163,7 +163,7 @@ def _level(view: Viewpoint, size: tuple[int, int]) -> _Level:
 
 
 def _pixel(view: Viewpoint, size: tuple[int, int]) -> float:
-    """Return the size of a pixel at a depth of 1 m [m]."""
+    """Return the size of a pixel [m] at a depth of 1 m."""
     return float(2 * np.tan(np.radians(view.fovy_deg) / 2) / size[0])
 
 
@@ -203,7 +203,7 @@ def _receptor_rays(eyes: Eyes) -> np.ndarray:
 
 
 def _radius(eyes: Eyes) -> float:
-    """Return the radius of an iris [m], small enough that eyes do not overlap."""
+    """Return the radius of an iris [m], small enough that an eye does not overlap the next eye on its right."""
     apart = np.abs(np.diff(eyes.azimuths())).min(initial=np.pi)
     return float(min(IRIS, BODY_RADIUS * np.sin(apart / 2)))
 

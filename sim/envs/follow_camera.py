@@ -61,7 +61,7 @@ class FollowCamera:
         self._fields: dict[tuple[int, int], FieldsOfView] = {}
 
     def picture(self, state: WorldState, index: int = 0, size: tuple[int, int] = SIZE) -> np.ndarray:
-        """Return an sRGB image (height, width, 3) uint8 of the world with this index in a state."""
+        """Return an sRGB image (height, width, 3) uint8 of one world; `index` is its index in `state`."""
         pose(self._data, self.world, state, index)
         height, width = size
         view = _follow(state, index)

@@ -1,7 +1,7 @@
 """Choice of the number of frames per action that receptors with dynamics need for correct motion blur.
 
 A few random actions are simulated. For each number of frames, the responses at the end of each action are compared with
-the responses to the largest number that is tried: at most 20 (FINEST), and at most one frame per physics step.
+    those for the largest number of frames that is tried: at most 20 (FINEST), and at most one frame per physics step.
 """
 
 from __future__ import annotations

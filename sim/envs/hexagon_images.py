@@ -22,8 +22,9 @@ def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
 
     Each map is Hammer's equal-area projection of the sphere: ahead is in the middle, left is on the left, and up is at
     the top. A map shows the part of the sphere that has ommatidia. A pixel has the colour of the ommatidium with the
-    nearest direction, which gives hexagons on a hexagonal lattice. Colours show receptor types as for other eyes
-    (`retina_images.side_by_side`), and white in full daylight is white.
+    nearest direction, which gives hexagons on a hexagonal lattice. Pixels at the edges of hexagons and around the eye's
+    field are grey. Colours show receptor types as for other eyes (`retina_images.side_by_side`), and white in full
+    daylight is white.
 
     frame: signals of the ommatidia of all mounts, one mount after the other, (ommatidium, channel)
     """

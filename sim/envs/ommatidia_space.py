@@ -1,4 +1,4 @@
-"""Space of the signals of a compound eye, which stores the viewing directions of the ommatidia."""
+"""Observation space of a compound eye's signals. It also stores the viewing directions of the ommatidia."""
 
 from __future__ import annotations
 

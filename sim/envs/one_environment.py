@@ -23,7 +23,7 @@ class OneEnvironment(VecEnv):
         )
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seed all random streams at the next reset, and return the seed of each world.
+        """Seed all random streams at the next reset, and return a list that contains `seed` num_envs times.
 
         World i uses streams derived from (seed, i). If the seed is None, the random numbers continue.
 
@@ -34,13 +34,14 @@ class OneEnvironment(VecEnv):
         return self._seeds
 
     def render(self, mode: str | None = None) -> np.ndarray | None:
-        """Return the images of all worlds, tiled; None without a render mode.
+        """Return the images of all worlds, tiled; None without a render mode, or if `mode` differs from it.
 
         Stable-baselines3 forwards unsupported modes to the individual environments. Here all worlds share this
         environment, so it handles the mode "eyes" itself.
 
         Raises:
-            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
+            RuntimeError: there is a render mode, and there has been no reset yet, `close` has been called, or an action
+                is pending.
         """
         if self.render_mode == "eyes" and mode in (None, "eyes"):
             return tile_images(self.get_images())

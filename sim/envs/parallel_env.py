@@ -24,7 +24,8 @@ from sim.tasks.user_tasks import batched
 class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
     """Several animals that act at the same time, each with its own policy, as a PettingZoo parallel environment.
 
-    Each animal's observations and `info` are the same as in an environment of `make_vec_env`.
+    Each animal's observations and `info` are the same as in an environment of `make_vec_env`, except for the entries
+    that stable-baselines3 needs at the end of an episode.
 
     encounter: the animals
     seed: seed of episodes and noise, used until `reset` receives a seed
@@ -127,7 +128,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         return pictures[0] if self.render_mode == "rgb_array" else pictures
 
     def close(self) -> None:
-        """Stop all threads. No other call may follow."""
+        """Stop all threads. Only further calls of `close` may follow."""
         self._calls.close()
         self._animals.simulation.close()
 
@@ -138,7 +139,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         return self._named([{name: array[0] for name, array in known.items()} for known in observations])
 
     def _commanded(self, actions: Mapping[str, np.ndarray]) -> list[np.ndarray]:
-        """Return the actions of each animal, (1, n_actions), after checking that each animal has some."""
+        """Return the action of each animal, (1, n_actions), after checking that all animals have one, and no others."""
         for name in actions:
             if name not in self.agents:
                 known = did_you_mean(name, self.agents) or f": there are {', '.join(self.agents)}"

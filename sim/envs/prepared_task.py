@@ -30,7 +30,7 @@ class PreparedTask:
     """A task, its scenes, and the fidelity of all eyes.
 
     task: the task
-    fidelity: fidelity of the learners' eyes; None: the fidelities that the task defines
+    fidelity: fidelity of the learners' eyes; None: the fidelities that the task defines, or an automatic choice
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
 
     Raises:

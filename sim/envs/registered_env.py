@@ -1,8 +1,8 @@
 """Environments that Gymnasium creates from an id. Gymnasium's `max_episode_steps` sets the length of their episodes.
 
 `gymnasium.make` passes this length only to its wrapper `TimeLimit`. The wrapper can end an episode earlier than the
-wrapped environment does, but not later. The wrapped environment therefore truncates no episode, unless a course or a
-family of layouts defines a number of actions.
+wrapped environment does, but not later. The wrapped environment therefore does not limit the number of actions in an
+episode, unless a course or a family of layouts does.
 """
 
 from __future__ import annotations

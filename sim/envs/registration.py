@@ -46,12 +46,13 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
     if not isinstance(task, Task) and not (isinstance(task, type) and issubclass(task, Task)):
         raise ValueError(f"register_task: task = {shown(task)}: must be a sim.Task, or its class")
     of_kind("register_task: id_", id_, str, "'FindBall-v0'")
+    episode_steps = whole("register_task: episode_steps", task.episode_steps, 1, MOST_STEPS)
     gymnasium.registry.pop(id_, None)
-    _register(id_, whole("register_task: episode_steps", task.episode_steps, 1, MOST_STEPS), {"task": task, **options})
+    _register(id_, episode_steps, {"task": task, **options})
 
 
 def _register(id_: str, episode_steps: int, options: dict[str, Any]) -> None:
-    """Register an id. Gymnasium's `TimeLimit` truncates the episodes, so that callers can choose another length."""
+    """Register an id. Callers of Gymnasium's functions can pass `max_episode_steps` for another length of episodes."""
     gymnasium.register(
         id_,
         entry_point="sim.envs.registered_env:RegisteredEnv",

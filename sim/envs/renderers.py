@@ -76,7 +76,7 @@ def _of_agent(
 def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:
     """Return the simulation's model as a scene for one kind of eyes.
 
-    Mitsuba traces all rays. Closed forms are used only for area sampling.
+    If samples are rays, Mitsuba traces all of them. If samples are areas, closed forms may replace ray tracing.
     """
     task, physics = simulation.task, simulation.physics
     return PreparedScene(

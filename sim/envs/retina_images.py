@@ -47,7 +47,7 @@ def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _palette(eye: Eye) -> np.ndarray:
-    """Return the linear sRGB of each signal, (channel, h, w, 3)."""
+    """Return the linear sRGB colour that shows the signal of white, for each signal of an eye, (channel, h, w, 3)."""
     height, width = eye.resolution
     if eye.mosaic is not None:
         return hues_of(eye.receptors)[eye.mosaic][None]
@@ -69,7 +69,7 @@ def hues_of(receptors: Receptors) -> np.ndarray:
 
 
 def shares_of(hues: np.ndarray) -> np.ndarray:
-    """Return weights (type, 3) with which equal signals of all types give white.
+    """Return each type's share in red, green and blue, (type, 3), such that equal signals of all types give white.
 
     If no type's colour contains a primary, all types contribute equally to this primary.
 

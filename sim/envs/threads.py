@@ -14,7 +14,9 @@ VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 def set_threads(count: int = 1) -> None:
-    """Set the number of threads of Dr.Jit, torch, OpenMP and BLAS in this process and in processes that it starts.
+    """Set the number of threads of Dr.Jit, torch, OpenMP and BLAS in this process.
+
+    Processes that it starts afterwards use the same number for torch, OpenMP and BLAS, but not for Dr.Jit.
 
     Call this function at the beginning of a training script, before it makes environments or a learner. By default,
     torch and BLAS use one thread per core. Networks for small eyes give so many threads too little work: most of the

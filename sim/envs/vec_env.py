@@ -31,7 +31,7 @@ class EyesVecEnv(OneEnvironment):
     documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
     observation is then the first observation of the new episode, and info["terminal_observation"] is the last
     observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
-    episodes depend only on the seed and on the world's index. Exceptions of a `sim.BatchTask` are raised unchanged.
+    episodes depend only on the seed, the world's index and its actions. A `sim.BatchTask`'s exceptions are raised.
 
     simulation, renderers: the worlds, and renderers of every agent's eyes
     memory, render_mode: see `sim.make_vec_env`
@@ -113,7 +113,7 @@ class EyesVecEnv(OneEnvironment):
         An episode is then the same as in a single environment with this seed.
 
         Raises:
-            ValueError: there is not one seed per world, or one is neither None nor a whole number of at least 0.
+            ValueError: there is not one seed per world, or a seed is neither None nor a whole number of at least 0.
             RuntimeError: `close` has been called, or an action is pending.
         """
         self._calls.require_open()
@@ -125,7 +125,7 @@ class EyesVecEnv(OneEnvironment):
         self.animals.seed(tuple(drawn))
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Store actions (num_envs, *action_space.shape) for `step_wait`; an action that is not finite ends its episode.
+        """Store actions (num_envs, *action_space.shape) for `step_wait`; a non-finite action ends its world's episode.
 
         Raises:
             ValueError: the actions are not real numbers, are masked, or do not have this shape.
@@ -188,7 +188,7 @@ class EyesVecEnv(OneEnvironment):
         return self.animals.get_state()
 
     def set_state(self, state: Mapping[str, np.ndarray], worlds: Sequence[int] | None = None) -> Arrays:
-        """Restore a stored state in these worlds (None: all); return the observation that belongs to it.
+        """Restore a stored state in these worlds (None: all); return the current observations of all worlds.
 
         Raises:
             ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
@@ -201,12 +201,12 @@ class EyesVecEnv(OneEnvironment):
         return _rows([senses.now for senses in self._learners])
 
     def close(self) -> None:
-        """Stop all threads. No other call may follow."""
+        """Stop all threads. Only further calls of `close` may follow."""
         self._calls.close()
         self.simulation.close()
 
     def get_images(self) -> list[np.ndarray]:
-        """Return images (y, x, 3) uint8 of every world, as set by `render_mode`; an empty list without a mode.
+        """Return images (y, x, 3) uint8, see `WorldPictures.taken`; an empty list without a mode.
 
         Raises:
             RuntimeError: there has been no reset yet, `close` has been called, or an action is pending.

@@ -29,7 +29,8 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     i has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.
 
     num_envs: number of worlds
-    task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its `alone`
+    task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its method
+        `alone`
     eyes, memory, mode ...: see `sim.make_vec_env`
 
     Raises:

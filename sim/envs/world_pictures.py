@@ -28,7 +28,8 @@ RIMS = 0.15  # length of the drawn edges of fields of view, in units of the mode
 class WorldPictures:
     """Images of worlds for human viewers, as `render_mode` selects.
 
-    "rgb_array": the model in each world; "eyes": the signals of the learning agents' eyes; None: no images
+    "rgb_array": the agent of a built-in task from behind, or the model of a user task; "eyes": the signals of the
+    learning agents' eyes; None: no images
     """
 
     def __init__(self, animals: Animals, render_mode: str | None) -> None:
@@ -68,7 +69,7 @@ class _Follower:
 
 
 class _ModelCameras:
-    """The camera of the model that the task selects, or a camera that shows the whole model."""
+    """Images of worlds from the camera that the task names, or from a viewpoint that shows the whole model."""
 
     def __init__(self, animals: Animals) -> None:
         self._animals, self._simulation = animals, animals.simulation

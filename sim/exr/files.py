@@ -8,8 +8,8 @@ channels `receptor_0` ..., and viewing directions, `direction_ahead` ...). Each 
 in the channels R, G and B, which plain viewers show. Readers that support only one part, such as colour-science, read
 the first part. Spectral parts precede receptor parts. Pixels are 32-bit floats with ZIP compression.
 
-A file is written completely or not at all. Each part stores a SHA-256 hash of its contents. Files of other programs
-need the spectral layout and have no hash.
+A file is written completely or not at all. Each part stores a SHA-256 hash of its contents. `read_exr` also reads files
+of other programs, without a hash, if they have the spectral layout.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     """Read the views from a file that `write_exr` or another program wrote.
 
     A file of another program needs channels of the spectral layout: radiance (`S0.450,0nm` ...) or reflectance
-    (`T.450,0nm` ...). A view has the name of its part, or of the file if the part has none. An ExrWarning names
+    (`T.450,0nm` ...). Its views have the names of their parts, or of the file if a part has none. An ExrWarning names
     contents that are not read, such as polarisation.
 
     most_bytes: largest allowed size of the unpacked pixels [bytes], which may be infinite; the header of a small file
@@ -113,6 +113,7 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     Raises:
         ExrError: the file cannot be read, is truncated, damaged, altered or too large, or has no spectral channels.
             ExrError is a subclass of ValueError.
+        ValueError: `path` is no path, or most_bytes is not positive.
         FileNotFoundError: the file does not exist, or is a folder.
     """
     import OpenEXR

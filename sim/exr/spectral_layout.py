@@ -34,7 +34,7 @@ _OF_STORAGE = ("pixelAspectRatio", "screenWindowWidth", "chunkCount", "name", "v
 
 
 class ExrWarning(UserWarning):
-    """Warning that names the parts of an OpenEXR file that are not read."""
+    """Warning that names contents of an OpenEXR file that are not read."""
 
 
 def channel(nm: float, quantity: str = RADIANCE) -> str:
@@ -63,7 +63,7 @@ def fields_of_views(parts: Sequence[Any], stem: str) -> list[dict[str, Any]]:
 
     stem: name of the view of a part without a name
 
-    An ExrWarning names parts without spectral channels, polarisation and fluorescence, which are not read.
+    An ExrWarning names contents that are not read: polarisation, fluorescence, and parts without spectral channels.
 
     Raises:
         NoSpectra: no part has spectral channels.
@@ -86,7 +86,7 @@ def fields_of_views(parts: Sequence[Any], stem: str) -> list[dict[str, Any]]:
 def _fields_of_view(channels: Mapping[str, np.ndarray], header: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Return the fields of a `View` from the channels (y, x) of a part; empty without spectral channels.
 
-    Channels of other quantities, such as reradiation, are left out with an `ExrWarning`.
+    Spectral channels of other quantities, such as reradiation, are left out with an `ExrWarning`.
 
     Raises:
         ValueError: two channels of a quantity have the same wavelength, or radiance and reflectance have different
@@ -119,7 +119,7 @@ def _fields_of_view(channels: Mapping[str, np.ndarray], header: Mapping[str, Any
 def _nanometres(value: str, prefix: str | None, unit: str) -> float:
     """Return the vacuum wavelength [nm] of a channel, whose name states a wavelength or a frequency.
 
-    value: the number, with a comma as decimal sign
+    value: the number, with a comma or a point as decimal sign
     prefix: SI prefix of the unit; None or "": none
     unit: "m" for a wavelength, otherwise hertz
     """

@@ -52,7 +52,7 @@ class View:
     def from_ommatidia(cls, name: str, eye: CompoundEye, frame: np.ndarray, **others: Any) -> View:
         """Return the view of a compound eye: signals and direction of each ommatidium, as a single row of pixels.
 
-        frame: signals of one mount at one moment, (ommatidium, channel), as in an observation
+        frame: signals of one mount at one moment, (ommatidium, channel), see `CompoundEye.as_frames`
         others: further fields of the view, except for `receptors`, `peaks_nm` and `directions`
 
         Raises:

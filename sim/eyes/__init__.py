@@ -9,7 +9,7 @@ varied_fields        receptive fields of receptors of different sizes behind a p
 field_areas          rectangles of the visual field, and the fraction of each receptive field in them
 receptor_sums        weighted sums over samples for each receptor
 depth_layers         distances for which an eye has a PSF
-allowed_error        largest acceptable error of a signal, small compared with the receptors' noise
+allowed_error        largest acceptable error of a signal, derived from the receptors' noise
 compound_eye         CompoundEye: ommatidia with any viewing directions
 viewing_directions   hexagonal patches, whole heads, measured directions
 hexagonal_rows       hexagonal lattices in rows of equal length, with an acute zone

@@ -1,4 +1,4 @@
-"""The largest acceptable error of a signal, which is small compared with the receptors' noise."""
+"""The largest acceptable error of a signal, derived from the receptors' noise and the signal of white."""
 
 from __future__ import annotations
 

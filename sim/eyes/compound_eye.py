@@ -1,4 +1,4 @@
-"""Compound eyes: ommatidia with any viewing directions, all equal or varying over the eye."""
+"""Compound eyes: ommatidia with any viewing directions. The ommatidia of an eye may be equal or different."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class CompoundEye:
 
     Every ommatidium collects light with its acceptance function, which wave optics computes for each band
     (`optics.acceptance_function`). Signals are normalised: if a white surface in full daylight fills the field of an
-    ommatidium, the signal is 1. Observations have the axes (memory, ommatidium, channel). If an eye has several mounts,
-    the ommatidia of the first mount come first.
+    ommatidium, the signal is 1. Observations have the axes (memory, ommatidium, channel), unless `rows` is given. If an
+    eye has several mounts, the ommatidia of the first mount come first.
 
     directions: viewing directions in the frame of the mount: unit vectors (ahead, left, up), (n, 3), or (azimuth to the
         left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The attribute
@@ -263,7 +263,7 @@ class CompoundEye:
         self._refuse_pairs(tree.query_pairs(float(sizes.max()), output_type="ndarray"), sizes)
 
     def _refuse_pairs(self, pairs: np.ndarray, sizes: np.ndarray) -> None:
-        """Refuse pairs (n, 2) of facets that are closer than the mean of their sizes [rad], (ommatidium,)."""
+        """Refuse pairs (n, 2) of facets that are closer than the mean of their sizes [rad]. sizes: (ommatidium,)."""
         pairs = pairs[pairs[:, 0] != pairs[:, 1]]
         chords = np.linalg.norm(self.directions[pairs[:, 0]] - self.directions[pairs[:, 1]], axis=1)
         close = np.flatnonzero(chords < sizes[pairs].mean(axis=1))

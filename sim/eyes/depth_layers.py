@@ -18,7 +18,7 @@ class DepthLayers:
     last layer is attributed to that layer.
 
     farthest, nearest: distances [m]; farthest may be infinite
-    count: number of layers; a single layer is at the mean of the inverse distances 1/farthest and 1/nearest
+    count: number of layers; the inverse distance of a single layer is the mean of 1/farthest and 1/nearest
 
     Raises:
         ValueError: `nearest` is not positive, or is larger than `farthest`; `count` is less than 1; or there are

@@ -253,7 +253,7 @@ class Eyes:
     def field_aspect(self) -> float:
         """Width of an eye's field of view divided by its height, on a plane in front of the eye.
 
-        For compound eyes it is the angular width of the lattice divided by its angular height.
+        For compound eyes, it is the width of the lattice divided by its height in Mercator's projection.
         """
         if self.ommatidium is not None:
             return self.resolution[1] / (self.resolution[0] * ROW_DISTANCE)

@@ -95,7 +95,7 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
     It is the smallest number for which at most the fraction `beyond` of the light of the line's receptors comes from
     beyond the rim.
 
-    profile: power of a receptor's field in each of its cells along the line, (cell,)
+    profile: fraction of the power of a receptor's field in each of its cells along the line, (cell,)
     line: number of receptors in the line, and rectangles per receptor
     cells: number of cells along a receptor's side
     """

@@ -1,4 +1,4 @@
-"""Hexagonal lattices of ommatidia in rows of equal length, with an acute zone in the middle."""
+"""Hexagonal lattices of ommatidia in rows of equal length, with or without an acute zone in the middle."""
 
 from __future__ import annotations
 

@@ -16,10 +16,10 @@ _BEYOND = 1e-9
 
 
 def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
-    """Return the depth of a point below the surface of a primitive or a closed mesh [m].
+    """Return the depth [m] of a point below the surface of a primitive or a closed mesh.
 
-    The depth is 0 for points outside the geom, and for geoms of all other types. For ellipsoids and meshes the depth is
-    approximate.
+    The depth is 0 for points outside the geom, and for geoms of other types, such as planes. For ellipsoids and
+    meshes the depth is approximate.
 
     point: position in world coordinates [m], (3,)
     """
@@ -43,7 +43,7 @@ def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
 
 
 def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
-    """Return the distance to the nearest crossing [m] if the point is inside the mesh; otherwise 0.
+    """Return the shortest distance [m] to the mesh along 64 rays if the point is inside the mesh; otherwise 0.
 
     From a point inside a closed mesh, rays in all directions cross the mesh an odd number of times.
 

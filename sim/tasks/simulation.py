@@ -179,10 +179,7 @@ class Simulation:
         )
 
     def _any_learner(self, rows: np.ndarray) -> np.ndarray:
-        """Return, for each world, whether a condition is true for at least one of its learners, (n,) bool.
-
-        rows: the condition for every learner and world, learners first, (learners · n,)
-        """
+        """Return whether a condition (learners · n,), learners first, holds for a learner of each world, (n,) bool."""
         return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 
     def poses(self) -> Poses:

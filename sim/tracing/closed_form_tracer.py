@@ -2,10 +2,10 @@
 
 A few walls are intersected one by one. If there are more, a ray walks through a grid in which each wall fills whole
 cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Light is traced in
-components, which are usually the bands. There are fewer components if all lights share one spectrum and the materials'
-spectra are linear combinations of a few spectra. Each of these few spectra is then a component. After two reflections,
-the spectrum of light is a product of two materials' spectra, so all bands are traced, unless all materials are grey and
-all lights share one spectrum.
+components. In a medium and for compound eyes, the components are the bands. Otherwise, there are fewer components if
+all lights share one spectrum and the materials' spectra are linear combinations of a few spectra. Each of these few
+spectra is then a component. After two reflections, the spectrum of light is a product of two materials' spectra, so all
+bands are traced, unless all materials are grey and all lights share one spectrum.
 """
 
 from __future__ import annotations
@@ -85,16 +85,16 @@ class ClosedForm:
     name, why: name of the tracer, and the reason for its choice, for reports
     light: level of light: "direct", "bounce" or "all"
     basis: (component, band): contribution of each component to each band
-    world, walls, footprints, lights, components: the parts of the scene
+    world, walls, lights, footprints, components: scene, walls, lights, method of intersecting walls, light's components
     medium: water or air between surfaces and eyes; None: clear air
     faces: textures of walls and floor, see `face_rows`
     sphere_textures: for each sphere that rays can hit, the map from texture coordinates to texels, and the place of its
         texture in the atlas
 
     Raises:
-        NoClosedForm: there are many walls, and they lie on no grid. There are further reasons if light is reflected
-            more than once: walls have several heights or are lower than a body, a body may change its height, or the
-            body that carries the eyes has a texture.
+        NoClosedForm: there are many walls, and they lie on no grid or overlap. There are further reasons if light is
+            reflected more than once: walls have several heights or are lower than a body, a body may change its height,
+            or the body that carries the eyes has a texture.
     """
 
     name = "closed_form"
@@ -129,7 +129,7 @@ class ClosedForm:
         )
 
     def buffers(self, n_envs: int) -> SphereRows:
-        """Return buffers for the rows of `n_envs` worlds."""
+        """Return a buffer for the centres of the visible spheres in `n_envs` worlds."""
         return SphereRows(self.world.spheres, n_envs)
 
     def around(self, scenes: None, rows: Array, tables: ClosedFormTables, world: Array) -> ClosedFormSurroundings:
@@ -169,7 +169,7 @@ class ClosedForm:
         return [dr.select(hit.is_lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
 
     def _hit(self, ray: Array, centres: list[Array], tables: ClosedFormTables) -> _Hit:
-        """Return the first hits of rays with walls, floor or bodies. Bodies without a centre are ignored."""
+        """Return the first hits of rays with walls, floor or the first bodies, as many as there are `centres`."""
         t, face, normal = self.footprints.hit(ray, tables.cells)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)

@@ -55,8 +55,8 @@ class LevelStand:
     def radius(self) -> float | None:
         """Common distance of all pupils from the body's vertical axis [m].
 
-        It is None if the distance differs between eyes, if an eye is not upright, or if it does not look straight away
-        from the axis.
+        It is None if the distance differs between eyes or is 0, if an eye is not upright, or if an eye does not look
+        straight away from the axis.
         """
         level, axes = self.origins[:, :2], self.rotations[:, :, 2]
         radii = np.linalg.norm(level, axis=1)

@@ -1,4 +1,4 @@
-"""Components into which the light of closed forms is divided, usually fewer than bands."""
+"""Components into which the closed-form tracer divides light, often fewer than the spectral bands."""
 
 from __future__ import annotations
 

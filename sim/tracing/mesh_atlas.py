@@ -1,8 +1,8 @@
 """All moving meshes in one Mitsuba scene, in which a kernel intersects each of them separately.
 
-Every mesh is scaled to a ball of radius 1 in a separate cell. A ray that is traced only inside this ball cannot hit
-another mesh. A kernel therefore needs one scene and one loop for any number of meshes, and moving a mesh does not
-change the scene. With one scene per mesh, kernels for 128 meshes would take minutes to compile.
+Every mesh is scaled to a ball of radius 1 in a separate cell. A ray is traced only inside a ball of radius 1.1, so it
+cannot hit another mesh. A kernel therefore needs one scene and one loop for any number of meshes, and moving a mesh
+does not change the scene. With one scene per mesh, kernels for 128 meshes would take minutes to compile.
 """
 
 from __future__ import annotations

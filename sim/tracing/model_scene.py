@@ -47,8 +47,8 @@ class ModelScene:
     medium: water or air; the attribute is the medium in the eye's bands; None: clear air
     variant: Mitsuba's variant
     geoms: ids of all visible geoms
-    looks: appearances of these geoms
-    moving: appearances that glow, or that may change their place, size or colour
+    looks: appearances of these geoms; a geom that may have several materials has one for each of them
+    moving: appearances that glow, or of geoms that may change their place, size, colour or material
     bsdfs: the BSDF of every appearance; equal surfaces share one object. They are stored here, because a BSDFPtr does
         not keep its objects alive
     lights: all lights
@@ -108,7 +108,8 @@ class ModelScene:
     def warn_of_missing(self, light: str = DIRECT) -> None:
         """Warn (`sim.MirrorWarning`) of features that are not rendered with this level of light.
 
-        Also warn of measured lights for which the eye has too few bands.
+        Also warn of measured lights for which the eye has too few bands, and of geoms of different groups in the same
+        place.
         """
         model = self.model
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
@@ -151,7 +152,7 @@ class ModelScene:
             return mi.load_dict(description, optimize=False)
 
     def _shared_bsdfs(self) -> dict[Appearance, MitsubaObject]:
-        """Return the BSDF of every appearance. A maze with a thousand walls of one material has one for all of them."""
+        """Return the BSDF of every appearance. A thousand walls of one material share one BSDF."""
         made: dict[Hashable, MitsubaObject] = {}
         found = {}
         for look in self.looks:

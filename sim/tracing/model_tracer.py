@@ -43,7 +43,7 @@ class Tables:
 
     bsdfs, painted, ends: BSDF and index in `Paint` of each mover, and index of the first mover of each kind
     sky, glows: the sky's emitter, and the BSDFs of glowing geoms; None if there are none
-    glowing: for each mover, its index in `glows`
+    glowing: for each mover, its index in `glows`, or len(glows) if it does not glow; None if no geom glows
     """
 
     bsdfs: Array
@@ -229,7 +229,7 @@ class ModelTracer:
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return the index of the surface that each ray hits first, in `ModelScene.one_shape_per_geom`.
+        """Return a number for the surface that each ray hits first, if `still` is `ModelScene.one_shape_per_geom`.
 
         It is a mover's index, or the number of movers plus the Mitsuba id of a static shape (0 for none).
         """
@@ -261,7 +261,7 @@ class ModelTracer:
         return blocked | there.still.ray_test(ray, active & ~blocked) if self._any_still else blocked
 
     def _sent(self, hit: _SurfaceHit, arrives: list[Array], there: Surroundings) -> list[Array]:
-        """Return the radiance of surfaces: reflected light, and emission."""
+        """Return the radiance along rays: light that surfaces reflect and emit, or light of the sky."""
         emitted, found = self._emitted(hit, there), []
         for band, color, e, own in zip(self._bands, hit.colors, arrives, emitted, strict=True):
             hit.si.wavelengths = band

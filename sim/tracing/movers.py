@@ -1,7 +1,7 @@
 """Intersections of rays with moving geoms in the renderer's kernel: primitives in closed form, meshes by Mitsuba.
 
 Rays are transformed to the frame of each geom. When a mesh moves, its Mitsuba scene (`sim.tracing.mesh_atlas`) is not
-rebuilt. On a GPU, meshes are intersected in a separate kernel.
+rebuilt. On a GPU, a separate kernel intersects all moving geoms if any of them is a mesh.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class MoverRows(WorldRows):
 
 
 class Movers:
-    """The moving geoms ("movers") of a model: primitives by kind, then meshes. Each appearance of a geom is a mover.
+    """The moving geoms of a model ("movers", one for each material a geom may have): primitives by kind, then meshes.
 
     looks, geoms: appearance and geom id of each mover
     atlas: the movers that are meshes
@@ -148,7 +148,7 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return a mask of the appearances that a world does not show, (world or 1, mover); None if there are none."""
+        """Return a mask of appearances that a world does not show, (world or 1, mover); None if each geom has one."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid

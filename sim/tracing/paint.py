@@ -1,4 +1,4 @@
-"""Colours of geoms that differ between worlds ("paint"), as reflectances in the eye's bands.
+"""Colours that differ between worlds ("paint"), as reflectances of geoms in the eye's bands.
 
 The BSDF of a painted geom is white, times its texture if it has one. The kernel multiplies its reflectance by the
 colour in the lane's world, as MuJoCo multiplies a texture by a colour. As in all scenes, Mitsuba converts colours to

@@ -109,7 +109,7 @@ def nearest(spheres: Spheres, centres: list[Array], ray: Array, t: Array) -> tup
 
 
 def blocks(radii: list[float], centres: list[Array], ray: Array) -> Array:
-    """Return whether any sphere lies on the ray ahead of its origin."""
+    """Return whether any sphere lies on the ray ahead of the ray's origin, or contains the origin."""
     blocked = mi.Bool(False)
     for radius, centre in zip(radii, centres, strict=True):
         b, c = _quadratic(ray, centre, radius)

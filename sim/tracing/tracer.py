@@ -70,7 +70,7 @@ class Tracer(Protocol):
 
 
 class Tracers:
-    """The tracers of a scene, one for each level of light (`lighting.LEVELS`).
+    """The tracers of a scene by level of light (`lighting.LEVELS`), for rays and for areas.
 
     scene, places: the scene, and the positions of the eyes in it
     name: "closed_form", "mitsuba", or "auto": the closed form if the scene has one, otherwise Mitsuba
@@ -101,14 +101,15 @@ class Tracers:
 
     @property
     def is_upright(self) -> bool:
-        """True if rays are traced in closed form."""
+        """True if direct light is traced in closed form."""
         return self.tracer_for(lighting.DIRECT).name == ClosedForm.name
 
     def tracer_for(self, light: str) -> Tracer:
         """Return the tracer for this level of light, one of `lighting.LEVELS`.
 
         Raises:
-            ValueError: no tracer supports this level.
+            ValueError: the level is "all", or the tracer is "closed_form" and the scene has no closed form for this
+                level.
         """
         if light not in self._known:
             with variant(self._scene.variant):

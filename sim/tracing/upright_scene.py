@@ -1,7 +1,7 @@
 """A model as upright walls, a floor and moving spheres, for eyes that stay upright.
 
-If a model cannot be represented in this form, `NoClosedForm` states the reason in one line, with the name of the geom,
-light or body.
+If a model cannot be represented in this form, `NoClosedForm` states the reason in one line, if possible with the name
+of the geom, light or body.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     """Return the closed form of a model.
 
     Raises:
-        NoClosedForm: the model has another form; the message names the geom, light or body that is the reason.
+        NoClosedForm: the model has another form; the message states the reason.
     """
     _refuse_what_shines(scene)
     model = scene.model

@@ -2,7 +2,7 @@
 
 Walls are axis-aligned boxes that reach from the floor to above the eyes. Their tops and bottoms are not visible from
 the eyes. A ray therefore hits a wall where it enters the wall's footprint, if it is below the wall's top there. Texture
-coordinates are affine on every face, and follow from the mirror's triangles.
+coordinates are affine on every face, and follow from the triangles of the Mitsuba scene (`sim.mirror`).
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
     eyes: heights of the pupils [m]
 
     Raises:
-        NoClosedForm: a geom is neither a box nor a plane; there is not exactly one plane, or it is tilted or turned; or
-            the eyes are not above it. Other causes are that a box is not aligned with the axes, does not stand on the
-            floor, extends beyond it, ends below the eyes or has a cube texture.
+        NoClosedForm: a geom is neither a box nor a plane; there is not exactly one plane, or it is tilted, or its sides
+            are not parallel to the axes; or the eyes are not above it. Other causes are that a box is not aligned with
+            the axes, does not stand on the floor, extends beyond it, ends below the eyes or has a cube texture.
     """
     lowest, highest = float(eyes.min()), float(eyes.max())
     key = model_hash(model), tuple(int(geom) for geom in geoms), lowest, highest

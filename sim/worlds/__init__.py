@@ -3,13 +3,13 @@
 catalog      TASKS: the name of each task and the aim of its agent
 world        build_world; World: a compiled world
 detection    an open field with a goal and adversaries, also for tracking
-foraging     the field of detection, with objects that differ in ultraviolet reflectance only
+foraging     the field of the task detection, with objects that differ in ultraviolet reflectance only
 navigation   the built-in courses between walls
-course       Course: a course on which the distance from the start need not decrease
+course       Course: a course on which the distance from the start hardly has to decrease
 maze         random mazes
 random_course  random courses
 layout_family  LayoutFamily: random mazes or courses in disjoint sets for training, selection and test
-striped_walls  walls of cells as boxes with stripes
+striped_walls  walls of grid cells, built from boxes with stripes
 layout       grid cells, walls and the floor
 materials    reflectances, stripes, daylight
 agent_model  model of an agent without the walls and objects of its world

@@ -20,8 +20,8 @@ _KEPT = KeptValues(MOST_MODELS)
 class AgentModel:
     """Model of an agent without the walls and objects of its world.
 
-    model: the agent without objects, walls, lights, cameras or textures, and 4 boxes (ROOM) that do not collide; they
-        are placeholders for walls
+    model: the agent, and 4 boxes (ROOM) that do not collide, which are placeholders for walls; there are no objects,
+        walls, lights, cameras or textures
     whole: hash of the complete model of the world, from which the agent was extracted
     """
 

@@ -1,4 +1,4 @@
-"""A course: a path through a grid of cells on which an agent's distance from the start increases almost everywhere.
+"""A course: a path through a grid of cells on which an agent's distance from the start hardly has to decrease.
 
 Navigation rewards an increase of the distance from the start. If the path leads back towards the start, this reward
 has a local optimum that no agent ever leaves (docs/concepts/physics.md). On a course the distance never has to

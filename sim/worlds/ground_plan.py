@@ -63,7 +63,7 @@ def _layout_around(
     The layouts are arranged from south to north and have the same extent along y.
 
     walls: centres and half side lengths of all walls [m], (wall, 4), as in `GroundPlan`
-    region: x_min, y_min, x_max, y_max of the southernmost layout's goal region [m], (4,); None: no goal region
+    region: x_min, y_min, x_max, y_max of the goal regions of all layouts together [m], (4,); None: no goal region
     extent: south and north end of the floor [m]
     mazes: number of layouts
     """

@@ -2,8 +2,8 @@
 
 An animal that is trained and judged in the same layouts may memorise them. A family therefore has a set for training, a
 set for the selection of animals and policies, and a set for final results ("test"). A layout depends only on the
-family's seed and size, the name of its set and its index in the set. A larger set thus begins with the layouts of a
-smaller one.
+family's seed, on the layout's size and path width, on the name of its set and on its index in the set. A larger set
+thus begins with the layouts of a smaller one.
 """
 
 from __future__ import annotations

@@ -47,8 +47,8 @@ def add_layout(spec: mujoco.MjSpec, mazes: Sequence[np.ndarray], rngs: Sequence[
 def draw_maze(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
     """Return the walls of a maze without dead ends, boolean (row, column).
 
-    A depth-first walk connects all rooms into a tree. Every dead end then gets a second opening, so that an agent in a
-    corridor never has to turn back.
+    A depth-first walk connects all rooms, which are the cells with odd row and column, into a tree. Every dead end then
+    gets a second opening, so that an agent in a corridor never has to turn back.
 
     shape: number of cells (rows, columns), both odd
     """

@@ -27,7 +27,7 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3
     Two centre lines lead from the same cell in the west to the goal in the east. Their straight parts have random
     directions and lengths. The free cells are those of the centre lines and, on wide paths, their four neighbours. On
     narrow paths, each diagonal step also has a free cell at its corner. Episodes start at the west end, and in training
-    also along the path.
+    also along one of the centre lines.
 
     shape: number of cells (rows, columns)
     width: width of a path along x or y [cells]: 1 or 3

@@ -1,6 +1,6 @@
 """State of a batch of worlds as plain arrays.
 
-Physics computes the next state, renderers render the eyes for a state, and recorders store it.
+Physics computes the next state, renderers compute the eyes' signals for a state, and recorders store it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Walls of grid cells, built from boxes with stripes. The frequency of the stripes differs between boxes."""
+"""Walls of grid cells, built from boxes with stripes. Each box has a random stripe frequency."""
 
 from __future__ import annotations
 

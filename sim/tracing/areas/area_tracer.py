@@ -288,8 +288,7 @@ def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
     """Return eight numbers per face, flat, from which the kernel finds the texture at a point.
 
-    They are the four coefficients of the texel's column as an affine function of (x, y, z), the texture's first texel,
-    its number of columns, and two zeros.
+    They are the texel's column, affine in (x, y, z), the first texel, the number of columns and two zeros.
     """
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows

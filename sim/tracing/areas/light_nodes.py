@@ -1,7 +1,7 @@
 """Nodes at which the light that walls and floor reflect to each other is computed, and interpolation between them.
 
-Every free cell of the grid has nodes on its floor and on each of the walls around it. It also has places at which the
-light on bodies is computed.
+Every free cell of the walls' grid has nodes on its floor and on its four sides, where walls may stand. It also has
+positions of a body's centre, for which the light on the body is computed.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ class LightNodes:
 
     @classmethod
     def from_walls(cls, walls: Walls) -> LightNodes:
-        """Return the nodes of a world of walls of one height.
+        """Return the nodes of a world whose walls all have the same height.
 
         Raises:
-            NoClosedForm: there are no walls, they lie on no grid, or there are too many nodes.
+            NoClosedForm: there are no walls, they lie on no grid or overlap, or there are too many nodes.
         """
         if not len(walls):
             raise NoClosedForm("no walls, between which light would be reflected")
@@ -63,7 +63,7 @@ class LightNodes:
         return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
 
     def body_margin(self, radius: float) -> float:
-        """Return the smallest distance [m] between a body's places in a cell and the borders of the cell.
+        """Return the smallest distance [m] between a cell's borders and the tabulated positions of a body's centre.
 
         It is the radius, because walls may stand at the borders, and a body's centre cannot be closer to a wall. The
         upper limit for large bodies is a quarter of the side of the cell.
@@ -74,7 +74,7 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Indices of all cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
+        """Index of each cell among the free cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
         return self.grid.numbers.astype(np.float32).ravel()
 
 
@@ -134,7 +134,7 @@ class NodeLight:
 def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
     """Yield index and weight of the four nodes around a position.
 
-    first: index of the grid's first node
+    first: index of the first node of this cell, or of this floor or wall in the cell
     axes: x and y in [0, 1], each with its number of nodes
     """
     (x, nx), (y, ny) = axes

@@ -1,4 +1,4 @@
-"""A cache of tables of reflected light on disk, because the computation of a world's tables takes seconds.
+"""A disk cache for tables of reflected light, because the computation of a world's tables takes seconds.
 
 A file is used only if it has the expected names, shapes and number types, finite numbers, and a checksum that includes
 the world. Otherwise the tables are baked again.
@@ -43,7 +43,7 @@ def write_error() -> str | None:
 
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:
-    """Return the tables, from the cache if possible. Without a writable disk, they are baked in every process."""
+    """Return the tables, from the cache if possible. If it cannot be written to, each call bakes missing tables."""
     world = _digest(baking.ingredients)
     path = cache_folder() / f"{world}.npz"
     found = _read(path, baking.layout, world)

@@ -1,7 +1,8 @@
 """Light that the walls and the floor of a world reflect to each other, looked up in precomputed tables.
 
-Every free cell of the grid has a table for its floor, and one for each of the walls around it. Another table contains
-the light that arrives from all sides on the surface of bodies in the cell (`sim.tracing.areas.light_baking`).
+Every free cell of the walls' grid has a table for its floor, and one for each of its four sides, where walls may stand.
+Another table contains the light that arrives from all sides on the surface of bodies in the cell
+(`sim.tracing.areas.light_baking`).
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from sim.tracing.closed_form_tracer import ClosedForm
 class LightTables(NodeTables):
     """Reflected light at the nodes and on bodies.
 
-    bodies: spherical harmonics of the light on all kinds of bodies, one array per component
+    bodies: coefficients of spherical harmonics of the light on bodies, for each combination of radius and height of the
+        centre, one array per component
     """
 
     bodies: list[Array]
@@ -40,7 +42,7 @@ class LightTable(NodeLight):
     tables: attribute, the tables in the form in which the kernel receives them
 
     Raises:
-        NoClosedForm: there are no walls, they lie on no grid, or there are too many cells for the tables.
+        NoClosedForm: there are no walls, they lie on no grid or overlap, or there are too many cells for the tables.
     """
 
     def __init__(self, tracer: ClosedForm, radii: np.ndarray, heights: np.ndarray) -> None:

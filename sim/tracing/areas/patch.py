@@ -39,11 +39,11 @@ class Area:
         return cls(middle.o, middle.d.xy, right, middle.d.z, mi.Float(height))
 
     def level(self, a: Array) -> Array:
-        """Return the horizontal part of the directions in column a (Vector2f)."""
+        """Return the horizontal part (Vector2f) of the directions at the horizontal position a, from -1/2 to 1/2."""
         return self.ahead + self.right * a
 
     def direction(self, a: Array, b: Array) -> Array:
-        """Return the direction at column a and height b of the area, not normalised (Vector3f)."""
+        """Return the direction (Vector3f), not normalised, at the position (a, b) of the area, see the class."""
         level = self.level(a)
         return mi.Vector3f(level.x, level.y, self.up + self.height * b)
 

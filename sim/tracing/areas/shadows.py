@@ -1,4 +1,7 @@
-"""The fraction of a patch that a light reaches. Edges of shadows are treated as straight lines across the patch."""
+"""The fraction of a patch that a light reaches.
+
+Edges of shadows are treated as straight lines across the patch, unless a sphere's shadow is small and lies within it.
+"""
 
 from __future__ import annotations
 
@@ -60,16 +63,17 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: A
 
 
 class WallShadows:
-    """Shadows of walls of one height, which reach at most into the next cell of the walls' grid.
+    """Shadows of walls of one height. The shadows reach at most into the next cell of the walls' grid.
 
-    A ray from a point in a free cell to a light crosses the next cell along x, the next cell along y, or the cell
-    across the corner. A table states for each cell which of these neighbours are walls. Three straight lines across the
-    patch separate points whose rays enter different neighbours, or pass above the wall there.
+    Below the walls' tops, a ray from a point in a free cell to a light enters at most the next cell along x or the next
+    cell along y, and from there the cell across the corner. A table states for each cell which of these neighbours are
+    walls. Three straight lines across the patch separate points whose rays enter different neighbours, or pass above
+    the wall there.
 
     around: table for the kernel that states, for each cell, which of its neighbours are walls; None without walls
 
     Raises:
-        NoClosedForm: the walls lie on no grid, or shadows are longer than a cell.
+        NoClosedForm: the walls lie on no grid or overlap, or shadows are longer than a cell.
     """
 
     def __init__(self, walls: Walls, directions: list[list[float]]) -> None:

@@ -1,7 +1,7 @@
 """The fraction of an area that a sphere fills, and the patch of the sphere that is visible there.
 
-A sphere's outline on the tangent plane is a conic. Its intersections with a few lines across the area are exact.
-Between these lines, the outline is approximated by straight lines.
+A sphere's outline on the tangent plane is a conic. Strips of its inside are treated as parallelograms. Their length is
+that of the mean chord for ellipses (exact areas, unless they are clipped), and of the middle chord for other outlines.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Slice:
     patch: Patch
 
     def inverse_distance(self, area: Area) -> Array:
-        """Return the inverse 1/z of the slice's distance along the eye's axis [1/m]."""
+        """Return 1/z [1/m], where z is the distance of the slice along the eye's axis."""
         found: Array = dr.norm(self.seen) * dr.rcp(dr.norm(self.patch.point - area.origin))
         return found
 
@@ -107,7 +107,7 @@ class SphereView:
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
     def _between(self, low: Array, high: Array) -> Strip:
-        """Return the strip between two cumulative fractions of the visible part, from 0 to 1."""
+        """Return the strip between two edges, given by numbers from 0 to 1, see `_Outline.edge`."""
         outline = self._outline
         one, other = outline.edge(low), outline.edge(high)
         place, width = (one.place + other.place) / 2, other.place - one.place
@@ -162,7 +162,7 @@ class _Outline:
     high: Array
 
     def edge(self, share: Array) -> _Edge:
-        """Return the edge of a strip, given the fraction of the visible part that lies before this edge."""
+        """Return the edge at `share`, from 0 to 1. The angle of an ellipse is linear in it, or else the place is."""
         angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
         place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), share - 0.5)
@@ -171,7 +171,7 @@ class _Outline:
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
         """Return length and middle of the average chord between two edges, clipped to the area.
 
-        With this length, the areas of ellipses are exact.
+        Unless the chord is clipped, the areas of ellipses are exact with this length.
         """
         double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
         mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
@@ -184,7 +184,7 @@ def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Arra
     """Return the outline of the sphere with its centre at `way` from the eye.
 
     A direction v = ahead + x across + y along, with |x| and |y| up to 1/2 in the area, hits the sphere if
-    |way × v|² < radius² |v|².
+    |way × v|² < radius² |v|² and way · v > 0.
     """
     x, y, z = (dr.cross(way, v) for v in (across, along, ahead))
     square = radius * radius

@@ -47,7 +47,7 @@ class StripeTables:
 
     rows: four numbers for each texel: the second and the first integral up to the texel's centre, and the deviations of
         this texel and of the next one from the texture's mean
-    means: the textures' means, for each texel
+    means: for each texel, the mean of its texture
     """
 
     rows: list[Array]
@@ -130,7 +130,7 @@ class Stripes:
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
     def _rows(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> tuple[list[Array], Array]:
-        """Return the rows of the texel below middle + beyond, per component, and the distance from its centre.
+        """Return the row of the last texel centre up to middle + beyond, per component, and the distance from it.
 
         Whole texels are separated from `middle` before `beyond` is added. A sum with a large column number would be
         rounded, and such errors would not cancel in differences.

@@ -267,3 +267,8 @@ def test_registration(monkeypatch):
     for task in ("maze", int, SimpleNamespace(episode_steps=3)):
         with pytest.raises(ValueError, match=r"must be a sim\.Task, or its class"):
             registration.register_task("Own-v0", task)
+    gymnasium.registry["Own-v0"] = "former"
+    short.episode_steps = 0
+    with pytest.raises(ValueError, match="episode_steps = 0"):
+        registration.register_task("Own-v0", short)
+    assert gymnasium.registry["Own-v0"] == "former", "an invalid task does not remove what is registered"
