@@ -261,7 +261,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], fraction: float) -> float:
     """Return the half side [m] of the square about `centre` that contains this fraction of the rays' hit points.
 
-    behind: distance [m] and refractive index behind the pupil. Without dispersion, all wavelengths share a cached result.
+    behind: distance [m] and refractive index behind the pupil. Without dispersion, wavelengths share a cached result.
     """
     x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
