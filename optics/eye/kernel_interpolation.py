@@ -33,7 +33,7 @@ class NodeError(AccuracyError):
 
 @dataclass(frozen=True)
 class Choice:
-    """The chosen number of nodes for one stage ("depth" or "field"), with the reason.
+    """The chosen numbers of nodes for one stage, with the reason: along depth, or along the two axes of the field.
 
     predicted_error: error of a receptor's signal, relative to the signal of a white surface, for any scene at most as
         bright as white. None if the user requested the number.
@@ -58,9 +58,9 @@ def checks(counts: tuple[int, ...]) -> list[Place]:
     """Return the places at which the error is measured, for these numbers of nodes along each axis.
 
     With a single node, these are the ends of the range, or on two axes the corners and the middles of the sides. With
-    more, they are the points halfway between nodes along every axis. If there are many such points, only a few are
-    used: evenly spaced ones along one axis, and on two axes those next to all four corners and a few between them,
-    because the error of a pupil without symmetry may be largest at any corner.
+    more, they are the points halfway between nodes along every axis with several nodes. If there are many such points,
+    only a few are used: evenly spaced ones along one axis, and on two axes those next to all four corners and a few
+    between them, because the error of a pupil without symmetry may be largest at any corner.
     """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
@@ -73,7 +73,7 @@ def checks(counts: tuple[int, ...]) -> list[Place]:
 
 
 def _place(axes: Sequence[np.ndarray], shares: Iterable[float]) -> Place:
-    """Return the place at these shares of the axes: 0 for an axis's first value, 1 for its last one."""
+    """Return the place at these fractions of the lists `axes` of positions: 0 is a list's first one, 1 its last one."""
     return tuple(float(axis[round(share * (len(axis) - 1))]) for axis, share in zip(axes, shares, strict=True))
 
 
@@ -88,8 +88,8 @@ class NodeChoice:
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
     white: function that returns the fraction of the signal of a white surface that the kernels transmit. It is less
-        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, the function computes a
-        kernel.
+        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, a call takes long, because
+        it computes a kernel.
     """
 
     stage: str
@@ -105,7 +105,7 @@ class NodeChoice:
         most: part of the tolerance that is available for this stage (None: all).
 
         Raises:
-            NodeError: the error of the last candidate exceeds the tolerance.
+            NodeError: the predicted error of every candidate exceeds this limit.
         """
         error = math.inf
         for counts in self.candidates:
@@ -121,7 +121,7 @@ class NodeChoice:
         )
 
     def error(self, counts: tuple[int, ...]) -> float:
-        """Return the largest interpolation error with these nodes, relative to the signal of a white surface."""
+        """Return the largest measured interpolation error with these nodes, relative to the signal of white."""
         coarse = _places(nodes(n) for n in counts)
         worst = 0.0
         for place in checks(counts):
@@ -140,8 +140,8 @@ class NodeChoice:
 def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_receptor: int) -> float:
     """Return the largest absolute signal that Σ weight · kernel can give for any scene with radiance in [0, 1].
 
-    It is the sum over the positive values of the receptive field (kernel ⊗ receptor aperture), or over the negative
-    values, whichever is larger.
+    It is the sum of the positive values of the combined receptive field (kernel ⊗ receptor aperture), or of the
+    magnitudes of its negative values, whichever is larger.
 
     terms: pairs of a weight and a kernel (band, ky, kx).
     """

@@ -67,9 +67,9 @@ class _Scene:
     def passing(self, layer: Layer) -> Array:
         """Return the fraction of the light from behind that passes a layer, (band, *shape).
 
-        Some cells of the layer hide nothing, because their surface continues in a farther layer, which does not contain
-        these cells again. The hidden fraction is therefore relative to the part of the pupil that these cells leave
-        open.
+        Some cells of the layer hide nothing, because their surface continues in a farther layer. The farther layer does
+        not contain these cells again, so its light only comes through the part of the pupil that they leave open. The
+        hidden fraction is relative to this part.
         """
         import drjit as dr
 

@@ -47,8 +47,8 @@ def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[La
     """Yield the layers of a depth map from the nearest to the farthest.
 
     inverse_distance: 1/z [1/m] of the cells, (Y, X).
-    parallax: shift of the image [cells] between opposite edges of the pupil, per difference of 1/z [1/m]. With 0, no
-        surface hides another one.
+    parallax: shift [cells] of the image between views from opposite edges of the pupil, divided by the difference of
+        1/z [1/m] that causes it. With 0, no surface hides another one.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -85,7 +85,7 @@ def _least_jump(inverse_distance: np.ndarray, parallax: float) -> float:
 
 
 def _highest_neighbour(values: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return the highest value of the selected cells among each cell and its neighbours; -inf without such cells."""
+    """Return, for each cell, the highest value of itself and its neighbours, of selected cells only; else -inf."""
     from scipy.ndimage import maximum_filter
 
     selected = np.where(cells, values, -math.inf)

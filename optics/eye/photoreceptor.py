@@ -63,8 +63,8 @@ def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random
     """Return a signal with Poisson noise, whose standard deviation is √(signal/photons).
 
     signal: (channel, y, x).
-    photons: absorbed photons for a signal of 1: a number, one per channel, or one per receptor (channel, y, x), or
-        (channel, 1, 1).
+    photons: absorbed photons for a signal of 1: a number, an array with one per channel, (channel,) or
+        (channel, 1, 1), or an array with one per receptor, (channel, y, x).
 
     Raises:
         ValueError: a signal is negative, a number of photons is not positive, or a receptor absorbs more than 1e18.

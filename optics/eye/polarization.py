@@ -6,8 +6,8 @@ then absorb as much as in unpolarised light of the same radiance, times
 
     1 + p (d - 1)/(d + 1) cos 2(ψ - φ),
 
-which is 2(d cos² + sin²)/(d + 1) for p = 1. The absorbed light is linear in the Stokes parameters I, Q = I p cos 2ψ and
-U = I p sin 2ψ. The optics blur Q and U in the same way as the radiance I.
+which is 2(d cos²α + sin²α)/(d + 1) with α = ψ - φ for p = 1. The absorbed light is linear in the Stokes parameters I,
+Q = I p cos 2ψ and U = I p sin 2ψ. The optics blur Q and U in the same way as the radiance I.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ STEEP = 0.62
 
 
 def microvilli_of(given: Any) -> Tile | None:
-    """Convert one Microvilli for all receptors, or rows of them, to rows of microvilli; None remains None.
+    """Convert a single Microvilli, which all receptors share, or rows of several to a tuple of rows; None remains None.
 
     Raises:
-        ValueError: `given` is none of these, or rows have different lengths.
+        ValueError: `given` is none of these, or rows are empty or have different lengths.
     """
     if given is None:
         return None
@@ -81,8 +81,8 @@ def taken_by(
 ) -> list[tuple[np.ndarray, Any]]:
     """Return the radiance (band, Y, X) and, if it is polarised, Stokes parameters Q and U, each with its weight.
 
-    The weighted sum of the three gives the signals. A weight is a number, or an array (h, w) with one entry per
-    receptor.
+    The signals of the eye are the weighted sum of the signals for each of these one or three components. A weight is a
+    number, or an array (h, w) with one entry per receptor.
 
     polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
 

@@ -27,11 +27,11 @@ HUMAN_E2_DEG = 1.04  # mean of r_2k on the four meridians: 1.058, 1.035, 1.084 a
 class Fovea:
     """Receptors whose acuity falls with the angle E from the fovea, as 1/(1 + E/E₂).
 
-    The law holds for the horizontal angle between the columns of receptors, and for the vertical angle between the
-    rows. The density is the product of both, so the receptors at the fovea have the shape of the average receptor. The
-    default E₂ is that of midget ganglion cells, which limit human acuity. Source: the first term of equation 8 of
-    Watson, J. Vision 14(7):15, 2014, whose density is (1 + E/E₂)⁻² in all directions. Its second, smaller term is left
-    out.
+    The number of columns of receptors per horizontal angle and the number of rows per vertical angle follow this law.
+    The density is the product of both. If the field is a square around the fovea, the receptors there have the shape of
+    the average receptor. The default E₂ is that of midget ganglion cells, which limit human acuity. Source: the first
+    term of equation 8 of Watson, J. Vision 14(7):15, 2014, whose density is (1 + E/E₂)⁻² in all directions. The
+    equation's second, smaller term is left out.
 
     e2_deg: angle E₂ [degrees] at which acuity is half of that at the fovea, 1e-3 to 1e3.
     center_deg: angles (right, up) [degrees] of the fovea from the eye's axis, -80 to 80.
@@ -108,7 +108,8 @@ def density_of(value: Any) -> Density | DensityMap | None:
     """Return the density of receptors in the form that an `Eye` stores.
 
     Raises:
-        ValueError: the value is neither a function, nor a map of positive numbers, nor None.
+        ValueError: the value is neither a hashable function, nor a map of positive numbers with at most 2048 rows and
+            columns, nor None.
     """
     if value is None or isinstance(value, DensityMap):
         return value

@@ -1,4 +1,4 @@
-"""Choice of a receptor's kernel: `visual_kernel` for a square receptor, `guided_field` for a waveguide."""
+"""Choice of a receptor's kernel: `guided_field` for a waveguide, else `visual_kernel`; 1 without a pupil."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
 
 
 def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
-    """Return the fewest bands within the eye's tolerance, see `choose_bands`.
+    """Return the fewest spectral bands whose error is within the eye's tolerance, see `choose_bands`.
 
     retina: a retina without wavelengths and with large cells.
     """

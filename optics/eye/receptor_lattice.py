@@ -3,8 +3,9 @@
 Coordinates are x to the right and y down in the visual field, from the middle of the retina. Their units are the width
 and the height of an average receptor: the retina of h x w receptors is [-w/2, w/2] x [-h/2, h/2]. Each row extends over
 the whole width and has w receptors, whose widths differ from row to row. The heights of rows follow from the density's
-mean over the columns, and the widths in a row from its mean over that row (the conditional distribution, Rosenblatt,
-Ann. Math. Stat. 23, 470, 1952). The rectangles leave no gaps, and an array of signals remains an image (row, column).
+mean along x. The widths in a row follow from the density's mean along y over the height of this row (the conditional
+distribution, Rosenblatt, Ann. Math. Stat. 23, 470, 1952). The rectangles leave no gaps, and an array of signals remains
+an image (row, column).
 """
 
 from __future__ import annotations
@@ -85,10 +86,10 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack(found)
 
     def places(self, counted: np.ndarray) -> np.ndarray:
-        """Return positions (x, y) on the retina, (n, 2), given in coordinates that count receptors from the middle.
+        """Convert coordinates that count receptors from the middle, (n, 2), to positions (x, y) on the retina, (n, 2).
 
-        In these coordinates, the receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. Beyond the
-        rim, receptors continue with the size of the outermost ones.
+        In the former coordinates, the receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. Beyond
+        the rim, receptors continue with the size of the outermost ones.
         """
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         column, row = (counted + np.array([width, height]) / 2).T
@@ -159,7 +160,7 @@ def receptor_lattice(
 
 
 def overlaps(edges: np.ndarray, cells: int) -> np.ndarray:
-    """Return the part of each cell between successive edges, (interval, cell). Cell k is the interval [k, k + 1]."""
+    """Return the fraction of each cell between successive edges, (edges - 1, cell). Cell k covers [k, k + 1]."""
     return np.diff(np.clip(edges[:, None] - np.arange(cells), 0, 1), axis=0)
 
 

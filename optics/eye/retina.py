@@ -23,7 +23,7 @@ class Retina:
     size: height and width [m] of the retina.
     samples: number of cells along a receptor's side.
     pupil_turned: True if the pupil is rotated by 180° about the axis.
-    most_seconds: largest predicted time [s] of the PSF of a band.
+    most_seconds: largest predicted time [s] that the PSF of one band may take.
     """
 
     distance: Scalar
@@ -40,6 +40,7 @@ class Retina:
         """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.
 
         Light from the right travels to the left of the eye's owner, which is +x. Light from below travels up, to +y.
+        Both signs are reversed if the pupil is turned.
 
         direction: tangents (right, down) of the source's direction in the visual field.
         """

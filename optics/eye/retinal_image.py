@@ -80,7 +80,7 @@ def _flat(array: np.ndarray, types: Precision) -> Array:
 
 
 def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:
-    """Return the size of the part of the scene that affects the middle part, of size `shape`, of the image.
+    """Return the size of the part of the scene that affects the image's middle part, whose size is `shape`.
 
     It is at most the scene's size and has the same parity.
     """
@@ -99,7 +99,7 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Return the middle part, of size `shape`, of an image (…, Y, X).
 
     Raises:
-        ValueError: the margins on both sides are not equal.
+        ValueError: the image is smaller than `shape`, or the margins on both sides are not equal.
     """
     margins = [size - n for size, n in zip(image.shape[-2:], shape, strict=True)]
     if any(margin < 0 or margin % 2 for margin in margins):

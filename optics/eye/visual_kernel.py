@@ -43,7 +43,7 @@ class _WindowNeeds:
     half_window: half side [m] of the window around the geometric image.
     pitch: pitch [m] that resolves the PSF.
     band: frequency [1/m] beyond which light behind the pupil may be omitted, within the tolerance.
-    half_of_rays: half side [m] of a window that contains the hit points of rays, without diffraction.
+    half_of_rays: half side [m] of a window for the rays alone, see `_half_side`.
     """
 
     half_window: float
@@ -71,7 +71,7 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """Half the side [m] of the square that contains the hit points of rays, without diffraction."""
+        """Half the side [m] of the square for the rays alone, without diffraction, see `_half_side`."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:
@@ -231,14 +231,11 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
 
 
 def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNeeds:
-    """Return the window and samples that the light of one wavelength requires.
+    """Return the window around the geometric image `centre` (x, y) [m] and the samples that one wavelength requires.
 
-    The window may lose the fraction `tolerance` of the light. Half of this fraction is for diffraction at the pupil's
-    edge, and half for rays that hit the retina outside the window. If masks, pixels or fine detail scatter light, the
-    second half is divided equally between rays and scattered light. A spatial frequency is a sine divided by λ.
-    Diffraction that adds a frequency f thus increases the sine of a ray's angle by λf.
-
-    centre: geometric image (x, y) [m].
+    The window may lose the fraction `tolerance` of the light: half of it by diffraction at the pupil's edge, and half
+    as rays that miss the window. If masks, pixels or fine detail scatter light, rays and scattered light share this
+    second half equally. Diffraction that adds a frequency f increases the sine of a ray's angle by λf.
     """
     pupil, z, radius = beam.pupil, number(retina.distance), beam.pupil.radius
     wavelength = beam.wavelength / beam.index
@@ -264,9 +261,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], fraction: float) -> float:
     """Return the half side [m] of the square about `centre` that contains this fraction of the rays' hit points.
 
-    Results are cached, because all wavelengths have the same slopes if the glass has no dispersion.
-
-    behind: distance [m] and refractive index behind the pupil.
+    behind: distance [m] and refractive index behind the pupil. Without dispersion, wavelengths share a cached result.
     """
     x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
@@ -277,9 +272,8 @@ def _beyond_edge(pupil: Pupil, fraction: float) -> float:
     """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts this fraction of the light.
 
     δ is relative to undiffracted light. The squared spectrum of a straight edge, integrated over frequencies above f,
-    is 1/(2π²f) per length of the edge. An aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ) of
-    its light beyond δ. For a disk this is 1/(π²Rδ), as in the Airy pattern (Born & Wolf, §8.5.2). The fraction is
-    larger behind a mask that is brighter along the edge than on average.
+    is 1/(2π²f) per length. An aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ), a disk 1/(π²Rδ)
+    (Airy pattern, Born & Wolf, §8.5.2). The fraction is larger behind a mask brighter along the edge than on average.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * fraction)

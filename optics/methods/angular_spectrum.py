@@ -1,7 +1,7 @@
 """The angular spectrum of a pupil's field on grids, propagated as a whole or with the paraxial part split off.
 
-The split method propagates the spectrum without the paraxial part of its phase to a relay plane, and from there to the
-window with Fresnel's integral.
+The split method first propagates the spectrum to a relay plane, without the paraxial part of the phase. From there to
+the window, Fresnel's integral adds this part.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
     """Return the period [m] and the number of its samples at the window's pitch.
 
     The period covers the window and all light that could wrap around into it from a pupil that ends `outermost` [m]
-    from the axis.
+    from the axis, except for negligible light beyond the problem's `reach`.
     """
     beam = outermost + taper.blur + problem.distance * taper.tangent
     # Light beyond `reach` is negligible, except behind steep pupils, so it may wrap around to the rim of the window.
@@ -128,9 +128,9 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
 def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
     """Return the period [m] and the number of its samples.
 
-    The period covers the pupil and the non-paraxial displacement z (tan θ - sin θ), with the distance z of the window
-    and the angle θ at which the taper ends. Fresnel's integral repeats the field at distances of λz divided by the
-    pitch. The samples are so dense that these copies do not reach the window.
+    The period covers the pupil, the blur of the taper, and the non-paraxial displacement z (tan θ - sin θ), with the
+    distance z of the window and the angle θ at which the taper ends. Fresnel's integral repeats the field at distances
+    of λz divided by the pitch. The samples are so dense that these copies do not reach the window.
 
     outermost: distance [m] from the axis at which the pupil ends.
     """

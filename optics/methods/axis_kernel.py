@@ -1,6 +1,7 @@
 """The diffraction kernel along one axis of the window, relative to its value at the middle of the window.
 
-It is the Fourier kernel times the slow factor along this axis. It depends on one sine and one position.
+It is the Fourier kernel times the slow factor (see `slow_factor`) along this axis, and depends on one sine and one
+position.
 """
 
 from __future__ import annotations
@@ -29,20 +30,20 @@ class HasDirections(Protocol):
 
     @property
     def elsewhere(self) -> float | np.ndarray:
-        """Sines along the other axis at which the factor of one axis is evaluated."""
+        """Sines along y, relative to the pupils' centres, at which the factor along x is evaluated; or vice versa."""
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return points (x, y) [m] of the pupils."""
+        """Return the points (x, y) [m] of the pupils at these sines, which are relative to the pupils' centres."""
 
 
 @dataclass(frozen=True, eq=False)
 class AxisFactor:
     """The slow factor along x (0) or y (1), relative to its value at the middle of the window.
 
-    Along the other axis, the sine is that of the centre plus `elsewhere`. The points of the pupil, and the factor at
-    the middle of the window, are computed once.
+    Along the other axis, the sine is that of the pupil's centre plus `elsewhere`. The points of the pupil, and the
+    factor at the middle of the window, are computed once.
 
-    sines: sines along the axis, minus that of the pupil's centre. They have as many axes as the positions.
+    sines: sines along the axis, minus that of the pupil's centre, as an array with as many dimensions as the positions.
     """
 
     path: Path
@@ -53,7 +54,7 @@ class AxisFactor:
     def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return amplitude and phase [waves] at positions [m] along the axis, relative to the middle of the window.
 
-        The positions have the type of the sines.
+        The positions must have the dtype of the sines.
         """
         points, directions, middle = self.pupil
         none = np.zeros((1,) * self.sines.ndim, self.sines.dtype)
@@ -76,7 +77,7 @@ class AxisFactor:
 
 
 def axis_factor(path: Path, samples: HasDirections, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the `AxisFactor` at positions [m] relative to the middle of the window, complex.
+    """Return the complex factor that `AxisFactor` describes, at positions [m] relative to the middle of the window.
 
     Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
     that kernel.
@@ -101,7 +102,7 @@ def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, d
 def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
     """Return `axis_kernel` for all columns (0) or rows (1) of the window, (stack, place, sample).
 
-    The phase is smooth, and is interpolated from a few sines and positions.
+    If amplitude and phase are smooth, they are interpolated from a few sines and positions.
     """
     at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
     if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
@@ -116,7 +117,7 @@ def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.n
 
 @dataclass(eq=False)
 class AxisRows:
-    """Rows of the `axis_kernel` for positions of the window. Those of a single pupil are computed once.
+    """Rows of the `axis_kernel` for positions of the window. For a single pupil, each row is computed only once.
 
     path, samples, axis, dtype: see `axis_kernel`.
     """

@@ -1,10 +1,10 @@
-"""Quadrature nodes in the cells between the knots of maps, for derivatives with respect to the samples of the maps.
+"""Quadrature nodes in the cells between the knots of spline maps, for derivatives with respect to the maps' samples.
 
-In a cell, the integrand of a derivative is a cubic polynomial times the light behind the pupil, which is a wave. Let t
-in [-1, 1] be the position across the cell, and z the largest phase difference between its middle and a border. The wave
-then varies at most as fast as e^{izt}, whose Chebyshev coefficients have the modulus 2 |J_k(z)|. A rule of n
-Gauss-Legendre nodes is exact for polynomials up to degree 2n - 1. Cells that the edge of the aperture cuts have the
-same nodes, with weights that are exact up to degree n - 1 over the open part.
+In a cell, the integrand of a derivative is a cubic polynomial, or a product of two, times the light behind the pupil,
+which is a wave. Let t in [-1, 1] be the position across the cell, and z the largest phase difference between the cell's
+middle and a border. The wave then varies at most as fast as e^{izt}, whose Chebyshev coefficients have the modulus
+2 |J_k(z)|. A rule of n Gauss-Legendre nodes is exact for polynomials up to degree 2n - 1. Cells that the edge of the
+aperture cuts have the same nodes, with weights that are exact up to degree n - 1 over the open part.
 """
 
 from __future__ import annotations

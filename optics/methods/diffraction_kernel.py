@@ -1,4 +1,4 @@
-"""The kernel z/(λD²) (1/(kD) - i) e^{ikD} of the first Rayleigh-Sommerfeld integral, as moduli and phases of NumPy.
+"""The kernel z/(λD²) (1/(kD) - i) e^{ikD} of the first Rayleigh-Sommerfeld integral: modulus and phase, in NumPy.
 
 D is the distance between a point of the pupil and a point of the window, and k the wave number. The term 1/(kD) belongs
 to the near field. It matters if the window is a few wavelengths behind the pupil.
@@ -33,8 +33,9 @@ def diffraction_kernel(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return modulus [1/m²] and phase [waves] of i times the kernel, without the spherical phase e^{ikρ}.
 
-    The kernel is z/(λD²) (1/(kD) - i) e^{ikD}. D and ρ are the distances of the point of the window from the point and
-    from the centre of the pupil, z is that of the window's plane, and k the wave number. All arrays are broadcast.
+    The kernel is z/(λD²) (1/(kD) - i) e^{ikD}. D is the distance of a point of the window from a point of the pupil,
+    and ρ its distance from the pupil's centre. z is the distance of the window's plane, and k the wave number. All
+    arrays are broadcast.
 
     wavelength: wavelength in the medium [m].
     distance: distance of the window's plane [m].

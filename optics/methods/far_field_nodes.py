@@ -1,7 +1,7 @@
 """The nodes of the window at which `far_field` evaluates the slow factor.
 
-The slow factor is interpolated between nodes, which are Chebyshev points in angle. Its values at most of these nodes
-are, within the tolerance, linear combinations of its values at a few of them. Only these few nodes are evaluated. Their
+The slow factor is interpolated between nodes, which are Chebyshev points in angle. Within the tolerance, its
+values at all nodes are linear combinations of its values at a few of them. Only these few nodes are evaluated. Their
 choice is an interpolative decomposition (Cheng et al., SIAM J. Sci. Comput. 26 (2005) 1389).
 """
 

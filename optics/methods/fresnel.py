@@ -115,10 +115,10 @@ def model_error(problem: Problem, curved: bool) -> float:
 
         q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|,   D = √(d² + z²),
 
-    at the hit points x of rays. Fraunhofer's integral omits the term ξ² of d². Light that adds up coherently at a hit
-    point comes from a few Fresnel zones around the ray's origin, or from the whole aperture if several rays may hit the
-    same point. A phase that is common to all this light causes no error. Without rays or behind a mask, the error
-    cannot be predicted and counts as 1.
+    at and near the hit points x of rays. Fraunhofer's integral omits the term ξ² of d². Light that adds up coherently
+    at a hit point comes from a few Fresnel zones around the ray's origin, or from the whole aperture if several rays
+    may hit the same point. A phase that is common to all this light causes no error. Without rays or behind a mask, the
+    error cannot be predicted and counts as 1.
 
     curved: True for Fresnel's integral, False for Fraunhofer's.
     """

@@ -122,9 +122,10 @@ class PinholeSampling:
 def geometric(problem: Problem) -> list[RaySampling]:
     """Return a list with one sampling, which has enough rays for a smooth image; empty for a pupil of pixels.
 
-    Every ray is spread by a quadratic B-spline over the window's cells. The spectrum of the spline falls like (πf
-    dx)⁻³, so it is negligible beyond f = error^(-1/3)/(π dx). The rays are dense enough for this frequency: their hit
-    points are closer together than the window's pitch.
+    Every ray is spread by a quadratic B-spline over the window's cells. The spectrum of the spline falls like
+    (πf dx)⁻³, so it is below the error ε beyond f = ε^(-1/3)/(π dx). ε is a tenth of the tolerance, or a hundredth of
+    the model error if that is larger. The rays are dense enough for this frequency: their hit points are closer
+    together than the window's pitch.
     """
     rays = problem.rays
     if rays is None:

@@ -22,7 +22,7 @@ class WithField(Protocol):
 class Sampling(Protocol):
     """Samples with which one method solves a problem.
 
-    `seconds` is the predicted time of a compiled kernel on two cores.
+    `seconds` is the predicted time on two cores, without the time of compilation.
     """
 
     @property

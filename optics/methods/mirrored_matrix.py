@@ -1,6 +1,7 @@
 """Products with matrices that do not change if rows and columns are both mirrored, at half the cost.
 
-The Fourier kernel of a window about the axis is such a matrix: mirrored positions see mirrored samples alike.
+The Fourier kernel of a window about the axis is such a matrix, because it depends on products of positions and sines.
+These products do not change if both factors change their signs.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ LEAST_PRODUCTS, SHARE = 4e6, 0.65
 def mirroring_share(window: Grid, inner: np.ndarray) -> np.ndarray:
     """Return the time of a sum over the pupil relative to that without mirrored matrices; 1 if they save no time.
 
-    inner: numbers of rows, and of columns, of the matrix between the Fourier kernels of both axes.
+    inner: numbers of rows of square matrices between the Fourier kernels of both axes, one for each sum.
     """
     height, width = window.shape
     large = inner * inner * width + height * inner * width >= LEAST_PRODUCTS

@@ -2,7 +2,7 @@
 
 The Fourier kernel has positions instead of sines as its variable, because pixels have straight borders. The factors
 along both axes of the window correct most of the difference. A pixel has as few nodes along an axis as the phase of
-lens, wavefront and path requires for an average point of the window. Light behind a relief may arrive anywhere in it.
+lens, wavefront and path requires for an average point of the window, because light behind a relief may arrive anywhere.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class PixelNodes:
 
     nodes: the nodes.
     centre: centre (x, y) [m] of the window.
-    distance: distance [m] of the window's plane, by which positions are divided to directions.
+    distance: distance [m] of the window's plane. Directions are positions divided by this distance.
     elsewhere: direction at which factors along the other axis are evaluated, see `axis_kernel.AxisFactor`.
     """
 
@@ -171,7 +171,10 @@ class PixelPlan(NamedTuple):
 
 
 def pixel_plan(problem: Problem) -> PixelPlan | None:
-    """Return the nodes for a pupil of pixels and a coarse tolerance; None if there would be too many."""
+    """Return the nodes for a pupil of pixels and a coarse tolerance; None if there would be too many.
+
+    The result is also None if the pupil has no pixels, or for derivatives with respect to maps or the pupil's radius.
+    """
     aperture = problem.pixelated
     if aperture is None or problem.knots is not None or problem.resized or (across := _across(problem)) is None:
         return None
@@ -212,9 +215,10 @@ def _across(problem: Problem) -> int | None:
 
 @lru_cache(maxsize=MOST_NODES)
 def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return squared errors of the integrals of e^{2iφt} over [0, 1], and on average over parts, for φ in PHASES.
+    """Return squared errors of the integrals of e^{2iφt} over t in [0, 1], and in open parts of it, for φ in PHASES.
 
-    The weights of `count` Gauss-Legendre nodes in [0, 1] integrate the interpolating polynomial over each part.
+    The second errors are averaged over the parts [0, p] with p in PARTS. The weights of `count` Gauss-Legendre nodes in
+    [0, 1] integrate the interpolating polynomial over each part.
     """
     (at, _), (t, size), found = gauss_legendre(count), gauss_legendre(MOST_NODES), []
     for part in (1.0, *PARTS):

@@ -226,7 +226,7 @@ class Problem:
 
     @property
     def fade_ripple(self) -> float:
-        """Allowed error of the amplitude of light beyond the band, which fades out."""
+        """Allowed amplitude error of light at frequencies beyond `band`, where the spectrum fades out."""
         if self.steep:
             return min(FADE_RIPPLE_PER_TOLERANCE * self.tolerance, 0.1)
         return self.ripple if self.reach is None else 0.1  # choice: there is hardly any light beyond the band

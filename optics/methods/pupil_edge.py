@@ -23,7 +23,7 @@ class PupilEdge:
 
     @property
     def stopband(self) -> float:
-        """Frequency [1/m] beyond which the spectrum is below the ripple."""
+        """Frequency [1/m] beyond which the soft edge's spectrum is below the allowed error (`Problem.ripple`)."""
         return self.aperture.stopband / self.radius
 
     @property

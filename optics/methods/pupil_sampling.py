@@ -45,7 +45,7 @@ class PupilSamples(Protocol):
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
         """Return the points (x, y) [m] of samples. i and j are their float64 indices along x and along y.
 
-        The points carry the derivatives of the beam's radius.
+        Nodes within pixels carry the derivatives of the beam's radius. Points of grids are fixed.
         """
 
     def field(self, beam: Beam, types: Precision) -> Field:
@@ -151,7 +151,8 @@ def cell_samples(problem: Problem, band: float | None = None) -> PixelSamples | 
 def samples_of(problem: Problem) -> PupilSamples | None:
     """Return the fewest samples that resolve the combined phase of pupil and path.
 
-    The result is None if pixels are too coarse for this phase, or if a grid would be too large.
+    The result is None if pixels are too coarse for this phase, if a grid would be too large, or if derivatives with
+    respect to samples of maps need too many cells.
     """
     if problem.knots is not None:
         return cell_samples(problem)

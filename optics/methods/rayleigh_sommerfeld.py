@@ -136,10 +136,11 @@ def node_rule(problem: Problem) -> tuple[float, float]:
 def turns(problem: Problem, digits: float) -> float:
     """Return the cycles per radius that the nodes must resolve.
 
-    These are the cycles of the phase. In addition, the kernel has poles at the height z above the pupil's plane, the
-    distance of the window. If z is short, the poles slow convergence: with n nodes, the errors of Gauss-Legendre rules
-    over [0, R] fall like e^{-4nz/R}, and those of the trapezoid rule around a ring of radius R like e^{-nz/R}.
-    Additional cycles then represent the poles. In a focus, where the phase is constant, only the poles matter.
+    These are the cycles of the phase. In addition, the kernel has poles at the height z above the pupil's plane, where
+    z is the distance of the window. If z is short, the poles slow convergence: with n nodes, the errors of
+    Gauss-Legendre rules over [0, R] fall like e^{-4nz/R}, and those of the trapezoid rule around a ring of radius R
+    like e^{-nz/R}. Additional cycles then represent the poles. In a focus, where the phase is constant, only the poles
+    matter.
     """
     phase, poles = problem.radius * problem.turning_inside, digits * math.log(10) / (2 * math.pi)
     nearness = problem.radius / problem.distance

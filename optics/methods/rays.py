@@ -51,7 +51,7 @@ class Rays:
     def from_slopes(cls, slopes: Slopes, aperture: Aperture, distance: float, medium_n: float) -> Rays:
         """Return the rays that propagate (sine of the angle below 1).
 
-        The angle θ follows from the local slope p of the wavefront: tan θ = p/√(1 - p²).
+        With the local slope p of the wavefront, divided by the index of the medium, tan θ = p/√(1 - p²).
         """
         step = max(1, (slopes.grid.shape[0] - 1) // (ACROSS - 1))
         centred = slice(slopes.grid.shape[0] // 2 % step, None, step)

@@ -1,4 +1,4 @@
-"""The slow factor, relative to the middle of the window, divided by its values along both axes.
+"""The slow factor of `low_rank`, relative to the middle of the window, divided by its values along both axes.
 
 This quotient varies even more slowly over the window than the slow factor.
 """
@@ -24,7 +24,7 @@ class RemainingFactor:
     """The remaining factor for some points of pupils. Parts that do not depend on the window are computed once.
 
     directions: sines (s, t) of the points, minus those of the pupil's centre.
-    dtype: "float32" or "float64". With "float32", short paths are computed in float32, too.
+    dtype: "float32" or "float64". With "float32", paths are computed in float32, too, if they are short enough.
     """
 
     path: Path
@@ -35,7 +35,7 @@ class RemainingFactor:
     def at(self, window: Pair) -> np.ndarray:
         """Return the factor at positions (u, v) [m] relative to the middle of the window, complex.
 
-        Directions and positions have the same number of axes and broadcast.
+        Directions and positions are arrays with the same number of dimensions, and broadcast.
         """
         window = self.rounded(window[0]), self.rounded(window[1])
         if len({part.shape for part in (*self.directions, *window)}) == 1:
@@ -58,7 +58,7 @@ class RemainingFactor:
         return np.asarray(turned(size, waves, self.dtype))
 
     def _paired(self, window: Pair) -> np.ndarray:
-        """Return the factor for one position per point. All three slow factors are evaluated together."""
+        """Return the factor for one position per point. The slow factor and its axis factors are evaluated together."""
         (u, v), none, (points, directions, middle) = window, np.zeros_like(window[0]), self._three
         at = np.stack([u, u, none], axis=1), np.stack([v, none, v], axis=1)
         size, waves = slow_parts(self._pupil[0], points, directions, at)
@@ -68,7 +68,7 @@ class RemainingFactor:
 
     @cached_property
     def _three(self) -> tuple[Pair, Pair, Pair]:
-        """Points, directions and slow factors at the middle: for the factor itself, along x and along y.
+        """Points, directions, and slow factors at the window's middle, for the factor itself and both axis factors.
 
         The shapes are (pupil, 3, ...).
         """

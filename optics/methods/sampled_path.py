@@ -1,7 +1,8 @@
 """Heights of reliefs and lengths of wavefronts at samples of the pupil, from arrays that many pupils share.
 
 Polynomials are interpolated from a few points across the pupil. Values of maps of cubic splines are the product of a
-sparse matrix and the coefficients of the splines. Both only depend on the samples, not on the relief or wavefront.
+sparse matrix and the coefficients of the splines. This matrix and the weights of the interpolation only depend on the
+samples, not on the relief or wavefront.
 """
 
 from __future__ import annotations
