@@ -1,4 +1,4 @@
-"""Statistics per generation, gene trajectories, image quality and confidence intervals.
+"""Statistics per generation, trajectories of phenotypes, peak signal-to-noise ratio and confidence intervals.
 
 All functions depend only on their arguments. The report and the comparisons of runs show the results.
 """
@@ -46,9 +46,9 @@ class GenerationStatistics:
 
     generation: number of the generation, counted from 0
     evaluated, failed: number of evaluated candidates, and number of failed candidates among them
-    best, median: best fitness and median of the population; NaN if all its candidates have failed
-    low, high: the 10 % and 90 % quantiles of the population (linear interpolation); NaN if all its candidates have
-        failed
+    best, median: best fitness and median of the successful candidates; NaN if all candidates have failed
+    low, high: the 10 % and 90 % quantiles of the successful candidates (linear interpolation); NaN if all candidates
+        have failed
     best_so_far: best fitness up to and including this generation; NaN before a candidate has succeeded
     """
 
@@ -67,9 +67,10 @@ class Trajectory:
     """One quantity of the phenotypes over the generations. All arrays have the shape (generation,).
 
     generations: numbers of the generations
-    low, median, high: 10 % quantile, median and 90 % quantile in each population; NaN values are ignored, and the
-        result is NaN if all values are NaN
-    best: value of the quantity in the best candidate so far; NaN before a candidate has succeeded
+    low, median, high: 10 % quantile, median and 90 % quantile in each population; values that are not finite are
+        ignored, and the result is NaN if there are no others
+    best: value of the quantity in the best candidate so far; NaN before a candidate has succeeded, or if the best one
+        lacks the quantity
     """
 
     generations: NDArray[np.int64]
@@ -118,7 +119,7 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return a quantity over the generations: its quantiles in each population, and its value in the best candidate.
+    """Return a quantity over the generations: quantiles in each population, and its value in the best candidate so far.
 
     Failed candidates also have a phenotype, so they belong to the populations.
 
@@ -224,7 +225,7 @@ def bootstrap_interval(
 
 
 def psnr(signals: NDArray[np.floating], reference: NDArray[np.floating], gain: float = 1.0) -> float:
-    """Return the peak signal-to-noise ratio of `gain` x signals relative to a reference [dB].
+    """Return the peak signal-to-noise ratio [dB] of `gain` x signals relative to a reference.
 
     The peak is 1, the signal of a white surface in daylight. For equal images, the ratio is infinite.
 

@@ -36,7 +36,8 @@ class Vision:
     contrast: MTF in white daylight at half the receptors' Nyquist frequency
     psnr_db: peak signal-to-noise ratio of the eye's image, relative to the image of a perfect lens [dB]. The eye's
         image is first scaled to the same brightness
-    ssim: structural similarity of the same two images, in [-1, 1]; NaN for retinas narrower than three receptors
+    ssim: structural similarity of the same two images, in [-1, 1]; NaN if a retina has fewer than three rows or columns
+        of receptors
     """
 
     image_quality: float
@@ -103,8 +104,8 @@ def ssim(signals: Floats, reference: Floats) -> float:
     """Return the mean structural similarity of images (…, height, width).
 
     The measure is equation 13 of Wang et al. (2004), with equal weights in a square window and sample variances.
-    Signals must range from 0 to 1. The window is 7 receptors wide; on narrower retinas, it is the largest odd number of
-    receptors that fits. The result is NaN if this number is less than 3.
+    Signals must range from 0 to 1. The window is 7 receptors wide and high. If a retina has fewer rows or columns, the
+    window's side is the largest odd number of receptors that fits. The result is NaN if this number is less than 3.
 
     signals, reference: images of the same shape
     """

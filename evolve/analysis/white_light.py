@@ -61,10 +61,10 @@ class WhiteLight:
 
 
 def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
-    """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the maximum.
+    """Return the Strehl ratio in white daylight; NaN if the PSF's maximum is inaccurate or lies outside the window.
 
     The reference is the PSF of the same aperture in white daylight, without aberrations at any wavelength. Maxima of
-    PSFs are proportional to 1/λ², so the maximum of the reference exceeds that of a PSF at the mean wavelength.
+    such PSFs are proportional to 1/λ², so the maximum of the reference exceeds that of a PSF at the mean wavelength.
 
     psf: PSF of the eye in each band
     """

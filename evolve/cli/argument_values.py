@@ -16,7 +16,7 @@ def seed(text: str) -> int:
     """Return the seed that an argument specifies as text.
 
     Raises:
-        ArgumentTypeError: the text is not a whole number, 0 or more.
+        ArgumentTypeError: the text is not a whole number, 0 or more, or has more than 4,000 digits.
     """
     if not text.isdecimal() or len(text) > LONGEST:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number, 0 or more")
@@ -24,7 +24,7 @@ def seed(text: str) -> int:
 
 
 def every(text: str) -> int:
-    """Return the number of actions from one image to the next that an argument specifies as text.
+    """Return the number of actions from one recorded frame to the next, from the text of an argument.
 
     Raises:
         ArgumentTypeError: the text is not a whole number from 1 to 1,000,000.
@@ -35,7 +35,7 @@ def every(text: str) -> int:
 
 
 def searches(text: str) -> int:
-    """Return the number of searches with random fitness that an argument specifies as text.
+    """Return the number of searches with random fitness, from the text of an argument.
 
     Raises:
         ArgumentTypeError: the text is not a whole number from 2 to 100,000.

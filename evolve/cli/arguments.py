@@ -209,7 +209,7 @@ def _add_watching(commands: Commands) -> None:
 
 
 def _add_products(commands: Commands) -> None:
-    """Add the commands that write files from a run."""
+    """Add the commands that write files from a run, and the command `see`."""
     for name, meaning, out in (
         ("replay", "play an episode of an agent, print the result, and write a page that shows it", "FILE"),
         ("report", "write the HTML report", "FILE"),
@@ -255,7 +255,7 @@ def _add_output(command: argparse.ArgumentParser) -> None:
 
 
 def _add_tables(commands: Commands) -> None:
-    """Add the commands that list tasks, presets, genes and settings, or check results and the installation."""
+    """Add the commands that print lists, settings or a completion script, or check results or the installation."""
     validate = _command(
         commands, "validate", "validate.validate", "run validation scripts (in a checkout of the repository)"
     )
@@ -277,7 +277,7 @@ def _add_tables(commands: Commands) -> None:
 def _command(
     commands: Commands, name: str, home: str, meaning: str, directory: bool = False
 ) -> argparse.ArgumentParser:
-    """Add the command that the function `home` of `evolve.cli.commands` runs, and return its parser."""
+    """Add a command, which the function `home` runs ("module.function" in `evolve.cli.commands`); return its parser."""
     parser = commands.add_parser(
         name,
         help=meaning,

@@ -63,7 +63,7 @@ for name in sys.argv[1:]:
 def unsupported(platform_name: str = sys.platform) -> str | None:
     """Return a message in one line if the operating system is not supported, else None.
 
-    Processes and locks use features that only Linux and macOS have.
+    Processes and locks use features of Linux and macOS that Windows lacks.
 
     platform_name: value of `sys.platform`
     """
@@ -83,7 +83,7 @@ def examine() -> dict[str, object]:
     light_cache: folder of the light tables, and the error that prevents writing there (None if there is none)
     packages: version of each package, or "not installed"
     llvm: all LLVM libraries that were tested
-    variants: state of each variant of Mitsuba
+    variants: state of each tested variant of Mitsuba
     notes: messages about the operating system, and about files that hide packages of rhabdom
     good: True if all parts that `evolve run` needs work
     """

@@ -1,8 +1,8 @@
 """The command `evolve`: parses the arguments and runs one of its subcommands.
 
 Errors that users can correct are printed as one line. The exit code is 0 after success, 1 if all candidates of a run
-failed or a validation script failed, 2 if the input or the environment is wrong, and 130 after an interruption. Modules
-of subcommands are imported on use, so that help appears immediately.
+failed, a validation script failed or an unexpected error occurred, 2 if the input or the environment is wrong, and 130
+after an interruption. Modules of subcommands are imported on use, so that help appears immediately.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments: arguments of the command line without the command's name; None: the arguments of this process
 
     Raises:
-        SystemExit: help or the version was requested, or an argument is invalid; see `evolve.cli.arguments.parse`.
+        SystemExit: help or the version was requested, or an argument is invalid (see `evolve.cli.arguments.parse`), or
+            the subcommand does not support Windows.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     open_closed_streams()

@@ -1,6 +1,6 @@
 """Measurement of the speed of this machine.
 
-A few seconds of real training are timed. They run at the same time in as many processes as the run will have.
+Real training is timed for a few seconds, at the same time in as many processes as the run will have.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Pace:
     steps_per_s: number of agent steps per second at the beginning of training, including updates of the policy
     play_s: time of one evaluation, whose episodes run in parallel [s]
     policy_bytes: size of the file of a trained policy [bytes]
-    pass_s: time of one pass over the samples in an update, divided by their number, the agent steps of a rollout [s]
+    pass_s: time per sample (an agent step of the rollout) of one pass over the samples in an update [s]
     """
 
     start_s: float
@@ -67,14 +67,14 @@ class Pace:
     def training_s(self, learning: LearningConfig, begin: int, end: int) -> float:
         """Return the time for rollouts and updates from `begin` to `end` steps [s].
 
-        The number of passes over the samples in an update decreases during training.
+        The number of passes over the samples in an update can decrease during training.
         """
         spared = learning.n_epochs - mean_passes(learning, begin, end)
         return (end - begin) * (1 / self.steps_per_s - spared * self.pass_s)
 
 
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
-    """Return the pace of the slowest worker for each animal. All workers measure at the same time.
+    """Return the pace for each animal, with the slowest of all workers' times. All workers measure at the same time.
 
     animals: animals that are trained for the measurement, by name
     workers: number of worker processes
@@ -180,7 +180,7 @@ def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Pat
 
 
 def _with_short_rollouts(learning: LearningConfig) -> LearningConfig:
-    """Return the settings with the shortest rollouts that consist of whole batches.
+    """Return the settings with the shortest rollouts that consist of whole batches, if these are shorter.
 
     The time per step hardly changes, because an update takes a constant time per batch.
     """

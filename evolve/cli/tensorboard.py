@@ -1,7 +1,7 @@
 """Scalars of a run for TensorBoard: fitness over the generations, learning curves of training runs, and genes.
 
 TensorBoard's own writer writes them to the folder `tensorboard/` of the run directory. All scalars follow from the
-record, so the files are deleted and written again when a run is resumed.
+record, so the files are deleted and written again when a run is resumed with `--tensorboard`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Assembly of a run's configuration from all sources of settings.
 
-The sources are the defaults, the preset and its scale, the task, a TOML file, an animal of another run, and
-`--set key=value`, in this order. Later sources override earlier ones. There is one exception: the preset overrides the
-settings of the task if the preset was made for this task.
+The sources are the defaults, the preset and its scale, the task's default settings, a TOML file, an animal of another
+run, and `--set key=value`, in this order. Later sources override earlier ones. There is one exception: the preset
+overrides the settings of the task if the preset was made for this task.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def assemble(
     preset: name of a preset; None: no preset
     file: TOML file with settings; None: no file
     assignments: settings such as "search.population=8"
-    starts: start values of the genes, which `evolve.runs.start_from` reads from another run; None: the default values
+    starts: start values of the genes, which `evolve.runs.start_from` reads from another run; None: no other run
     scale: "laptop" or "paper", only for a preset that has several scales; None: "laptop" for such a preset
 
     Raises:
@@ -127,7 +127,7 @@ def from_text(text: bytes | str, name: str = "config.toml") -> RunConfig:
 
 
 def _read_back(written: Source) -> RunConfig:
-    """Return a stored configuration, which contains all settings and therefore needs no preset or task defaults."""
+    """Return a stored configuration. Default settings are used only where the file lacks a setting."""
     return _assembled([], [replace(written, tree=upgraded(written.tree))])
 
 

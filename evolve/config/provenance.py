@@ -19,8 +19,8 @@ LONGEST_VALUE = 100  # maximum number of lines that a value may span
 class Source:
     """Settings from one source.
 
-    name: name of the source in messages, such as a file's path, "--set fov_deg=3" or "preset quick"; "" for a source
-        that messages do not name
+    name: name of the source in messages, such as a file's path, "--set seed=3" or "preset quick"; "" for a source that
+        messages do not name
     tree: settings as nested tables
     text: TOML text of the settings; None if the source has no text
     """
@@ -45,7 +45,7 @@ class Source:
 def _spellings(key: str) -> Iterator[list[str]]:
     """Yield the parts of a dotted key.
 
-    If the key belongs to a gene, also yield its parts with each group of this gene in the gene's place, the smallest
+    If the key belongs to a gene, also yield the parts with the gene's name replaced by each of its groups, the smallest
     group first.
     """
     path = key.split(".")
@@ -78,7 +78,8 @@ def _line_of(text: str, path: list[str]) -> int | None:
 def _parsed_from(lines: list[str], count: int) -> tuple[int, Tree | None]:
     """Return the smallest number of lines, at least `count`, that can be parsed, and the settings in these lines.
 
-    Lines that end in the middle of a multi-line value cannot be parsed.
+    Lines that end in the middle of a multi-line value cannot be parsed. If more than 100 additional lines are needed,
+    the result is (count, None).
     """
     for cut in range(count, min(count + LONGEST_VALUE, len(lines)) + 1):
         try:

@@ -22,7 +22,7 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
 
     The start values in `tree` may describe a whole relief of 4 x 4 points, by all its genes or by the genes of a
     symmetric relief. If the eyes have more points, these values are converted to the same surface with more points. If
-    reliefs are symmetric, start values that follow from others by symmetry are removed.
+    reliefs are symmetric, settings that follow from others by symmetry are removed.
 
     Raises:
         ConfigError: `tree` contains start values for more than 4 x 4 genes, and the eyes have even more genes.
@@ -49,7 +49,7 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
 
 
 def _patches(eye: EyeConfig) -> list[list[str]]:
-    """Return the gene of each of 4 x 4 heights: without symmetry and, if reliefs are symmetric, with symmetry."""
+    """Return lists of the genes of 4 x 4 heights: without symmetry and, for symmetric reliefs, also with it."""
     return [representatives(PATCH, symmetric) for symmetric in (False, True)[: 1 + eye.relief_symmetric]]
 
 

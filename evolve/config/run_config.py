@@ -124,7 +124,7 @@ class RunConfig:
             raise ConfigError(message, *keys)
 
     def _check_task(self) -> None:
-        """Check the genes and settings that only some tasks have, and the frames of receptors with memory.
+        """Check the genes and settings that only some tasks have, and the number of frames rendered per action.
 
         Raises:
             ConfigError: the task lacks a gene or a changed setting, or does not allow this number of frames.
@@ -277,5 +277,5 @@ class RunConfig:
 
 
 def _default_genome() -> Mapping[str, GeneConfig]:
-    """Return the default genes of animals in the built-in tasks."""
+    """Return the default settings of the genes of animals in the built-in tasks, by name."""
     return {name: gene.default for name, gene in GENES.items() if name not in OPTIONAL_GENES}

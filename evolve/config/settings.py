@@ -215,8 +215,8 @@ class WiringConfig:
 
     `evolve config schema` describes each field.
 
-    `pool_side` has no effect along an axis with at most this number of receptors. `repeat_side` has no effect along an
-    axis if averaging leaves at least as many signals there. Both must be 0 for compound eyes.
+    `pool_side` has no effect along an axis with at most `pool_side` receptors. `repeat_side` has no effect along an
+    axis if at least `repeat_side` signals remain there after averaging. Both must be 0 for compound eyes.
     """
 
     shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")

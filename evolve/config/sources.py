@@ -137,12 +137,13 @@ def _first_line(error: Exception) -> str:
 
 
 def read_assignment(text: str) -> Source:
-    """Return the source with the setting {"search": {"population": 8}} for the text "search.population=8".
+    """Return the source for one setting as text: "search.population=8" gives {"search": {"population": 8}}.
 
     The value is parsed as TOML. A value that is not valid TOML, such as a word without quotation marks, is text.
 
     Raises:
-        ConfigError: the text has another form, or contains several settings.
+        ConfigError: the text has another form or contains several settings, or its value has too many digits or nested
+            brackets.
     """
     key, equals, value = (part.strip() for part in text.partition("="))
     parts = key.split(".")

@@ -18,7 +18,8 @@ def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
     single gene. Unequal settings are kept, and `no_such_side` explains the error that follows from them.
 
     A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes, the task's
-    settings of height and width are ignored, and the preset's width applies to both sides.
+    settings of height and width are ignored, and the preset's width applies to both sides if the preset does not set
+    the height.
     """
     genes = source.tree.get("genome", {})
     if eye.square and not source.name:

@@ -65,7 +65,7 @@ class TaskCard:
     has_file: bool = False
 
     def has_gene(self, name: str) -> bool:
-        """Return whether animals in this task have this gene."""
+        """Return whether animals in this task can have this gene."""
         return name not in OPTIONAL_GENES or name in self.genes
 
 

@@ -35,7 +35,8 @@ class TaskChoice:
         said: name of a built-in task, or "FILE.py:CLASS"
 
         Raises:
-            ConfigError: the file of a user task cannot be read or is not valid Python, or the class does not exist.
+            ConfigError: the file of a user task cannot be read, is too large or is not valid Python, or the class does
+                not exist.
         """
         if not names_code(said):
             return cls(said)

@@ -35,7 +35,7 @@ class Episode:
     """Recording of one episode in mode "evaluation" or "test". In the shapes of arrays, t is the time step.
 
     Row t of the arrays contains the signals at time t, the action that followed, and the results of this action:
-    rewards and other entries of the observation.
+    rewards, and entries of the next observation other than the signals.
 
     task, candidate_id, seed: name of the task, id of the candidate, and seed of the episode
     phenotype, eye, world: the animal, and the settings of its eyes and of the world
@@ -46,7 +46,8 @@ class Episode:
     reward_terms: terms of the reward by name, (t,) each; 0 in steps in which the task did not return the term
     counted: titles of table rows, by term; a row shows the number of steps in which the term is not 0 (see
         `sim.BatchTask`)
-    beside: other entries of the observation by name, (t, number) each, such as "contact" or "feels"
+    beside: entries of the next observation other than signals and action, by name, (t, number) each, such as "contact"
+        or "feels"
     seconds: duration of one action [s]
     solved: True if the episode counts as solved
     failure: message of the failure that ended the episode; None without a failure

@@ -222,7 +222,7 @@ class _Beginning:
 
 
 def _model(physics: Any) -> mujoco.MjModel:
-    """Return the model of the single world, with the values that were drawn for this episode."""
+    """Return the MuJoCo model of the single world, with all values that were drawn at the start of the episode."""
     model: mujoco.MjModel = physics.datas[0].model if hasattr(physics, "datas") else physics.model
     return model
 

@@ -1,11 +1,11 @@
 """Space constraints of eyes and receptors, and repair of gene values for which eyes or receptors would overlap.
 
-Eyes sit on the equator of a head of radius `eye.head_radius`, and an eye is as wide as its retina. The angle between
-neighbouring eyes is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with receptors,
-which are at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is instead the
-number of receptors along its width times this pitch. Height takes no space on the head, but receptors are also at
-least `eye.receptor_width` high. The repair changes genes as little as possible. Costs (`evolve.config.costs`) are
-computed for the repaired animal.
+Camera eyes sit on the equator of a head of radius `eye.head_radius`, and an eye is as wide as its retina. The angle
+between neighbouring eyes is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with
+receptors, which are at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is
+instead the number of receptors along its width times this pitch. Height takes no space on the head, but receptors are
+also at least `eye.receptor_width` high. The repair changes genes as little as possible. Costs (`evolve.config.costs`)
+are computed for the repaired animal. For compound eyes, see `evolve.genome.head_surface`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SLACK = 1e-9  # tolerance for rounding errors: eyes in contact must not count as
 
 
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
-    """Return the width of a retina with this number of receptors along its width [m]. The eye has the same width.
+    """Return the width [m] of a retina with this number of receptors along its width. The eye has the same width.
 
     sizes: settings of the eyes, here and in the other functions
     """
@@ -73,9 +73,9 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     If receptors are too narrow, their number along the width is reduced. `_with_high_receptors` repairs receptors that
     are not high enough. If eyes overlap, they are spread over a larger part of the head. If the searched range of their
     placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number of its
-    receptors, the numbers of eyes and of receptors are instead reduced in the same proportion. Rhabdoms become at most
-    as wide as the shorter side of a receptor, but at least as wide as the lowest valid value of their gene. All other
-    genes stay within their searched ranges.
+    receptors, the numbers of eyes and of receptors are instead reduced in about the same proportion. Rhabdoms become at
+    most as wide as the shorter side of a receptor, but at least as wide as the lowest valid value of their gene. All
+    other genes stay within their searched ranges.
 
     For compound eyes, see `evolve.genome.head_surface`.
 
@@ -103,9 +103,9 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     """Return new values of genes, by name, with which receptors are at least `eye.receptor_width` high.
 
-    The number of rows is reduced. If the lowest number does not fit and the vertical field of view is a gene, this
-    field grows, at most to its highest value. If that is not enough, the horizontal field shrinks, which makes a retina
-    of the same width higher. For square receptors, the result is {}.
+    If necessary, the number of rows is reduced. If the lowest number does not fit and the vertical field of view is a
+    gene, this field grows, at most to its highest value. If that is not enough, the horizontal field shrinks, which
+    makes a retina of the same width higher. For square receptors, the result is {}.
     """
     vertical = vertical_fov(values, sizes)
     if vertical is None:
@@ -165,8 +165,9 @@ def _thinned(wanted: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> P
     number, evolution would drift towards animals in which the other number is large. Selection, not the repair, should
     choose between eyes and receptors.
 
-    The required space depends on the number of gaps between eyes, eyes - 1. The ratio is therefore computed from the
-    mean of the numbers of eyes and of gaps, eyes - 0.5. This preserves the proportion of eyes to receptors best.
+    The required space depends on the number of gaps between eyes, eyes - 1. The ratio of two numbers of eyes is
+    therefore computed from eyes - 0.5, the mean of the numbers of eyes and of gaps. This preserves the proportion of
+    eyes to receptors best.
 
     wanted, least: numbers of eyes and receptors before the repair, and their smallest allowed values
     range_deg: angle over which the eyes may be spread [deg]

@@ -18,7 +18,7 @@ AUTO = "auto"  # value of a setting whose number is chosen automatically
 def setting(default: Any, valid: Interval | None, meaning: str) -> Any:
     """Return a dataclass field whose metadata contain the valid range and the meaning of the setting.
 
-    valid: valid range of a number; None if it has none, or the value is not a number
+    valid: valid range of a number; None if all numbers are valid, or the value is not a number
     """
     return field(default=default, metadata={"valid": valid, "meaning": meaning})
 
@@ -27,7 +27,7 @@ def setting(default: Any, valid: Interval | None, meaning: str) -> Any:
 class EyeConfig:
     """Settings shared by all eyes of a run. `RunConfig` checks the values.
 
-    `evolve config schema` prints the range, the default and the meaning of each field, which its metadata contain.
+    `evolve config schema` prints the range, the default and the meaning of each field.
     """
 
     optics: bool = setting(True, None, "see through the pupil and its relief; if false, through a perfect lens")
@@ -138,7 +138,7 @@ class EyeConfig:
 
     @property
     def genes(self) -> Mapping[str, Gene]:
-        """All genes of animals that have these eyes, by name."""
+        """All genes that animals with these eyes can have, by name."""
         present = {
             RHABDOM: self.rhabdoms or self.compound,
             VERTICAL: self.vertical_fov == "gene",

@@ -114,7 +114,7 @@ class Gene:
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Return the gene's value at a coordinate. Each value of an integer gene has an interval of the same length.
+        """Return the gene's value at a coordinate. Values of an integer gene have coordinate intervals of equal length.
 
         u: coordinate in [0, 1], which is not checked
         use: settings of the gene in a run; the coordinates 0 and 1 correspond to `use.low` and `use.high`
@@ -141,7 +141,7 @@ class Gene:
         The coordinate of a real gene changes by `normal` times `sigma` and is reflected at 0 and 1. The value of an
         integer gene changes by `step` and is clipped to [use.low, use.high].
 
-        sigma: step size, as a fraction of the gene's range
+        sigma: step size, as a fraction of the searched range
         normal: random number from a standard normal distribution
         step: change of the value of an integer gene, a whole number such as 1 or -1
         use: settings of the gene in a run
@@ -163,7 +163,7 @@ def gene_table(
 ) -> Mapping[str, Gene]:
     """Return the genes of animals with these kinds of eyes by name, in the order of the genome.
 
-    relief_points: number of relief genes along one side; the relief has relief_points² genes
+    relief_points: number of points of the relief along one side; without symmetry, there are relief_points² genes
     relief_symmetric: True if the relief has only the genes of an eighth of its area
     square: True if eyes are square and have one gene for both sides
     optional: names of the genes in OPTIONAL that the animals have

@@ -1,4 +1,4 @@
-"""Encoding of the open genes' values (`evolve.genome.genes`) in a genome, which is a vector in [0, 1]^d."""
+"""Encoding of the genes that the search varies (open genes) in a genome: a vector with a number in [0, 1] per gene."""
 
 from __future__ import annotations
 

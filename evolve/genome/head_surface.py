@@ -29,12 +29,12 @@ SLACK = 1 + 1e-9  # tolerance for rounding errors
 
 
 def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
-    """Return the gene values after the repair of facets that do not fit on the head.
+    """Return the gene values after the repair of eyes that are too high, or whose facets do not fit on the head.
 
     The repair reduces the numbers of eyes, rows and columns and the width of the facets. The distance of a combination
-    of these four quantities from the genes' values is the sum of the squared logarithms of the four ratios. Among all
-    combinations that fit and lie within the searched ranges, the repair chooses the nearest one. No quantity is
-    therefore reduced in preference to the others. Rhabdoms become at most as wide as a facet.
+    of these four quantities from the genes' values is the sum of the squared logarithms of the ratios of new to former
+    values. Among all combinations that fit and lie within the searched ranges, the repair chooses the nearest one. No
+    quantity is therefore reduced in preference to the others. Rhabdoms become at most as wide as a facet.
 
     values: value of each gene, by name
     uses: searched range of each gene, by name

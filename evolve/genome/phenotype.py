@@ -62,10 +62,10 @@ class Phenotype:
     dispersion: 1 / Abbe number of the relief's material; 0: no dispersion
     lambda_max_nm: wavelengths at which the pigments of the receptor types absorb most [nm]; None: the setting
         `eye.receptors` of the run determines the receptors
-    encoder: number of neurons in each of the brain's first layers, of which there is one for each eye
+    encoder: number of neurons in each layer of an eye's encoder, which processes the eye's signals first
     elevation_deg: elevation of the eyes [deg]; None in built-in tasks, in which eyes look along the floor
     rhabdom_diameter_um: diameter of the rhabdoms [µm]; None: receptors are rectangles that absorb all incident light
-    vertical_fov_deg: an eye's vertical field of view [deg]; None: receptors are square
+    vertical_fov_deg: an eye's vertical field of view [deg]; None: receptors are square, or the eyes are compound eyes
     time_constant_ms: time constant of the receptors [ms]; None: they have no memory
     facet_diameter_um, rhabdom_length_um: width of the facets and length of the rhabdoms of compound eyes [µm]
     f_number: focal length of a facet in air / its width
@@ -128,7 +128,7 @@ class Phenotype:
         )
 
     def dynamics(self, eye: EyeConfig) -> optics.ReceptorDynamics | None:
-        """Return the properties of the receptors in time; None for receptors without memory."""
+        """Return the temporal properties of the receptors; None for receptors without memory."""
         import optics
 
         if self.time_constant_ms is None:
@@ -243,7 +243,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
     config: settings of the run, such as a `RunConfig`
 
     Raises:
-        ValueError: the coordinates are not finite numbers, one for each open gene, or are in half precision.
+        ValueError: the genome does not contain one finite number for each open gene, or is in half precision.
     """
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics and not config.eye.compound

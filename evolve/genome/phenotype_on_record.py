@@ -1,6 +1,6 @@
 """Checks of a phenotype that was read from a file: the type of each field, and the range of its gene.
 
-These fields determine the sizes of an animal's arrays. They are therefore checked before the animal is built.
+Some fields determine the sizes of an animal's arrays. All fields are therefore checked before the animal is built.
 """
 
 from __future__ import annotations

@@ -23,8 +23,8 @@ def doe_names(points: int) -> list[str]:
 def representatives(points: int, symmetric: bool) -> list[str]:
     """Return, for each height of the relief in the order of `doe_names`, the name of the gene that determines it.
 
-    A symmetric relief does not change under reflection and rotation by 90°, so an eighth of its heights determines all
-    of them. Only the genes of this eighth exist. Without symmetry, each height has its own gene.
+    A symmetric relief does not change under reflection and rotation by 90°, so the heights in an eighth of its area
+    determine all of them. Only the genes of these heights exist. Without symmetry, each height has its own gene.
 
     points: number of heights along one side of the relief
     """
@@ -40,7 +40,7 @@ def refined(relief: Floats, points: int) -> Floats:
     The conversion is exact: the patch is a single bicubic polynomial, which the cubic spline through its heights
     reproduces. A relief that already has points x points heights is returned unchanged.
 
-    relief: heights in row-major order (y, x), of any shape
+    relief: control points of a 4 x 4 patch, or heights, in row-major order (y, x); the array may be flat
 
     Raises:
         ValueError: the relief has neither 4 x 4 nor points x points heights.

@@ -22,7 +22,7 @@ Callback = Callable[[Run, Candidate], Any]
 
 @dataclass(frozen=True)
 class CallbackWatcher:
-    """Watcher of a run that calls a user's functions with each candidate after it is evaluated and recorded."""
+    """Watcher that calls a user's functions with the run and each candidate, after the candidate is recorded."""
 
     run: Run
     callbacks: Sequence[Callback]
@@ -62,7 +62,7 @@ class Callbacks:
         Raises:
             RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
             ExecutorError: no worker can evaluate candidates.
-            ConfigError: the optimizer is unknown, or cannot be used here.
+            ConfigError: the optimizer is unknown, or cannot be used with the run's settings.
             OSError: a file of the run cannot be read or written.
         """
         with voices(patient=True):

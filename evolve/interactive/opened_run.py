@@ -96,13 +96,13 @@ class OpenedRun(Run):
     def frozen(self, task: Task, candidate_id: int | None = None) -> Frozen:
         """Return a candidate as an animal with a fixed policy, which can be listed in the `others` of another task.
 
-        task: task of this animal, with the same body as the run's task; it receives the candidate's eyes
+        task: task of the animal, with the same body as the run's task; a copy of `task` receives the animal's eyes
         candidate_id: id of the candidate; None: the best candidate
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ValueError: `task` is not a `sim.Task`, has no mounts or several kinds of eyes, or its `place` fails or
-                returns another number of mounts.
+            ValueError: `task` is not a `sim.Task`, has no mounts or several kinds of eyes, or its `place` fails or does
+                not return one mount for each eye.
             OSError: the policy's file cannot be read.
         """
         from evolve.episodes.recorder import trained_policy
@@ -115,8 +115,8 @@ class OpenedRun(Run):
     def held_out(self, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None) -> Episodes:
         """Play episodes in the test set of layouts, which neither training nor selection has used.
 
-        The result has `returns`, sums of rewards, and `verdicts` (1: solved, -1: not solved, 0: undecided), (episode,)
-        each.
+        A user task determines these layouts itself, in its mode "test". The result has `returns`, sums of rewards, and
+        `verdicts` (1: solved, -1: not solved, 0: undecided), (episode,) each.
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episodes
@@ -124,7 +124,8 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: the run has no test set, or the user task's code was not named, or cannot be executed.
+            ConfigError: the run has no test set, or the user task was not named when the run was opened, or its module
+                cannot be executed.
             ValueError: `episodes` is below 1, or `seed` is negative.
             RuntimeError: a method of the user task fails at the start of an episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -143,8 +144,8 @@ class OpenedRun(Run):
             LockedError: another process is working on the run.
             RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, its
                 format is too old, or the search proposes candidates that differ from those on record.
-            ConfigError: config.toml is invalid, the optimizer is unknown or cannot be used here, the user task was not
-                named when the run was opened or fails at its start, or `callbacks` is not a list of functions.
+            ConfigError: config.toml is invalid, the optimizer is unknown or rejects the settings, the user task was not
+                named when the run was opened or fails in a short trial, or `callbacks` is not a list of functions.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             ExecutorError: no worker can evaluate candidates.
             OSError: a file of the run cannot be read or written.
@@ -239,7 +240,7 @@ class OpenedRun(Run):
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set,
-                or the user task's code was not named when the run was opened, or cannot be executed.
+                the user task was not named when the run was opened, or its module cannot be executed.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
             RuntimeError: a method of the user task fails at the start of the episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -263,7 +264,7 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, or the user task's code was not named, or cannot be executed.
+            ConfigError: an argument is invalid, or the user task was not named on opening the run or fails.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
             RuntimeError: a method of the user task fails at the start of the episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.

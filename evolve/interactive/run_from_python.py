@@ -42,9 +42,9 @@ def run(
     settings: settings by dotted name, such as {"search.generations": 2, "seed": 1}; they override all other settings.
         Values are numbers, texts, True or False. None: no such settings
     config: path of a TOML file with settings, which override those of the preset; None: no file
-    scale: scale of an experiment, "laptop" or "paper"; None: "laptop". Other presets accept None only
+    scale: scale of a preset that has several, "laptop" or "paper"; None: "laptop". Presets without scales require None
     start_from: "RUN:ID" of an animal of another run, or "RUN" for its best animal, whose genes are the start values;
-        None: the default values
+        None: the start values in the settings
     out: run directory; None: runs/TASK-PRESET-N, with the first free number N
     callbacks: functions that are called as callback(run, candidate) after every evaluation of a candidate; an exception
         ends the run
@@ -117,7 +117,7 @@ RIGHT: Mapping[str, tuple[Any, str]] = {
 
 
 def _check(**given: Any) -> None:
-    """Check the types of the arguments in `given`, by their names.
+    """Check the types of arguments; `given` contains their values by name.
 
     Raises:
         ConfigError: an argument has the wrong type.
@@ -131,8 +131,8 @@ def _check(**given: Any) -> None:
 def _toml(value: Any) -> str:
     """Return the value of a setting as TOML text, as in the option `--set`.
 
-    The text is written as JSON, because JSON and TOML write numbers, texts, true and false in the same way. NumPy
-    values are converted to Python values.
+    The text is written as JSON, because JSON and TOML write finite numbers, most texts, true and false in the same way.
+    NumPy values are converted to Python values.
 
     Raises:
         ConfigError: the value cannot be written as JSON.

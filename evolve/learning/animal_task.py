@@ -1,4 +1,4 @@
-"""Task of a run with one animal in it. No other module converts a task's name to an object."""
+"""A run's task, with one animal placed in it. No other module converts a task's name to an object."""
 
 from __future__ import annotations
 
@@ -62,14 +62,14 @@ def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes
     """Return a user task with this animal in it.
 
     The eyes are rendered with the run's setting `eye.rays_per_receptor`. If this setting is "auto", the task's own
-    fidelity is used. If this is a `Fidelity`, it receives the run's number of bands. The run's medium replaces the
-    task's own, unless the run's medium is air.
+    fidelity is used. If this fidelity is a `Fidelity`, its number of bands becomes that of the run. The run's medium
+    replaces the task's own, unless the run's medium is air.
 
     eyes: eyes that replace the animal's own; None: the animal's own eyes
 
     Raises:
-        ValueError: the task's `place` fails or returns another number of mounts, or the task has no mounts or several
-            kinds of eyes.
+        ValueError: the task's `place` fails or does not return one mount for each eye, or the task has no mounts or
+            several kinds of eyes.
     """
     animal = with_evolved_eyes(task, eyes or phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
     rays, bands = config.eye.rays_per_receptor, config.eye.bands

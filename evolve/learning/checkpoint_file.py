@@ -1,7 +1,7 @@
-"""Files of checkpoints: each contains its owner and a checksum. Files that cannot be used are renamed.
+"""Files of checkpoints: each names its training run (its owner) and has a checksum. Unusable files are renamed.
 
-The owner is the training run from which the checkpoint comes, see `TrainingRung.owners`. This module does not import
-torch, so that the main process can check a file before a worker loads it.
+`TrainingRung.owners` defines the data that identify an owner. This module does not import torch, so that the main
+process can check a file before a worker loads it.
 """
 
 from __future__ import annotations

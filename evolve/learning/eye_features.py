@@ -1,14 +1,14 @@
-"""Encoder of the eyes' signals for actor and critic: a multilayer perceptron for each eye over a memory of frames.
+"""Encoder of the eyes' signals for actor and critic: for each eye, a multilayer perceptron on its last frames.
 
 Each eye has its own weights, unless `wiring.shared_encoder` is set. The same encoder is applied to each frame in
 memory: three layers of width w map the signals of a frame to a code of w numbers. (For a compound eye, the outputs of
 two hexagonal layers take the place of the signals, and all ommatidia count as one eye.) One further layer then maps the
 codes of all frames, `memory` x w numbers, to the w features of the eye. The features of all eyes are joined with the
-other entries of the observation: proprioception and the previous action.
+other entries of the observation, such as proprioception and the previous action.
 
-Units are leaky rectifiers. With tanh, the agent needed a third more samples to learn detection, and each unit took ten
-times as long to compute. Receptors adapt: the first layer subtracts the running mean of the signals, and divides by
-their running standard deviation. Both are measured during learning.
+Units are leaky rectifiers. With tanh, the agent needed a third more samples to learn the task `detection`, and each
+unit took ten times as long to compute. Receptors adapt: the first layer subtracts the running mean of the signals, and
+divides by their running standard deviation. Both are measured during learning.
 """
 
 from __future__ import annotations
@@ -65,11 +65,11 @@ class Felt(nn.Module):
 class EyeFeatures(BaseFeaturesExtractor):
     """Module that returns the features of observations: `width` numbers for each eye, then the other entries.
 
-    All layers have the same width. An observation may have one of two forms, which give the same features. Environments
-    return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each frame once:
-    `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number of steps
-    since the first frame of the episode. A segment is a sequence of steps of one world. The samples are then the pairs
-    (step, segment) in row-major order.
+    All layers of the encoders have the same width. An observation may have one of two forms, which give the same
+    features. Environments return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers
+    store each frame once: `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment),
+    the number of steps since the first frame of the episode. A segment is a sequence of steps of one world. The samples
+    are then the pairs (step, segment) in row-major order.
 
     Frames of a compound eye have the axes (ommatidium, channel) instead of (eye, channel, height, width). Two layers of
     `hexagonal_layers` come before the encoder, and all ommatidia of the observation count as one eye.
@@ -131,7 +131,8 @@ class EyeFeatures(BaseFeaturesExtractor):
     def _encode(self, frames: Tensor) -> Tensor:
         """Return codes (eye, code, a, b) of frames (a, b, eye, channel, height, width).
 
-        For compound eyes, frames have the axes (a, b, ommatidium, channel), and `eye` has the length 1.
+        The axes a and b are those of the stored frames, such as sample and memory. For compound eyes, frames have the
+        axes (a, b, ommatidium, channel), and `eye` has the length 1.
         """
         a, b = frames.shape[:2]
         return self.encoder(self._signals(frames)).unflatten(2, (a, b))

@@ -1,4 +1,4 @@
-"""Final results: the returns of a trained policy in layouts that neither its training nor its selection has used."""
+"""Final results: the returns of a trained policy in episodes that neither its training nor its selection has used."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def final_episodes(
         RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         TrainingDiverged: the policy's actions, or the returns, are not finite.
-        UnfitPolicy: the policy was trained with different eyes.
+        UnfitPolicy: the policy was trained with eyes whose signals have another shape.
     """
     count = config.evaluation.episodes if episodes is None else episodes
     prepared = PreparedTask(animal_task(phenotype, config, "test"))

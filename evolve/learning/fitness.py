@@ -122,7 +122,7 @@ def _train_and_play(
     progress: Progress | None,
     begun: Checkpoint | None = None,
 ) -> tuple[Training, Episodes]:
-    """Train, then play the evaluation episodes, which have new start poses and object positions.
+    """Train, then play evaluation episodes, whose start poses and object positions differ from those during training.
 
     The layouts of the evaluation are the same for all candidates. Failures of episodes are counted in
     `failures`, even if learning diverges.

@@ -2,8 +2,9 @@
 
 A unit of the first layer receives the signals of seven ommatidia: a central one and its six neighbours. A unit of the
 second layer receives the outputs of seven units of the first layer in the same way. The centres are chosen so that
-every ommatidium is in at least one neighbourhood. On a hexagonal lattice, neighbourhoods are hexagons, and each layer
-reduces the number of places to about a quarter. Other sets of directions are also possible.
+every ommatidium is in at least one neighbourhood. On a hexagonal lattice, neighbourhoods are hexagons. Each layer has
+about a quarter as many of them as the previous layer or, for the first layer, as there are ommatidia. Other sets of
+directions are also possible.
 """
 
 from __future__ import annotations
@@ -75,8 +76,8 @@ def neighbourhoods(directions: np.ndarray) -> np.ndarray:
     """Return the indices of the directions in each neighbourhood, (place, 7), with the centre first.
 
     The six neighbours are in counter-clockwise order, as the animal sees them, beginning on the right. Every direction
-    is in at least one neighbourhood. If there are fewer than seven directions, all belong to a single
-    neighbourhood.
+    is in at least one neighbourhood. If there are fewer than seven directions, all belong to a single neighbourhood,
+    and the result is (1, ommatidium).
 
     directions: unit vectors, (ommatidium, 3)
     """
@@ -93,7 +94,7 @@ def neighbourhoods(directions: np.ndarray) -> np.ndarray:
 
 
 def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Return the indices `near`, with all but the first sorted by azimuth around the direction of the first."""
+    """Return `near` with the centre, its first entry, unchanged, and the neighbours sorted by angle around it."""
     ahead, left, _ = directions[near[0]]
     level = np.hypot(ahead, left)
     rightwards = np.array([left, -ahead, 0]) / level if level > 0 else np.array([0.0, -1.0, 0.0])

@@ -1,4 +1,4 @@
-"""Linear layers with separate weights for each eye: a plain layer, one with adaptation, and one over memory.
+"""Linear layers for each eye: a plain layer, a layer that normalises its inputs, and a layer on several frames.
 
 The last axis of the inputs x contains the samples. A layer W x is then one batched matrix product (GEMM) without a
 copy. With samples on the first axis, the product x Wᵀ took three times as long, both forward and backward, because
@@ -50,10 +50,10 @@ class PerEyeLinear(nn.Module):
 class AdaptedLinear(PerEyeLinear):
     """Linear layer on signals that are normalised by their running mean and standard deviation.
 
-    Each receptor has its own mean, and each eye its own standard deviation, even if the eyes share their weights.
-    Within a scene, signals vary little around their means, and behind a small pupil all signals are small. Without
-    normalisation, the units would respond almost only to the means, and hardly to the variations around them. Weight
-    and bias are rescaled instead of the signals, so that normalisation takes almost no time.
+    Each channel of a receptor has its own mean, and each eye its own standard deviation, even if the eyes share their
+    weights. Within a scene, signals vary little around their means, and behind a small pupil all signals are small.
+    Without normalisation, the units would respond almost only to the means, and hardly to the variations around them.
+    Weight and bias are rescaled instead of the signals, so that normalisation takes almost no time.
     """
 
     def __init__(self, n_eyes: int, inputs: int, outputs: int, shared: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Policy of an animal: an actor and a critic, whose inputs are the features of its eyes.
+"""Policy of an animal: an actor and a critic, whose inputs are features of its eyes and other observations.
 
 A policy is stored in a safetensors file, with its `PolicyConfig` in the metadata. The file contains no code.
 """
@@ -129,7 +129,7 @@ class PolicyConfig:
 
         Raises:
             KeyError: an entry is missing.
-            TypeError: an entry has the wrong type or is unknown.
+            TypeError: an entry has the wrong type, or the wiring has an unknown entry.
             ValueError: an entry has an impossible value.
         """
         return cls(
@@ -151,7 +151,7 @@ def _wiring(stored: Mapping[str, Any]) -> WiringConfig:
 
 
 class EyePolicy(MultiInputActorCriticPolicy):
-    """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
+    """Actor and critic of stable-baselines3 (SB3), whose inputs are the outputs of EyeFeatures.
 
     brain: size and wiring of the brain
     first_actions: mean and standard deviation of each element of untrained actions; None: 0 and 0.5
@@ -288,7 +288,7 @@ def _require_shape(config: PolicyConfig, tensors: Mapping[str, Tensor]) -> None:
 
 
 def require_same_shapes(own: Mapping[str, Tensor], tensors: Mapping[str, Tensor]) -> None:
-    """Check that these are the tensors of a policy, by their names and shapes.
+    """Check that `tensors` have the same names and shapes as `own`, the tensors of a policy.
 
     Raises:
         ValueError: a name or a shape differs.

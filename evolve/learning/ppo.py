@@ -95,8 +95,9 @@ class AdaptingPPO(PPO):
     def _update_learning_rate(self, optimizers: Adam) -> None:
         """Set the step size and the number of passes of the next update.
 
-        In SB3, both would depend on the completed fraction of the planned steps. Here they depend on the number of
-        steps so far, so that the course of training is independent of its planned length.
+        In SB3, the step size may depend on the completed fraction of the planned steps, and the number of passes is
+        constant. Here both depend on the number of steps so far, so that the course of training is independent of its
+        planned length.
         """
         self.n_epochs, share = schedule(self.config, self.num_timesteps)
         optimizers.param_groups[0]["lr"] = self.learning_rate * share
@@ -208,9 +209,10 @@ def train(
 ) -> Training:
     """Train a policy. On one machine, the same arguments give the same policy, bit for bit.
 
-    After every `eval_interval` steps, the policy plays one episode in each of the evaluation worlds. Training ends
-    after `patience` evaluations without a better mean return, or after `total_steps`. The result is the policy at the
-    evaluation with the highest mean return; if several evaluations share it, at the earliest.
+    After every `eval_interval` steps (rounded up to whole rollouts) and at the end, the policy plays one episode in
+    each of the evaluation worlds. Training ends after `patience` evaluations without a better mean return, or after
+    `total_steps`. The result is the policy at the evaluation with the highest mean return; if several evaluations share
+    it, at the earliest.
 
     seed: seed of initial weights, exploration and mini-batches, and of the evaluation worlds
     progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
@@ -240,12 +242,15 @@ def train(
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
-    """Return whether none of the last `patience` evaluations exceeds the best evaluation before them."""
+    """Return whether none of the last `patience` evaluations exceeds the best before them; False if none is before."""
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
-    """Return (mean, standard deviation) of each command before training; `learning.first_speed` sets both for speed."""
+    """Return (mean, standard deviation) of each element of untrained actions.
+
+    `learning.first_speed` sets both for the element "speed".
+    """
     speed = (2 * config.first_speed - 1, config.first_speed)
     return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

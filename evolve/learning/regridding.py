@@ -61,7 +61,7 @@ def _averages(n: int, side: int) -> np.ndarray:
 def _repeats(n: int, side: int) -> np.ndarray:
     """Return the matrix that repeats `n` values on a grid of `side` cells, (side, n).
 
-    Each cell takes the value of the interval that contains its centre.
+    The values belong to equal intervals. Each cell takes the value of the interval that contains its centre.
     """
     taken = (np.arange(side) + 0.5) * n // side
     return np.eye(n)[taken.astype(int)]

@@ -51,7 +51,7 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
 
 
 def _resolve_textures(task: Task | BatchTask) -> None:
-    """Request linear light for the textures for which MuJoCo's compiler chooses it.
+    """Request linear light explicitly for the colour textures that MuJoCo's compiler resolves to linear light.
 
     Raises:
         ValueError: the model cannot be compiled with this request.

@@ -37,11 +37,12 @@ class UnusedSettingWarning(UserWarning):
 def check_settings(config: RunConfig) -> None:
     """Refuse a user task with mounts (places for eyes) that no animal would use; warn about other idle settings.
 
-    The default method `place` of a task spreads an animal's eyes around a single mount. Runs on record are not checked,
-    so they can always be continued and replayed with their eyes.
+    The default method `place` of a task spreads an animal's eyes around a single mount. Existing runs are not checked,
+    so they can always be continued and replayed.
 
     Warns:
-        UnusedSettingWarning: the genome or the settings of the run determine a value that the task also defines.
+        UnusedSettingWarning: the task defines a value that the run's genome or settings determine, or auxiliary
+            entries, which evolving eyes lack.
 
     Raises:
         ConfigError: the task has several mounts and does not define `place`, the user has not named its code, or its
@@ -98,7 +99,7 @@ def check_layouts(config: RunConfig) -> None:
 
 
 def try_task(config: RunConfig) -> None:
-    """Build the user task with the run's first animal, and take a few random actions; skip built-in tasks.
+    """Build a user task with an animal of the genes' start values, and take a few random actions; skip built-in tasks.
 
     Raises:
         ConfigError: the user has not named the task's code, or the task's module, model, eyes or methods fail; the

@@ -66,7 +66,7 @@ def differing_settings(runs: Sequence[Run]) -> dict[str, list[Any]]:
 
 
 def comparison_lines(runs: Sequence[Run]) -> list[str]:
-    """Return the comparison as a table for a terminal, with a row per quantity and a column per run."""
+    """Return the comparison as a table for a terminal: quantities and differing settings as rows, runs as columns."""
     rows = [(name, *values) for name, values in _rows(runs).items()]
     settings = [(name, *(_shown(value) for value in row)) for name, row in differing_settings(runs).items()]
     rows += [("settings that differ", *("" for _ in runs)), *settings] if settings else []

@@ -34,7 +34,7 @@ def export_run(
     seed: seed of the episode
     every: number of actions from one file to the next
     out: folder of the files; None: `exr/` in the run directory
-    doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
+    doing: function that is called with a text on the current work and its completed fraction, in [0, 1]
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
@@ -102,7 +102,8 @@ def _views(episode: Episode, frame: int, source: Mapping[str, Any]) -> list[sim.
 def _attributes(episode: Episode, t: int, eye: int) -> dict[str, Any]:
     """Return the metadata of a view: task, candidate, time, fields of view, and poses of the animal and of the eye.
 
-    The pose of the eye is the position of its pupil [m], and three unit vectors, in world coordinates.
+    The pose of the eye is the position of its pupil [m] and the unit vectors to its right, upwards and ahead, in world
+    coordinates.
     """
     up, scene = float(episode.elevations_deg[eye]), episode.scene
     axes = zip(("eye_right", "eye_up", "eye_ahead"), scene.eye_rotations[t, eye].T, strict=True)

@@ -150,8 +150,8 @@ def _psf(light: WhiteLight) -> Html:
 def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
     """Return the central part of the PSF in white daylight [1/m²], (y, x), and half the width of this part [m].
 
-    It contains at least 98 % of the light, up to rounding, and is at least 3 receptors wide if the PSF is. The PSF is
-    averaged over blocks, so that the part has at most 161 pixels along a side.
+    This part contains at least 98 % of the light, up to rounding. It is at least 3 receptors wide, unless the computed
+    PSF is narrower. The PSF is averaged over blocks, so that the part has at most 161 pixels along a side.
     """
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
@@ -193,7 +193,10 @@ def _cuts(light: WhiteLight) -> Html:
 
 
 def _mtf(light: WhiteLight) -> Html:
-    """Return the figure of the MTF (contrast over spatial frequency), with the diffraction limit of the aperture."""
+    """Return the figure of the MTF (contrast over spatial frequency), with a diffraction limit.
+
+    The limit is that of a circular pupil as wide as the eye's.
+    """
     eye, scale = light.eye, light.per_degree
     cutoff = light.psf.cutoff
     nyquist = light.nyquist

@@ -105,7 +105,7 @@ def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> H
 
 
 def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
-    """Draw each successful candidate at its generation and fitness, connected with the nearest of its parents.
+    """Draw successful candidates at their generation and fitness, with a line to the nearest parent if that succeeded.
 
     The line of descent of the best candidate has the accent colour.
     """
@@ -213,7 +213,7 @@ def gene_figure(
 
 
 def relief_figure(paths: dict[str, Trajectory]) -> Html:
-    """Draw the relief's genes over the generations, in panels arranged as the genes are over the pupil.
+    """Draw the relief's genes over the generations, each in a panel at the gene's position in the pupil.
 
     paths: trajectory of each gene by its name, doe_ROWCOLUMN; row 0 is at the lowest y, and therefore at the bottom
     """

@@ -102,7 +102,7 @@ class Drift:
 
 
 def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
-    """Compare runs, which may differ only in their seeds, with searches with random fitness.
+    """Compare runs, which may differ only in seeds and numbers of workers, with searches with random fitness.
 
     The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical acuity
     unless `eye.vertical_fov` is "receptors", and the number of receptor positions in all eyes. Quantities that do not
@@ -113,8 +113,8 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
     done: function that is called with the completed fraction of the searches
 
     Raises:
-        RunError: the runs differ in settings other than their seeds, two runs have the same seed, or a run has no
-            complete generation.
+        RunError: the runs differ in other settings than seed and number of workers, two runs have the same seed, or a
+            run has no complete generation.
         ValueError: there are fewer than two searches, or more than 100,000.
     """
     if not 2 <= searches <= MOST_SEARCHES:

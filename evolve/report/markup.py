@@ -42,7 +42,9 @@ _SLOT = "{}"
 
 @dataclass(frozen=True)
 class Html:
-    """A piece of a page. Modules other than this one and `svg` must create pieces only with the function `html`.
+    """A piece of a page.
+
+    Other modules, except `svg`, must create nonempty pieces only with functions of this module, such as `html`.
 
     markup: the HTML text
     rules: CSS declarations for elements of this piece, by the value of the elements' attribute `data-look`
@@ -87,7 +89,8 @@ def style(declarations: str) -> Html:
     in the page's style sheet instead.
 
     Raises:
-        ValueError: the text contains more than declarations.
+        ValueError: the text contains characters that could end the declarations, such as braces, or that could begin a
+            comment.
     """
     if re.search(r"[{}<>@\\\x00-\x1f]|/\*", declarations):
         raise ValueError(f"declarations = {declarations!r}: must be CSS declarations")
@@ -142,8 +145,8 @@ def table(
 
     header, rows: cells of the first row, and of the other rows; texts are escaped
     name: id of the table
-    highlight: number of the row that is emphasised; None: no row
-    ids: id of each row
+    highlight: number of the emphasised row in `rows`, counted from 0; None: no row
+    ids: id of each row; (): no ids
     """
     head = joined(html('<th scope="col">{}</th>', cell) for cell in header)
     body = joined(
@@ -219,7 +222,7 @@ def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
 
 
 def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
-    """Return a content security policy that allows these styles and scripts, and nothing from other files."""
+    """Return a content security policy that allows only these styles and scripts, and images in data URIs."""
     return (
         f"default-src 'none'; img-src data:; base-uri 'none'; form-action 'none'; "
         f"style-src {_hashes(styles)}; script-src {_hashes(scripts)}"

@@ -115,9 +115,9 @@ def _palette(samples: list[Image.Image]) -> Image.Image:
 
 
 def _world(episode: Episode, time: int) -> Image.Image:
-    """Return an image of the world at one time: the latest rendered image, with the plan in its lower left corner.
+    """Return an image of the world at one time: the latest rendered image, and the ground plan in its corner, if any.
 
-    Without rendered images, the plan fills the image. Without both, the image has the width 0.
+    The plan is at the lower left. Without rendered images, it fills the image. Without both, the image has the width 0.
     """
     pictures, above = episode.pictures, None if episode.plan is None else _from_above(episode, episode.plan, time)
     if pictures is None:
@@ -141,7 +141,7 @@ def _from_above(episode: Episode, plan: GroundPlan, time: int) -> Image.Image:
 
 
 def _frame(world: Image.Image, seen: np.ndarray, aspect: float) -> Image.Image:
-    """Return one frame, with the world on the left, and the signals of all eyes on the right, row by row.
+    """Return one frame: the world on the left, and an image of each eye's signals on the right, arranged in rows.
 
     world: image of the world
     seen: signals of the eyes as pixels, (eye, y, x, 3)
@@ -160,7 +160,7 @@ def _frame(world: Image.Image, seen: np.ndarray, aspect: float) -> Image.Image:
 
 
 def _eye_height(eyes: int, columns: int, aspect: float) -> float:
-    """Return the largest height of an eye's image [pixels] if all images are arranged in `columns` columns.
+    """Return the greatest height [pixels] at which the images of all eyes fit into a frame in `columns` columns.
 
     aspect: width of an image divided by its height
     """
@@ -169,9 +169,9 @@ def _eye_height(eyes: int, columns: int, aspect: float) -> float:
 
 
 def _draw_world(draw: ImageDraw.ImageDraw, episode: Episode, plan: GroundPlan, time: int, scale: float) -> None:
-    """Draw walls, objects, the path so far, fields of view and the agent.
+    """Draw walls, the goal region if there is one, objects, the path so far, fields of view and the agent.
 
-    scale: pixels of the enlarged drawing per metre
+    scale: pixels per metre in this drawing, which is reduced in size afterwards
     """
 
     def place(x: float, y: float) -> tuple[float, float]:

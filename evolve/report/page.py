@@ -82,6 +82,7 @@ def numbers_section(run: Run) -> Html:
 
     Raises:
         RunError: the policy of the best candidate is missing or damaged.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: the policy's file cannot be read.
     """
     has_test_set = run.config.world.layouts == FAMILY and run.best is not None
@@ -90,7 +91,7 @@ def numbers_section(run: Run) -> Html:
 
 
 def genes_section(run: Run) -> Html:
-    """Return the section with the genes that the search varies, by cluster, and the acuity, over the generations."""
+    """Return the section with curves over the generations: the varied genes, by cluster, and the acuity."""
     if not run.candidates:
         return Html()
     parts = [
@@ -154,7 +155,7 @@ def _relief(run: Run, genes: list[Gene]) -> Html:
 
 
 def vision_section(run: Run, doing: Doing) -> Html:
-    """Return the section with four measures of the image quality (`VISION`) of the best eye over the generations."""
+    """Return the section with up to four measures of image quality (`VISION`) of the best eye so far, by generation."""
     best = champions(run.candidates)
     if not best:
         return Html()

@@ -33,7 +33,8 @@ def display(signals: NDArray[np.floating], gain: float = 1.0) -> NDArray[np.uint
 def png(pixels: NDArray[np.uint8]) -> bytes:
     """Return the contents of an 8-bit RGB PNG file with the pixels (y, x, 3).
 
-    The same pixels give the same bytes. Source: PNG specification, 3rd ed., sections 5 and 11.
+    With the same version of zlib, the same pixels give the same bytes. Source: PNG specification, 3rd ed., sections 5
+    and 11.
     """
     height, width, _ = pixels.shape
     rows = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, 3 * width)], axis=1)
@@ -51,7 +52,7 @@ def data_uri(pixels: NDArray[np.uint8]) -> str:
 
 
 def film_sheet(frames: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:
-    """Return a sheet (y, x, 3) that contains all frames (time, eye, y, x, 3), and the number of frames in a row.
+    """Return a sheet (y, x, 3) that contains all frames (time, eye, y, x, 3), and the number of frames in each row.
 
     A frame contains all eyes side by side. The frames fill the sheet row by row.
     """

@@ -61,7 +61,7 @@ def player(episode: Episode) -> Html:
 
 
 def _world(episode: Episode) -> Html:
-    """Return the figures of the world: rendered images, and the world from above if the task has a ground plan."""
+    """Return figures of the world: rendered images, if any, and the world from above if the task has a ground plan."""
     pictures = Html() if episode.pictures is None else figure_of_pictures(episode.pictures)
     return pictures if episode.plan is None else pictures + _from_above(episode.plan)
 
@@ -90,7 +90,7 @@ def _from_above(plan: GroundPlan) -> Html:
 def _sights(episode: Episode) -> Html:
     """Return a pair of canvases for each eye, which show its signals with noise and the signals without noise.
 
-    The signals without noise are those behind a perfect lens, except for compound eyes.
+    The signals without noise are those behind a perfect lens or, for compound eyes, those of the same ommatidia.
     """
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
@@ -198,8 +198,8 @@ def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
 def _commands(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
     """Return the commands at the time steps that the player shows.
 
-    The commands speed [m/s] and turn [°] are returned by name, because player.js writes them as a sentence. Other
-    actions are returned as plain numbers.
+    If the commands are speed [m/s] and turn [°], they are returned by name, because player.js writes them as a
+    sentence. Otherwise, the actions are returned as plain numbers.
     """
     action = episode.action[kept]
     found = {
@@ -222,7 +222,7 @@ def _kept(episode: Episode) -> np.ndarray:
 
 
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
-    """Return (frame, "goal" or "adversary") for each time at which an object was reached, in order of the frames.
+    """Return (frame, "goal" or "adversary") for each time at which one of these was reached, in order of the frames.
 
     frame: index in `kept` of the first time step at or after this time
     """

@@ -40,7 +40,7 @@ def write_replay(
     mode: "evaluation", or "test" for the layouts of the test set
 
     Raises:
-        RunError: the candidate does not exist, or its policy is missing or damaged.
+        RunError: the candidate does not exist, no candidate has succeeded, or the policy is missing or damaged.
         ConfigError: the package `rerun` or ffmpeg is needed but not installed, `out` has the ending of an additional
             file, a format or the mode is unknown, `every` is given without "rrd", the run has no test set, or the user
             task was not named when the run was opened, or its module cannot be executed.
@@ -70,7 +70,7 @@ def _require_page(out: Path) -> None:
 
     Raises:
         ConfigError: the path has the ending of an additional file.
-        StrangeFileError: the path is not a regular file.
+        StrangeFileError: the path is a link, FIFO, device or directory.
     """
     require_file_name(out)
     if (form := out.suffix.lower().removeprefix(".")) in BESIDE:

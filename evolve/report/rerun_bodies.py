@@ -19,7 +19,7 @@ GOAL, GOAL_HEIGHT = (0, 158, 115), 0.01  # colour (green) and half height [m] of
 
 
 def draw_bodies(to: RerunStream, scene: EpisodeScene, eyes: sim.Eyes) -> None:
-    """Log all bodies and eyes with their poses before each action, and the animal's path."""
+    """Log all bodies with visible geoms, and all eyes, with their poses before each action, and the animal's path."""
     for body in sorted({solid.body for solid in scene.solids}):
         _place(to, (*BODIES, scene.bodies[body]), scene.positions[:, body], scene.rotations[:, body])
     for solid in scene.solids:
@@ -44,7 +44,7 @@ def draw_goal_region(to: RerunStream, plan: GroundPlan) -> None:
 
 
 def _place(to: RerunStream, entity: tuple[str, ...], positions: np.ndarray, rotations: np.ndarray) -> None:
-    """Log the poses of an entity before each action, (t, 3) [m] and (t, 3, 3)."""
+    """Log the positions (t, 3) [m] and rotation matrices (t, 3, 3) of an entity before each action."""
     to.columns(entity, len(positions), to.rr.Transform3D.columns(translation=positions, mat3x3=rotations))
 
 

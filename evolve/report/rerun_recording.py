@@ -3,11 +3,12 @@
 A recording has two timelines: `action` is the number of the action, and `time` is the time in the world [s]. The
 recording has the following entities.
 
-`world` contains `bodies`, the animal's `path` and its `eyes`. Each eye is a camera with an image of its signals.
+`world` contains `bodies`, the animal's `path`, its `eyes` and, if the task has one, the `goal_region`. Each eye is a
+camera with an image of its signals.
 
 `signals` contains the same signals as numbers, (channel, y, x). `perfect_lens` contains images of the signals of the
 same receptors behind a perfect lens, or, for compound eyes, of the signals without noise. `scene` contains images of
-the scene in front of each eye, on a finer grid.
+the scene in front of each eye, on a finer grid, at the times at which radiance was recorded.
 
 `action`, `reward` with its terms, and other entries of the observation, such as `contact` or `feels`, are numbers over
 time. `outcome` is the outcome of the episode.
@@ -70,7 +71,9 @@ def _write(to: RerunStream, episode: Episode) -> None:
 
 
 def _log_images(to: RerunStream, episode: Episode) -> None:
-    """Log, for the time before each action, the signals of each eye, and those behind a perfect lens.
+    """Log, for the time before each action, the signals of each eye, and the signals for comparison.
+
+    The latter are the signals behind a perfect lens or, for compound eyes, the signals without noise.
 
     At times at which radiance was recorded, also log the scene in front of each eye.
     """

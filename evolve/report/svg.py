@@ -1,6 +1,7 @@
 """Conversion of Matplotlib figures to SVG elements, which follow the page's light or dark theme.
 
-The module does not use pyplot, which has a global state. The same figure therefore gives the same bytes.
+The module does not use pyplot, whose global state could change a figure. With the same version of Matplotlib, the same
+figure gives the same bytes.
 """
 
 from __future__ import annotations
@@ -91,7 +92,11 @@ def inline(figure: Figure, name: str, alt: str) -> Html:
 
 
 def _without_inline_styles(text: str) -> Html:
-    """Replace the attributes `style` by `data-look`. The figure's text cannot match, as its quotes are escaped."""
+    """Replace the attributes `style` by `data-look`.
+
+    Text in the figure that has the form of such an attribute is also replaced, because Matplotlib does not escape
+    quotes in text.
+    """
     pieces = re.split(r' style="([^"]*)"', text)
     return joined(html(" {}", style(unescape(piece))) if at % 2 else Html(piece) for at, piece in enumerate(pieces))
 

@@ -34,7 +34,7 @@ __all__ = [
 def headline(run: Run, held_out: Sequence[float] = ()) -> Html:
     """Return the main results of the run.
 
-    held_out: returns of the best candidate's episodes in the test set of layouts; empty if the run has none
+    held_out: returns of the best candidate's episodes in the test set of layouts; empty without a test set
     """
     failed = sum(not succeeded(c) for c in run.candidates)
     generations = len({c.generation for c in run.candidates})
@@ -73,7 +73,7 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
 
 
 def _best_spread(best: Candidate) -> str:
-    """Return the interval of the fitness in words, after the parts of the fitness if there are costs."""
+    """Return the 95 % interval of the fitness in words, after task fitness and costs if there are costs."""
     spread = _spread(best.returns, best.costs)
     if not best.costs:
         return spread
@@ -81,7 +81,10 @@ def _best_spread(best: Candidate) -> str:
 
 
 def _spread(returns: Sequence[float], costs: float = 0.0) -> str:
-    """Return the number of episodes and the interval of their mean return minus costs, in words."""
+    """Return the number of episodes and the 95 % interval of their mean return minus costs, in words.
+
+    For a single episode, there is no interval.
+    """
     if len(returns) == 1:
         return "a single episode"
     low, high = (end - costs for end in bootstrap_interval(returns))
@@ -190,7 +193,10 @@ def failures(run: Run) -> Html:
 
 
 def episode_failures(run: Run) -> Html:
-    """Return the table of failures that ended single episodes, with their numbers; empty if there are none."""
+    """Return the table of failures that ended single episodes, with the numbers of episodes and candidates.
+
+    The result is empty if there are none.
+    """
     found = episode_failures_of(run.candidates)
     if not found:
         return Html()

@@ -1,4 +1,7 @@
-"""Images at one time of an episode: the scene, and each eye's signals behind a perfect lens and its own optics."""
+"""Images at one time of an episode: the scene, and the signals of each eye with and without noise.
+
+For eyes with a lens, signals behind a perfect lens are also shown.
+"""
 
 from __future__ import annotations
 

@@ -87,7 +87,8 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
 
     tried: True to build the search, draw random layouts and try the user task in this process. False if the run is
-        only planned: other processes then try the task and measure its pace
+        only planned: other processes then try the task and measure its pace, and the search is built only if its
+        optimizer is neither "CMA" nor "mutation"
 
     Raises:
         ConfigError: a setting is invalid, the optimizer is unknown, random layouts cannot be drawn or two of them are

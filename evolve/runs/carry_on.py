@@ -47,7 +47,7 @@ def carry_on(
 
     Raises:
         RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
-        ExecutorError: no worker can evaluate candidates.
+        ExecutorError: candidates cannot be evaluated.
         ConfigError: the optimizer is unknown, or cannot be used here.
         OSError: a file of the run cannot be read or written.
     """

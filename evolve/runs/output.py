@@ -1,11 +1,13 @@
-"""Safe output of text on a terminal. Commands print all text through a Voice, and their results with `say`.
+"""Safe output of text on a terminal.
+
+Commands print all text through a `Voice`, a stream that escapes control characters, and their results with `say`.
 
 Messages, settings and names of directories may come from an untrusted source. Escape sequences in them are printed as
 visible text, so that they have no effect on the terminal. Characters that the terminal's encoding lacks are spelt out
 ("sigma"), or printed as numbers. If a reader such as `head` closes the pipe, or the disk is full, a run continues.
 
-stdout contains only the text that `say` prints. Within a command, `print` writes to stderr; so do `print` calls in the
-code of users' tasks.
+In commands other than `validate`, stdout contains only the text that `say` prints. There, `print` writes to stderr; so
+do `print` calls in the code of users' tasks.
 """
 
 from __future__ import annotations
@@ -72,7 +74,7 @@ class Voice(OwnedStream):
         stderr; None: faults other than a closed pipe are ignored
 
     Raises:
-        BrokenPipeError: on writing, the reader has closed the pipe, and `patient` is False.
+        BrokenPipeError: on writing, the pipe or terminal has been closed, and `patient` is False.
         OSError: on writing, another fault has occurred, `patient` is False, and the stream has a name.
     """
 
@@ -88,7 +90,7 @@ class Voice(OwnedStream):
         """Report a fault, or raise it if the stream is not patient.
 
         Raises:
-            BrokenPipeError: the reader has closed the pipe, and the stream is not patient.
+            BrokenPipeError: the pipe or terminal has been closed, and the stream is not patient.
             OSError: another fault has occurred, the stream is not patient, and it has a name.
         """
         number = fault.errno if isinstance(fault, OSError) else errno.EBADF
@@ -110,7 +112,10 @@ def results() -> TextIO:
 
 
 def say(text: str, end: str = "\n", flush: bool = False) -> None:
-    """Print a part of a command's result on stdout, unless it is silenced; `end` and `flush` are those of `print`."""
+    """Print a part of a command's result on stdout, unless `silenced` discards it.
+
+    end, flush: see `print`
+    """
     print(text, end=end, file=results(), flush=flush)
 
 
@@ -153,7 +158,7 @@ def _results_on(stream: TextIO) -> Iterator[None]:
 
 
 def as_it_is(stream: TextIO) -> TextIO:
-    """Return a stream with the same destination that does not escape control characters; see `Voice.obeyed`."""
+    """Return a stream to the same destination, which leaves control characters unchanged; see `Voice.obeyed`."""
     if not isinstance(stream, Voice):
         return stream
     return cast(TextIO, Voice(stream.stream, stream.patient, obeyed=True, name=stream.name))

@@ -56,7 +56,10 @@ class Tally:
 
     @property
     def planned(self) -> int:
-        """Total number of evaluations in the whole run; a candidate is evaluated after every rung that it reaches."""
+        """Total number of evaluations in the whole run if no candidate fails.
+
+        A candidate is evaluated after every rung that it reaches.
+        """
         return evaluations(self._run.config.search)
 
     @property

@@ -2,7 +2,7 @@
 
 ask_tell            minimal example of a search, as an introduction
 loop                main loop of a run, from proposals to recorded candidates
-search              Search: proposals of candidates, also if genes open in later generations, and training seeds
+search              Search: proposals of candidates, also if genes begin to vary in later generations, and seeds
 optimizers          CMA-ES and other optimizers
 null_model          searches with random fitness, for comparison with runs
 same_search         check that a rebuilt search proposes the candidates on record

@@ -35,7 +35,7 @@ class Connection:
 
     scheduler: the scheduler
     patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]
-    note: function that is called with one line if the run waits for a sign of life
+    note: function that is called with one line if the run waits for a sign of life, or removes a silent worker
     topic, events: Dask topic to subscribe to, and the function that receives its events
 
     Raises:
@@ -69,7 +69,7 @@ class Connection:
     def restore(self) -> None:
         """Connect again, with repeated attempts for at most `patience_s`.
 
-        Dask's client also reconnects, but gives up after seconds, so a new client replaces it.
+        Dask's client also reconnects, but gives up after a few seconds, so a new client replaces it.
         """
         while True:
             self._pass_time(CONNECT_S + LISTEN_S)
@@ -99,7 +99,9 @@ class Connection:
         self._pass_time(2 * LISTEN_S)
 
     def ask(self, call: Callable[[], Awaitable[Any]], timeout: float = math.inf) -> Any:
-        """Return the result of a call of Dask. Exceptions of the call are passed on.
+        """Return the result of a call of Dask.
+
+        Exceptions of the call are passed on, unless they show that the connection was lost.
 
         call: function that returns an awaitable, which is awaited in the thread of Dask's client
         timeout: maximum duration of the call [s]; by default, it is unlimited while there are signs of life
@@ -128,7 +130,7 @@ class Connection:
             answer.cancel()
 
     def remove_lost_workers(self) -> None:
-        """Make the scheduler remove workers that were silent for `patience_s`; other workers receive their candidates.
+        """Make the scheduler remove workers that were silent for `patience_s`, and give their candidates to others.
 
         Raises:
             ConnectionLost: the connection was lost.
@@ -164,7 +166,7 @@ class Connection:
         return asyncio.run_coroutine_threadsafe(awaited(), self.client.loop.asyncio_loop)
 
     def _pass_time(self, longest: float) -> None:
-        """Count the time since the last check as silence, and notify the user of a long silence.
+        """Count the time since the last check as silence, and notify the user of a long silence or a lost connection.
 
         longest: maximum time that is counted [s], because this process may have been suspended since the last check
 

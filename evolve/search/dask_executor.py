@@ -46,7 +46,8 @@ class DaskExecutor:
     """Executor with the workers of a Dask scheduler. Each worker evaluates one candidate at a time.
 
     The executor is a context manager. A candidate whose worker dies is evaluated again, up to 3 times in
-    total. If the connection to the scheduler is lost, all unfinished jobs are submitted again after reconnecting.
+    total. If the connection to the scheduler is lost, all unfinished jobs are submitted again after reconnecting, and
+    their attempts are counted anew.
 
     scheduler: the scheduler, or its address
     function: "module:name" of the function that evaluates a candidate; it takes the arguments of
@@ -101,6 +102,7 @@ class DaskExecutor:
             ExecutorError: a worker cannot evaluate candidates or has other software, its machine lacks resources such
                 as disk space, the run's settings cannot be used there, or the scheduler or all workers are silent for
                 `patience_s`.
+            ConfigError: the run has a user task that the user has not named.
             OSError: a policy or a checkpoint cannot be read or written here.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
@@ -212,7 +214,7 @@ class DaskExecutor:
         return outcome
 
     def _report(self, progress: Progress | None) -> None:
-        """Pass the progress reports that workers have sent to `progress`."""
+        """Call `progress` with each report of progress that workers have sent."""
         with contextlib.suppress(Empty):
             while True:
                 report = self._reports.get_nowait()

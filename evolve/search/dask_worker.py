@@ -55,7 +55,8 @@ class Order:
     counter: name of the scheduler's variable that counts the attempts
     topic: Dask topic on which the worker reports its progress
     ends: number of training steps at the end of each rung, up to the last rung of this job; () without rungs
-    begun: (rung, checkpoint) from which training continues; None: training starts from the beginning
+    begun: number of the last complete rung, and its checkpoint, from which training continues; None: training starts
+        from the beginning
     software: versions of the sender's software
     code: path and text of a user task's file; None for a built-in task
     """

@@ -163,7 +163,7 @@ def cores() -> int:
 
 
 def _end(worker: _Worker) -> None:
-    """Wait for a process to end; after 5 s, kill it."""
+    """Wait for a worker's process to end, or kill it after 5 s, and close the pipe."""
     worker.process.join(STOPPING_S)
     if worker.process.is_alive():
         worker.process.kill()
@@ -190,7 +190,7 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
 def _without_main() -> Iterator[None]:
     """Prevent multiprocessing from executing the caller's script again in a child.
 
-    Workers do not need the script. If the script starts a run, each worker would start another run.
+    Workers do not need the script. If the script starts a run, each worker would otherwise start another run.
     """
     main = sys.modules["__main__"]
     hidden: dict[str, Any] = {name: vars(main).pop(name) for name in ("__file__", "__spec__") if name in vars(main)}

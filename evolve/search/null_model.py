@@ -38,7 +38,7 @@ TIE = 1e-5
 
 @dataclass(frozen=True)
 class NullModel:
-    """Results of searches with random fitness, by name of the quantity.
+    """Results of searches with random fitness, by name of a quantity.
 
     means: mean of a quantity over the candidates of a generation that have it, (search, generation); NaN if no
         candidate has it
@@ -77,7 +77,8 @@ def null_model(
     searches: number of searches, at least 1
     done: function that is called with the completed fraction of the searches
     spread: standard deviation of task fitness in each generation, from `fitness_spread`. It is needed only if there
-        are costs, because optimizers use only the order of fitness values.
+        are costs. Without costs, the standard deviation is 1, because CMA-ES and "mutation" use only the order of
+        fitness values.
 
     Raises:
         ValueError: there are costs, and `spread` has fewer values than generations.
@@ -141,7 +142,7 @@ def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> 
     If animals have costs, the fitness is a random task fitness, with the standard deviation `spread` of its generation,
     minus the costs.
 
-    With `search.steady_state`, a fitness is reported before each new proposal, as in a run.
+    With `search.steady_state`, a fitness is reported before each new proposal after the first population, as in a run.
     """
     search, chance = Search(config), np.random.default_rng(config.seed)
 
@@ -173,7 +174,7 @@ def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> 
 def last_generations(config: RunConfig, generations: int) -> list[range]:
     """Return the final 3 generations of each phase, or all generations of a shorter phase.
 
-    A phase consists of the generations between two changes of the set of genes that vary.
+    A phase lasts from one generation in which genes begin to vary to the next such generation, or to the end.
 
     generations: number of generations of the search
     """

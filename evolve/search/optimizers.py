@@ -68,8 +68,9 @@ class Mutation:
     """Optimizer that mutates every gene of a parent. A real gene changes by a Gaussian step, an integer by -1, 0 or +1.
 
     The parent is drawn at random from the fittest candidates of the last two populations with known fitness. The number
-    of these candidates is a quarter of a population. Older candidates are excluded, so that a fitness that was high by
-    chance has no permanent effect. Before any fitness is known, the parent is the start genome.
+    of these candidates is a quarter of a population, rounded down, but at least 1. Older candidates are excluded, so
+    that a fitness that was high by chance has no permanent effect. Before any fitness is known, the parent is the start
+    genome.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
@@ -151,7 +152,8 @@ class CMA(Named):
     """CMA-ES (Hansen and Ostermeier 2001), implemented by pycma, which is called through nevergrad.
 
     The initial step size is `search.sigma`. CMA-ES samples candidates around a weighted mean of the better half of the
-    last population with known fitness. The members of this better half are recorded as the parents of each candidate.
+    last population with known fitness. The members of this better half are recorded as the parents of each new
+    candidate.
 
     nevergrad has an option for noisy functions, but its CMA-ES uses this option only to recommend a single best genome.
     The option is not set, because the best candidate is taken from the record.
@@ -204,13 +206,13 @@ def _array(space: Space, sigma: float) -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Suppress two warnings that have no consequences here.
+    """Suppress a warning of pycma, and all warnings of nevergrad, which have no consequences here.
 
     In small populations, pycma adds mirrored samples, which it calls injected solutions. nevergrad reflects them at the
     bounds. pycma then no longer recognises them, and warns. This is harmless, because pycma receives the samples that
     were evaluated.
 
-    nevergrad warns that some optimizers learn only from complete populations.
+    nevergrad warns, for example, that some optimizers learn only from complete populations.
     """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="orphanated injected solution")

@@ -2,8 +2,8 @@
 
 To continue a run, its search is rebuilt: all proposals are repeated, and the recorded fitness is reported again. On the
 processor and with the libraries that started the run, the proposed genomes equal those on record bit for bit. Another
-processor rounds differently, and the difference can grow, because pycma recognises its own solutions by their bits. If
-the last bit of a solution differs, pycma treats the solution as injected from outside, and shortens its step if the
+processor may round differently, and the difference can grow, because pycma recognises its own solutions by their bits.
+If the last bit of a solution differs, pycma treats the solution as injected from outside, and shortens its step if the
 step is long.
 """
 
@@ -30,6 +30,8 @@ LIBRARIES = ("nevergrad", "cma", "numpy")
 
 class SameSearch:
     """Comparison of a search's proposals with a run's record.
+
+    A tolerance is the largest accepted difference of a coordinate in [0, 1].
 
     The first generation follows from the settings alone, so its tolerance is 10⁻⁹. Later generations have the wider
     tolerance 0.02, but only if the optimizer's libraries have the same versions as at the start of the run. With other

@@ -1,9 +1,9 @@
 """The search, which proposes candidates and receives their fitness.
 
 A gene may begin to vary only in a later generation (its setting `opens_at`). A phase lasts from one generation in which
-genes begin to vary to the next such generation. The state of the search follows from the settings, the seed and the
-fitness values received so far. A run is continued by repeating all proposals and reporting all recorded fitness values
-again; no state is stored.
+genes begin to vary to the next such generation, or to the end of the search. The state of the search follows from the
+settings, the seed and the fitness values received so far. A run is continued by repeating all proposals and reporting
+all recorded fitness values again; no state is stored.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ class Proposal:
     """A proposed genome.
 
     place: place of the candidate in the search
-    genome: coordinates of the open genes in [0, 1]
-    parents: ids of the candidates from which the optimizer derived the genome. A new optimizer at the start of a later
-        phase has no parents yet; the parent is then the candidate from which the phase started.
+    genome: coordinates of the genes that vary at any time in the search, in [0, 1]
+    parents: ids of the candidates from which the optimizer derived the genome. At the start of a later
+        phase, the new optimizer names no parents yet; the parent is then the candidate from which the phase started, if
+        there is one.
     """
 
     place: Place
@@ -53,9 +54,9 @@ class Proposal:
 class Search:
     """Search that proposes one candidate after the other.
 
-    In each generation in which further genes begin to vary, a new optimizer starts from the best genome so far. This
-    optimizer varies these genes and those that varied before. Each optimizer receives the fitness of the candidates
-    that it has proposed.
+    In each generation in which further genes begin to vary, a new optimizer starts from the best genome so far, or
+    from the start genome if no candidate has succeeded. This optimizer varies these genes and those that varied before.
+    Each optimizer receives the fitness of the candidates that it has proposed.
 
     Raises:
         ConfigError: the optimizer is unknown, or cannot be built for this genome and population.
@@ -136,7 +137,7 @@ class Search:
 
 
 def training_seed(run_seed: int, candidate_id: int) -> int:
-    """Return the seed of a candidate's training and evaluation, which differs between candidates.
+    """Return the seed of a candidate's training and evaluation, which follows from the run's seed and the id.
 
     run_seed: the setting `seed` of the run
     """

@@ -66,7 +66,7 @@ class SignsOfLife:
     def silence_s(self) -> float:
         """Time [s] since the last answer of the scheduler, or since the last heartbeat of any worker if this is longer.
 
-        Heartbeats of paused workers do not count.
+        Heartbeats of workers that neither accept nor evaluate candidates do not count.
         """
         return max(self._scheduler_s, self._workers_s)
 

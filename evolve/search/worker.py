@@ -1,4 +1,7 @@
-"""Worker process, which evaluates one candidate after another until its pipe is closed or its parent process ends."""
+"""Worker process, which evaluates one candidate after another.
+
+It ends when its pipe is closed, its parent process ends, or it cannot evaluate candidates.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,8 @@ class Message:
     """Message from a worker to its executor.
 
     kind, content: "progress" with (steps trained, steps planned); "done" with the Evaluation; "unfit" with the reason
-        why the worker cannot evaluate candidates; or "died" with None, if the pipe is closed
+        why the worker cannot evaluate candidates; or "died" with None, which the executor itself creates if
+        the pipe is closed
     """
 
     kind: Literal["progress", "done", "unfit", "died"]
@@ -96,7 +100,7 @@ def prepare_device() -> None:
 
 
 def _keep_freed_memory() -> None:
-    """Make glibc keep freed memory until the evaluation of a candidate is complete.
+    """Make glibc keep up to 1 GiB of freed memory until the evaluation of a candidate is complete.
 
     By default, glibc requests new pages from the system for each array of about 100 kB or more, and the system fills
     these pages with zeros. With many eyes, this takes a tenth of the time of an update of the policy. On systems other
@@ -132,8 +136,8 @@ def evaluated(
 ) -> Evaluation:
     """Call `evaluate`, and return the candidate's evaluation.
 
-    If `evaluate` raises an exception, the candidate counts as failed. Only errors that do not depend on the animal are
-    passed on to the caller: a full disk, insufficient memory, and invalid settings.
+    If `evaluate` raises an exception, the candidate counts as failed. Only KeyboardInterrupt and errors that do not
+    depend on the animal are passed on to the caller: a full disk, insufficient memory, and invalid settings.
 
     arguments: positional arguments of `evaluate`
     progress: function that is called with (steps trained, steps planned)

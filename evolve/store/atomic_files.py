@@ -18,7 +18,7 @@ POLICIES, TRAININGS = "policies", "trainings"  # folders of a run
 def sweep(folder: Path) -> None:
     """Remove the unfinished files that killed processes left in a folder.
 
-    Files that another running process is writing, such as a replay, are kept.
+    A file is kept if its name contains the id of another running process, which may still be writing it.
 
     Raises:
         OSError: a file cannot be removed.

@@ -31,7 +31,7 @@ class Candidate:
     genome: coordinates of the open genes in [0, 1], see `Genotype`
     phenotype: eyes and brain of the animal
     seed: seed of training and evaluation
-    fitness: task fitness minus costs, which the search maximises; -inf if the candidate failed
+    fitness: task fitness minus costs; -inf if the candidate failed. The search maximises the fitness.
     parents: ids of the candidates from which the search derived the genome; () if there are none
     rung: rung after which the candidate was evaluated, counted from 0; steps and seconds include all earlier rungs
     policy: SHA-256 of the trained policy's file; None if there is no policy, or if an older version wrote the record
@@ -108,10 +108,10 @@ class Candidate:
         return self if free else replace(self, fitness=self.fitness - costs, costs=self.costs + costs)
 
     def recordable(self) -> Candidate:
-        """Return the candidate as a record restores it: text is escaped, and infinity in a list becomes NaN.
+        """Return the candidate as a record restores it: with escaped, shortened text, and NaN for infinity in a list.
 
         If a value of the outcome has the wrong type or is outside the range that a record allows, the candidate counts
-        as failed. If the candidate has failed already, such values are dropped.
+        as failed. Of its outcome, only the reason remains, and seconds and episode failures if they can be recorded.
 
         Raises:
             ValueError: another value, such as the genome or the seed, cannot be recorded.
@@ -146,8 +146,7 @@ class Candidate:
         """Return the candidate as a line of JSON.
 
         Finite numbers can be restored bit for bit. NaN and infinity become null, and lone surrogates in text are
-        escaped. If there are costs, the line contains them and the task fitness; otherwise, it has the same keys as
-        lines of older versions.
+        escaped. If there are costs, the line contains them and the task fitness; otherwise, both keys are omitted.
 
         Raises:
             TypeError: a value has a type that JSON lacks.
@@ -164,7 +163,7 @@ class Candidate:
 
     @classmethod
     def from_line(cls, line: str) -> Candidate:
-        """Return the candidate from a line that `to_line` returned.
+        """Return the candidate from a line that `to_line` returned, in this or an older version.
 
         Raises:
             ValueError: the line is invalid; the message states the reason.
@@ -206,7 +205,7 @@ class Candidate:
         return candidate
 
     def _require_success(self) -> None:
-        """Check that a successful candidate has a fitness and returns, and that a failed one has no costs.
+        """Check that a successful candidate has fitness, returns and success rate, and that a failed one has no costs.
 
         Raises:
             ValueError: the candidate does not meet these conditions.

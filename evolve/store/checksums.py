@@ -23,7 +23,7 @@ def digest(path: Path) -> str | None:
     """Return the SHA-256 of a file; None if the file is missing.
 
     Raises:
-        OSError: the file exists but cannot be read, or is not a regular file.
+        OSError: the file exists but cannot be read, has more than 1 GiB, or is not a regular file.
     """
     try:
         return hashlib.sha256(read(path)).hexdigest()

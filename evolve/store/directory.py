@@ -55,12 +55,12 @@ class Run:
 
     @classmethod
     def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Self:
-        """Create a run in a directory that does not exist yet, or is empty.
+        """Create a run in a directory that does not exist, is empty, or contains only remains of a killed creation.
 
         origin: "RUN:ID", the animal whose genes are the start values; None if there is no such animal
 
         Raises:
-            RunError: the directory is not empty, or cannot be written.
+            RunError: the directory contains other files, or cannot be written.
             LockedError: another process is creating a run there, or the lock cannot be written.
         """
         path = Path(path)
@@ -88,10 +88,10 @@ class Run:
         before_damage: True to use only the lines of the record before the first damaged line, if there is one
 
         Raises:
-            RunError: the directory does not exist or contains no run, or the record cannot be read or has an invalid
-                line; the message names the file and the line.
+            RunError: the directory does not exist or contains no run, or the record cannot be read. Without
+                `before_damage`, a damaged line of the record is also an error; the message names the line.
             ConfigError: the config is invalid, or the named task differs from the run's, cannot be read or has changed.
-            StrangeFileError: one of the run's files or folders is a link, FIFO or device, or config.toml is too large.
+            StrangeFileError: a file is not a regular file, a folder is not a folder, or config.toml is too large.
             OSError: config.toml cannot be read.
         """
         path = Path(path)
@@ -112,7 +112,7 @@ class Run:
 
         Raises:
             RunError: the directory cannot be written.
-            LockedError: another process is creating a run there.
+            LockedError: another process is creating a run there, or the lock cannot be written.
         """
         path, tried = next_directory(config.task_name, preset), None
         while path != tried:  # a broken link seems to be free, but cannot be created: stop
@@ -126,7 +126,7 @@ class Run:
         return cls.create(path, config, origin)
 
     def require_present_light(self) -> None:
-        """Check that the run can be continued: this version must compute light like the version that started the run.
+        """Check that the run can be continued: this version must compute light in the same way as at the run's start.
 
         Raises:
             RunError: the format of config.toml is too old; the message names the version that can continue the run.
@@ -155,8 +155,9 @@ class Run:
         a copy of the damaged record is kept. The caller must hold the lock.
 
         Raises:
-            RunError: the record is damaged or cannot be written, config.toml cannot be read, or its settings have
-                changed since the run was opened.
+            RunError: the record cannot be read or written, an incomplete file cannot be removed, config.toml cannot be
+                read, or the settings in config.toml have changed since the run was opened. If the run was opened
+                without `before_damage`, a damaged line is also an error.
             ConfigError: config.toml is invalid.
         """
         try:
@@ -177,8 +178,8 @@ class Run:
         """Append a candidate to the record, and synchronise the file with the disk.
 
         Raises:
-            RunError: the candidate is already on record, another process has changed the record, or the record cannot
-                be written; earlier lines remain intact.
+            RunError: the candidate is already on record or cannot be restored from it, another process has changed the
+                record, or the record cannot be written; earlier lines remain intact.
         """
         if self._lock is not None and not self._lock.stands:
             raise RunError(f"{self.record.path}: was changed by another process; nothing is added")
@@ -220,7 +221,7 @@ class Run:
 
     @property
     def best(self) -> Candidate | None:
-        """Candidate with the highest fitness (the earliest of several); None before a candidate has succeeded."""
+        """Candidate with the highest fitness (of several, the one with the smallest id); None if none has succeeded."""
         done = [candidate for candidate in self.candidates if candidate.failure is None]
         return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
 
@@ -269,8 +270,8 @@ class Run:
 def _require_no_run(path: Path) -> None:
     """Check that a run can be created in a directory.
 
-    The directory must be empty, or contain only files of a process that was killed while it created a run. It then has
-    no config.toml, which is written last.
+    The directory must be empty, or contain only files of a process that was killed while it created a run. Such a
+    directory has no config.toml, because this file is written last.
     """
     begun = {RunLock.NAME, VERSIONS, CANDIDATES, POLICIES}
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(UNFINISHED)}
@@ -283,7 +284,7 @@ def _require_no_run(path: Path) -> None:
 
 
 def _require_plain(path: Path) -> None:
-    """Check, before a run is read, that its files are regular files and that its folders are folders."""
+    """Check that those files of a run that exist are regular files, and that those folders that exist are folders."""
     for name in (CONFIG, VERSIONS, CANDIDATES, RunLock.NAME):
         require_regular(path / name)
     for name in (POLICIES, TRAININGS, *PRODUCTS):
@@ -291,7 +292,7 @@ def _require_plain(path: Path) -> None:
 
 
 def next_directory(task: str, preset: str, base: Path = Path("runs")) -> Path:
-    """Return the path runs/<task>-<preset>-<n> with the smallest n, from 1, for which nothing exists."""
+    """Return the first of the paths BASE/TASK-PRESET-N, with N = 1, 2, ..., that does not exist."""
     n = 1
     while (base / f"{task}-{preset}-{n}").exists():
         n += 1

@@ -25,7 +25,8 @@ class Evaluation:
     curve: learning curve: (training steps, mean return) of each evaluation during training. These evaluations select
         the policy, and play other episodes than those of `returns`
     failure: message in one line; None if the candidate did not fail
-    episode_failures: (message in one line, number of episodes that ended with it), the most frequent first
+    episode_failures: (message in one line, number of episodes that ended with it), the most frequent first. The last
+        entry may be the total of all other messages, see `most_frequent`
     """
 
     fitness: float
@@ -47,9 +48,10 @@ class Evaluation:
 
 
 def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
-    """Return the 4 most frequent messages with their numbers of episodes, the most frequent first.
+    """Return at most 4 messages with their numbers of episodes, the most frequent first.
 
-    If there are other messages, their total number of episodes follows under the name "others".
+    If there are other messages, their total number of episodes follows under the name "others". Messages are put on one
+    line and cut to 300 characters; messages that are then equal are counted together.
 
     failures: number of episodes that ended with each message
     """
@@ -63,7 +65,7 @@ def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
 
 
 def total_episode_failures(*parts: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
-    """Return the most frequent episode failures of several parts of a training run together; see `most_frequent`."""
+    """Sum the episode failures of several parts of a training run, and return the `most_frequent` of them."""
     counts: Counter[str] = Counter()
     for part in parts:
         counts.update(dict(part))

@@ -81,6 +81,8 @@ class RunLock:
 def holder(run: Path) -> str | None:
     """Return the process that is working on a run, such as "1234 on host"; None if there is none.
 
+    The result is "unknown" if the lock file does not name the process.
+
     Raises:
         OSError: the lock cannot be read.
     """

@@ -1,7 +1,8 @@
 """The record of a run, candidates.jsonl: one line per evaluated candidate and rung, in the order of completion.
 
-When a record is read, the values and the checksum of every line are checked. Candidates are appended. Only the
-repair of a run removes lines: an unfinished last line, or a damaged line and all lines after it.
+When a record is read, the values of every line are checked, and its checksum if it has one (`evolve.store.chain`).
+Candidates are appended. Only the repair of a run removes lines: an unfinished last line, or a damaged line and all
+lines after it.
 """
 
 from __future__ import annotations
@@ -54,14 +55,14 @@ class Record:
 
     @classmethod
     def read(cls, path: Path, config: RunConfig, before_damage: bool = False) -> Record:
-        """Read a record, and check the values of each line, its checksum, and its agreement with the other lines.
+        """Read a record, and check each line's values, its checksum if present, and its agreement with earlier lines.
 
         config: settings of the run, with which the lines must agree
         before_damage: True to use only the lines before the first damaged line, if there is one
 
         Raises:
-            RunError: the file cannot be read, or a line is damaged and `before_damage` is False; the message names the
-                file and the line.
+            RunError: the file cannot be read. If `before_damage` is False, a damaged line is also an error; the message
+                names the line.
         """
         record = cls(path, before_damage=before_damage)
         torn = False
@@ -83,7 +84,7 @@ class Record:
         """Read all lines of a file, and return whether its last line is unfinished.
 
         Raises:
-            ValueError: the next line is damaged; the message states the reason.
+            ValueError: a line is damaged; the message states the reason. `lines` then contains the lines before it.
         """
         dimension = Genotype(config.genome).dimension
         while text := file.readline(LONGEST_LINE + 1):
@@ -168,7 +169,7 @@ def _require_readable(candidate: Candidate, path: Path) -> None:
     """Check that the line of a candidate restores an equal candidate. Results of `Candidate.recordable` pass the check.
 
     Raises:
-        RunError: the line would restore a different candidate, or would be refused.
+        RunError: the line would restore a different candidate, or could not be read back.
     """
     try:
         if candidate == candidate.recordable():
@@ -186,7 +187,7 @@ def _furthest(lines: Lines) -> tuple[Candidate, ...]:
 
 
 def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
-    """Return the candidates after one more line, as `_furthest` would, but without a pass over all lines."""
+    """Return the result of `_furthest` after the line of `new` is added, without a pass over all lines."""
     at = bisect_left(candidates, new.id, key=lambda candidate: candidate.id)
     known = at < len(candidates) and candidates[at].id == new.id
     if known and candidates[at].rung > new.rung:

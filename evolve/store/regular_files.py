@@ -106,7 +106,9 @@ def folder(path: Path) -> Path:
 
 
 def folders(path: Path, exist_ok: bool = True) -> None:
-    """Create a folder and its missing parents, and synchronise them with the disk.
+    """Create a folder and its missing parents, so that they survive a power failure.
+
+    The new entries are synchronised with the disk, except in a parent folder that this process may not read.
 
     exist_ok: False to refuse a path that exists
 
@@ -148,7 +150,8 @@ def sync_folder(path: Path) -> None:
     """Synchronise a folder with the disk, so that new and renamed files survive a power failure.
 
     Raises:
-        OSError: the disk reports an error.
+        OSError: the folder cannot be opened, or the disk reports an error. It is no error if the file system cannot
+            synchronise folders.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
@@ -168,8 +171,8 @@ def _descriptor(path: Path, flags: int, alone: bool = False) -> int:
     alone: True to refuse a file with several hard links
 
     Raises:
-        StrangeFileError: the path is not a regular file, or the file has several hard links and `alone` is True.
-        OSError: the file cannot be opened.
+        StrangeFileError: the opened file is not a regular file, or has several hard links and `alone` is True.
+        OSError: the file cannot be opened, for example because the path is a link.
     """
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
     found = os.fstat(descriptor)

@@ -23,7 +23,7 @@ def copy_shipped_run(directory: Path) -> Run:
     Raises:
         RunError: the directory contains a file of the run with another content, or it contains files, but none of the
             run's.
-        OSError: the directory cannot be written.
+        OSError: the directory cannot be written, or one of its files cannot be read.
     """
     files = dict(_files(resources.files("evolve") / FOLDER))
     there = [name for name in files if (directory / name).exists()]

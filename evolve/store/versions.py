@@ -1,4 +1,4 @@
-"""Record of each start of a run: software versions, the machine, and fingerprints of the settings."""
+"""The file versions.json: software versions, machine and checksums of the settings at each start of a run."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def present() -> dict[str, str]:
 def recorded(run: Path) -> dict[str, str]:
     """Return the versions of the software, by name as in `present`, at the first start of a run.
 
-    The result is {} if the record cannot be read.
+    The result is {} if versions.json is missing or damaged.
     """
     starts = _starts(run)
     return starts[0]["versions"] if starts else {}
@@ -79,7 +79,7 @@ def commits(run: Path) -> list[str]:
 
 
 def machine() -> str:
-    """Return the processor and the number of cores of this machine, such as "AMD EPYC, 2 cores"."""
+    """Return the processor and the number of logical cores of this machine, such as "AMD EPYC, 2 cores"."""
     return f"{_processor()}, {os.cpu_count()} cores"
 
 
@@ -98,14 +98,15 @@ def machines(run: Path) -> list[str]:
 def run_id(run: Path) -> str:
     """Return the id of a run, which does not depend on its directory: 16 hexadecimal digits of a SHA-256.
 
-    It is computed from the time, the settings and the versions of the first start. If no start is recorded, it is "".
+    It is computed from all entries of the first start, such as the time, the checksums of the settings, and the
+    versions. If no start is recorded, it is "".
     """
     starts = _starts(run)
     return hashlib.sha256(json.dumps(starts[0], sort_keys=True).encode()).hexdigest()[:16] if starts else ""
 
 
 def provenance(run: Path) -> dict[str, Any]:
-    """Return values by name that identify a run in the files that are made from it.
+    """Return named values that identify a run, for the files that are made from it.
 
     Values that are unknown are omitted. The names and their meanings are:
 
@@ -157,8 +158,8 @@ def config_change(run: Path, candidates: int) -> str | None:
 def fingerprint(config: str) -> str:
     """Return the fingerprint of the text of a run's config.toml, 16 hexadecimal digits of a SHA-256.
 
-    It ignores lines that do not influence training and evaluation: comments, the number of workers, and the number of
-    generations.
+    It ignores lines that do not influence training and evaluation: empty lines, lines that start with "#", the number
+    of workers, and the number of generations.
     """
     left_out = ("workers =", "generations =", "#")
     lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
@@ -199,7 +200,7 @@ def origin(run: Path) -> str | None:
 
 
 def _starts(run: Path) -> list[dict[str, Any]]:
-    """Return the recorded starts of a run; [] if the file is missing or damaged, since a run does not need it."""
+    """Return the recorded starts of a run; [] if versions.json is missing or damaged, since a run does not need it."""
     try:
         starts = json.loads(read(run / FILE, LARGEST_FILE))
         return [start for start in starts if isinstance(start["versions"], dict)]
@@ -219,7 +220,7 @@ def _processor() -> str:
 
 
 def _commit() -> str:
-    """Return the git commit of this code, with "+" if files differ from it; "" if the code is not in a checkout."""
+    """Return the git commit of this code, with "+" if tracked files differ from it; "" if git does not know it."""
     here = Path(__file__).parent
     try:
         described = subprocess.run(

@@ -1,4 +1,4 @@
-"""`evolve drift`: comparison of runs with the null model of their search."""
+"""`evolve drift`: comparison of runs with searches whose fitness is random, the null model."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class Products:
         return {"directory": str(run.path), "report": str(self.report), **replay, "exr": exr}
 
     def lines(self, run: Run) -> list[str]:
-        """Return lines: the run directory, the paths of the pages, and number, folder and first of the EXR files."""
+        """Return lines with the run directory, the pages' paths, and the EXR files' number, folder and first name."""
         return [
             f"run directory: {run.path}",
             f"report: {self.report}",

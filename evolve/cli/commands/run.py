@@ -148,7 +148,7 @@ def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> in
 def _already_finished(run: Run, arguments: Namespace) -> int:
     """Write the report and EXR files of a finished run if they are missing, or if EXR files are damaged.
 
-    These files are missing if the run was killed after its last evaluation.
+    They are missing, for example, if the run was killed after its last evaluation.
     """
     page, frames = run.path / REPORT, sorted((run.path / EXR).glob("*.exr"))
     if not page.is_file() or not frames or harmed(run.path / EXR):

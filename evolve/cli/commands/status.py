@@ -53,7 +53,7 @@ def _read(arguments: Namespace) -> dict[str, Any]:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print one line (or JSON object) for each run in a directory, with the latest run last.
+    """Print one line (or JSON object) for each run in a directory, the most recently changed last.
 
     The line of a run that cannot be read states the reason.
     """
@@ -106,8 +106,8 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
 def standing(run: Run) -> dict[str, Any]:
     """Return the state of a run, its best candidate and its generations as JSON values by name.
 
-    Only "mishaps" is a list of `EpisodeFailure`, whose fields are JSON values. The state is "running" if a process
-    holds the lock of the run, else "finished" or "interrupted".
+    The exception is "mishaps", a list of `EpisodeFailure`, whose fields are JSON values. The state is "running" if a
+    process holds the lock of the run, else "finished" or "interrupted".
 
     Raises:
         OSError: the lock or config.toml cannot be read.

@@ -25,7 +25,7 @@ class _Proof:
     """A validation script.
 
     module: name of the script's module
-    old: old name with a code, such as "B0_planner"; "" if there is none
+    old: old name, which begins with a code (B0 in "B0_planner"); "" if there is none
     """
 
     module: str
@@ -50,9 +50,9 @@ def doctor(arguments: Namespace) -> int:
 
 
 def validate(arguments: Namespace) -> int:
-    """Run validation scripts, which check results and draw figures. Return 1 if one fails, and 2 without a checkout.
+    """Run validation scripts, which check results and draw figures; with --list, only print what they check.
 
-    Without names of scripts, all scripts run.
+    Without names of scripts, all scripts run. Return 1 if one fails, and 2 if the scripts are not installed.
 
     Raises:
         ConfigError: a name is unknown.
