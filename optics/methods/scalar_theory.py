@@ -2,9 +2,9 @@
 
 Let the unit vectors of two rays differ by Δs. The contrast of their interference is the product e·e' of their fields'
 directions. To second order in Δs it is 1 - Δs²/4 in unpolarised light, 1 - (Δs·p)²/2 in light polarised along p, and 1
-in scalar theory. The error of scalar theory is therefore proportional to the square of the steepest ray's sine. It also
-depends on the mean square distance between the points of the pupil from which the light comes. For a round pupil in
-focus, the integrals of Richards and Wolf give the error to all orders.
+in scalar theory. For small angles, the error of scalar theory is therefore proportional to the square of the steepest
+ray's sine, and to the mean square distance between the axis and the points of the pupil from which the light comes. For
+a round pupil in focus, the integrals of Richards and Wolf give the error to all orders.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ LEVEL = 1e-2  # choice: neglected level of a mask's spectrum
 def steepest_sine(radius: float, distance: float, leaving: float) -> float:
     """Return the largest sine of the rays that meet in a point of a window.
 
-    It is bounded by the sine of the ray from the pupil's rim to the image on the axis. It is also bounded by the
+    The result is the smaller of two bounds: the sine of the ray from the pupil's rim to the image on the axis, and the
     largest sine of the light that leaves the pupil, including diffraction at the edge.
 
     leaving: largest sine that follows from the slopes of the wavefront, plus the wavelength divided by the radius.

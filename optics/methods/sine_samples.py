@@ -5,8 +5,8 @@ The distance from a point ξ of the pupil to points x = c + u of a window about 
     |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
 
 With s as the variable, the term that is linear in u is exactly the Fourier kernel, however wide the aperture is. The
-remaining terms decrease with the distance. They result from the obliquity of the rays, and vary by about u²NA²/λD
-cycles over the window.
+remaining terms decrease with the distance. Because the rays are oblique, they vary over the pupil by about u²NA²/2λD
+cycles.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ class SineSamples:
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: sine along the other axis at which `axis_kernel.AxisFactor` evaluates the factor of an axis.
+    elsewhere: sine along y, relative to s₀, at which `axis_kernel.AxisFactor` evaluates the factor along x, and the
+        reverse.
     """
 
     edge: PupilEdge
@@ -81,13 +82,13 @@ class SineSamples:
 
     @property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points (x, y) [m] of the pupil, (y, x) for all samples."""
+        """Coordinates x and y [m] of all samples in the pupil, each an array (row, column)."""
         x, y, _ = self.layout
         return x, y
 
     @property
     def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points x and y [m], and their areas [m²] times the transmittance of the aperture, (y, x)."""
+        """Coordinates x and y [m], and areas [m²] times the transmittance of the aperture, each (row, column)."""
         return _layout(self)
 
     def light(self, beam: Beam, dtype: str) -> np.ndarray:

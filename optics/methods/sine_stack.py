@@ -38,7 +38,8 @@ class SineGeometry:
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the outermost samples with light, (pupil,).
-    elsewhere: sine along the other axis at which `axis_kernel.AxisFactor` evaluates the factor of an axis, (pupil,).
+    elsewhere: sines along y, relative to those of the pupils' centres, at which `axis_kernel.AxisFactor` evaluates the
+        factor along x, and the reverse, (pupil,).
     """
 
     distance: np.ndarray
@@ -53,12 +54,12 @@ class SineGeometry:
         return _sines(none, none, self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sines of points of the pupils [m], minus those of the pupils' centres, (pupil, ...)."""
+        """Return the sines of points (x, y) [m] of the pupils, minus those of the pupils' centres, (pupil, ...)."""
         sx, sy = _sines(x, y, self.centre, _aligned(self.distance, x))
         return sx - _aligned(self._middle[0], sx), sy - _aligned(self._middle[1], sy)
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupils in directions, see `directions`."""
+        """Return the points (x, y) [m] of the pupils whose `directions` are (s, t)."""
         sx, sy = s + _aligned(self._middle[0], s), t + _aligned(self._middle[1], t)
         slant = _aligned(self.distance, sx) / np.sqrt(self._squared_cosine(sx, sy))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
@@ -116,7 +117,7 @@ class SineStack(SineGeometry):
 
     @cached_property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points (x, y) [m] of all samples, (pupil, y, x)."""
+        """Coordinates x and y [m] of all samples, each (pupil, row, column)."""
         slant = self.distance[:, None, None] / np.sqrt(self._cosine2())
         sx, sy = (part[:, None] for part in self._middle)
         return (self.at + sx)[:, None, :] * slant + self.centre[0], (self.at + sy)[:, :, None] * slant + self.centre[1]
@@ -145,7 +146,7 @@ class SineStack(SineGeometry):
 
     @cached_property
     def known(self) -> KeptValues:
-        """Arrays that do not depend on the light, for further PSFs with the same samples."""
+        """Arrays that are kept for further PSFs with the same samples."""
         return KeptValues(KEPT)
 
     def _sizes(self, dtype: str) -> np.ndarray:
@@ -185,14 +186,14 @@ class SineStack(SineGeometry):
     def _waves(self, stack: LightStack) -> np.ndarray:
         """Return the paths through all samples to the middle of the window, in waves up to a constant, (beam, y, x).
 
-        Paths without fine detail are interpolated from a few points of the pupil.
+        Paths without fine detail are interpolated from a few points of the pupil if no sine exceeds SMOOTH_SINE.
         """
         count = stack.smooth_points
         if count is None or count >= self.at.shape[1] or not self.smooth(0.0):
             return self._paths(stack, *self.points)
 
         def computed() -> tuple[np.ndarray, np.ndarray]:
-            """Return the paths without reliefs and wavefronts at Chebyshev points, and powers of these points."""
+            """Return the paths without reliefs and wavefronts at Chebyshev points, and powers of their coordinates."""
             side = self.at[:, [0, -1]]
             nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
             points = self.points_at(nodes[:, None, :], nodes[:, :, None])
@@ -225,10 +226,10 @@ class SineStack(SineGeometry):
 def rim_sines(
     outermost: np.ndarray, centre: tuple[float, float], distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the largest sine of points on the rims, relative to the pupils' centres and along either axis, (pupil,).
+    """Return the largest difference along an axis between sines of points on a rim and of the pupil's centre, (pupil,).
 
-    The second result is the largest sine of all points on each rim, not relative to the centre. The third result is
-    True for pupils in which samples that are evenly spaced in sines are even enough.
+    The second result is the largest sine of the points on each rim. The third result is True for pupils in which
+    samples with evenly spaced sines have similar distances from each other.
 
     outermost: radii [m] of the rims.
     """
@@ -244,7 +245,7 @@ def rim_sines(
 
 
 def _aligned(values: np.ndarray, to: np.ndarray) -> np.ndarray:
-    """Return one value per pupil with the axes of another array (pupil, ...)."""
+    """Return values (pupil,) with more axes, so that they broadcast with another array (pupil, ...)."""
     return values.reshape(-1, *[1] * (to.ndim - 1))
 
 

@@ -1,6 +1,6 @@
 """Samples of a single pupil as a stack of one, kept for further PSFs with the same samples.
 
-A stack keeps arrays that do not depend on the light (`SineStack.known`), which grow with the number of samples.
+A stack keeps arrays (`SineStack.known`), whose memory grows with the number of samples.
 """
 
 from __future__ import annotations

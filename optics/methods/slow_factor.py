@@ -68,7 +68,7 @@ class Path:
         return Path(wavelength, distance, self.window)
 
     def numbers(self, axes: int) -> tuple[float | np.ndarray, float | np.ndarray]:
-        """Return wavelength and distance, with as many axes as the arrays with which they broadcast."""
+        """Return wavelength and distance; arrays (pupil,) get `axes` axes, so that they broadcast with others."""
         wavelength, distance = (
             part.reshape(-1, *[1] * (axes - 1)) if isinstance(part, np.ndarray) else part
             for part in (self.wavelength, self.distance)
@@ -168,14 +168,14 @@ def cross_term(
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return factors a and b, so that the slow factor divided by both axis factors is about 1 + a b.
+    """Return a and b, so that the slow factor, divided by its values along both axes, is about 1 + a b.
 
     The product a b is the term -ik us vt/D of the exponent, where k = 2π/λ, and 1/D is the mean inverse distance over
     the pupil. Because a depends on u and s, and b on v and t, the term costs as much as a second Fourier kernel along
-    either axis.
+    each axis.
 
-    directions: s and t, sines of samples along x and y minus those of the pupil's centre. Their last two axes, and
-        those of `window`, broadcast.
+    directions: s and t, sines of samples along x and y minus those of the pupil's centre. Their last two axes broadcast
+        with those of `window`.
     window: u and v, positions along x and y relative to the middle of the window [m].
     """
     (s, t), (u, v) = directions, window
@@ -187,7 +187,7 @@ def cross_term(
 def fourier_kernel(
     at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float | np.ndarray, dtype: str
 ) -> np.ndarray:
-    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} along one axis, complex (position, node · sample).
+    """Return A[u, (a, s)] = L_a(u) e^{-ik s u} along one axis, complex (position, node · sample).
 
     L_a are the Lagrange polynomials of the interpolation points.
 

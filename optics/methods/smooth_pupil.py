@@ -1,4 +1,4 @@
-"""The light behind a steep pupil, convolved with a Gaussian. Few samples represent it, however steep the relief is.
+"""The light behind a steep relief or wavefront, convolved with a Gaussian, so that few samples represent it.
 
 The convolution multiplies the light of a ray of the frequency ν by e^{-2π²δ²ν²}, where δ is the width of the Gaussian.
 Light that is too steep to arrive in a window disappears from the samples. A division of the spectrum by this factor
@@ -37,7 +37,7 @@ TRIED = 101  # number of points along an axis at which the sides of an aperture 
 
 @dataclass(frozen=True)
 class Side:
-    """A straight line or a circle that bounds an aperture, in radii.
+    """A straight line or a circle that bounds an aperture. Lengths are in radii of the pupil.
 
     sign: 1 if the opening lies inside the circle, -1 if it lies outside.
     centre, radius: centre and radius of the circle. The radius is 0 for a line.

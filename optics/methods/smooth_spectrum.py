@@ -1,4 +1,4 @@
-"""The angular spectrum of a steep pupil, from samples of its light convolved with a Gaussian (`smooth_pupil`).
+"""The angular spectrum behind a steep relief, from samples of the light convolved with a Gaussian (`smooth_pupil`).
 
 Samples of all light behind a rough relief would have to resolve its steepest slopes, even if nearly all of this light
 misses the window or is evanescent. Samples of the convolved light only have to resolve the light that arrives in the
@@ -45,9 +45,9 @@ SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
 class SmoothSpectrum(SpectrumSampling):
     """Spectrum of a pupil whose light is convolved with a Gaussian.
 
-    smooth: pupil with the Gaussian of the closed form.
+    smooth: pupil whose light is convolved with a Gaussian in closed form.
     blur: width [m] of a second Gaussian, with which the light is convolved numerically. It allows a longer pitch if the
-        Gaussian of the closed form is narrow. 0: none.
+        Gaussian of `smooth` is narrow. 0: none.
     pupil_period: number of the pupil's samples per period.
     """
 

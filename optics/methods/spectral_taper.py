@@ -47,7 +47,7 @@ class Taper:
         return self.band + self.width
 
     def fade(self, f2: Array, types: Precision) -> Array:
-        """Return the taper: 1 below the band and 0 beyond its end, to within the ripple.
+        """Return the taper: 1 up to the frequency `band` and 0 beyond `end`, to within the ripple.
 
         The error function falls to the ripple at the argument √ln(1/ripple).
 

@@ -27,7 +27,7 @@ class SpectrumSampling:
     method: "angular_spectrum" or "split_angular_spectrum".
     taper: taper that fades the spectrum out.
     period: width [m] after which the field in the pupil's plane repeats. The spectrum's samples are 1/period apart.
-    output_period: number of samples per period in the plane where the last transform starts (split) or ends (whole).
+    output_period: number of samples per period in the window's plane or, with the split method, in the `relay` plane.
     even: True if the field is even in x and y. A quarter of each plane is then sufficient.
     """
 
@@ -70,7 +70,7 @@ class SpectrumSampling:
         return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
 
     def sum_bytes(self, start: Grid, end: Grid, dtype: str) -> float:
-        """Return the memory [bytes] of a sum from some stored samples of one plane to some of another."""
+        """Return the predicted memory [bytes] of a sum from samples of one plane to samples of another."""
         return predicted_bytes(start.shape, end.shape, ITEM_BYTES[dtype])
 
     def bytes_from_spectrum(self, window: Grid, dtype: str) -> float:
@@ -88,7 +88,7 @@ class SpectrumSampling:
         return to_relay + self.sum_seconds(self.relay, 0.5, window)
 
     def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
-        """Return the field with the phase that `arrived` omits for a split spectrum: e^{iπr²/λz}/i."""
+        """Return the field; for a split spectrum, times the phase factor e^{iπr²/λz}/i, which `arrived` omits."""
         if self.is_whole:
             return field
         types = precision(problem.dtype)

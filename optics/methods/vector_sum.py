@@ -7,8 +7,8 @@ plane wave:
 
 L is the path through the pupil, and e is the field of rays behind it (`ray_field`). With e = 1, this is the
 Rayleigh-Sommerfeld integral about c with one approximation. The term ik(|x|² - (s·x)²)/2D of the exponent is replaced
-by its value at the pupil's centre for all points of the pupil. With rotational symmetry, the sum equals the integral of
-Richards and Wolf (1959).
+by its value at the pupil's centre for all points of the pupil. For a round aplanatic pupil, the sum equals the integral
+of Richards and Wolf (1959).
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class VectorSum:
         return found if self.aplanatic else found * self._bend()
 
     def _bend(self) -> np.ndarray:
-        """Return the phase of the path from the pupil's centre to a sample, relative to a plane wave, (y, x)."""
+        """Return the phase factor of the path from the pupil's centre to a sample, relative to a plane wave, (y, x)."""
         (cx, cy), z = self.window.centre, number(self.beam.distance)
         x, y, d = self.window.x[None, :], self.window.y[:, None], math.hypot(cx, cy, z)
         longer = np.sqrt(x * x + y * y + z * z) - d - (cx * (x - cx) + cy * (y - cy)) / d

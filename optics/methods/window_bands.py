@@ -25,7 +25,7 @@ class Bands:
     around: np.ndarray
 
     def where(self, chosen: np.ndarray, other: Bands) -> Bands:
-        """Return these bands for chosen beams, and others for all other beams."""
+        """Return these bands for the chosen beams, and those of `other` for the rest."""
         pairs = (self.density, other.density), (self.passband, other.passband), (self.around, other.around)
         return Bands(*(np.where(chosen, own, their) for own, their in pairs))
 

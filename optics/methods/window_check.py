@@ -1,11 +1,11 @@
 """The error of a PSF that was computed from few samples of the pupil.
 
 The check compares the PSF with a sum over other samples, in a few rows and columns of the window. The other samples are
-finer, and their edge is sharper. Their grid is shifted by a fraction of the pitch that is not a simple ratio. The
-comparison therefore shows the errors due to aliased light, to detail between the samples, and to the soft edge. It also
-shows the error of interpolating the slow factor over the window, because the check interpolates it over the pupil
-instead. Both sums use the slow factor, so the check also compares this factor with the diffraction kernel itself. The
-error of the check's own sum is at most half of the error that the check finds.
+finer, and the soft edge of their aperture is sharper. Their grid is shifted by a fraction of the pitch that is not a
+simple ratio. The comparison therefore shows the errors due to aliased light, to detail between the samples, and to the
+soft edge. It also shows the error of interpolating the slow factor over the window, because the check interpolates it
+over the pupil instead. Both sums use the slow factor, so the check also compares this factor with the diffraction
+kernel itself. The error of the check's own sum is at most half of the error that the check finds.
 """
 
 from __future__ import annotations
@@ -101,15 +101,15 @@ class _CheckSums:
 
     @property
     def apart(self) -> np.ndarray:
-        """Largest difference between slow factor and diffraction kernel, in the corners of the window, (stack,)."""
+        """Largest error of the interpolated factor, in the corners of the window, (stack,); see `_interpolation`."""
         return self._interpolation[1]
 
     @cached_property
     def _interpolation(self) -> tuple[np.ndarray, np.ndarray, RemainingFactor]:
         """Interpolation points in sines, (pupil, a), their error, (stack,), and the factor at pairs of points.
 
-        The interpolation is compared with the kernel in the middle and at the rim of the pupil. The search starts with
-        a number of points that is usually sufficient for the phase there.
+        The interpolated factor is compared with that of the kernel itself in the middle and at the rim of the pupil.
+        The search starts with a number of points that is usually sufficient for the phase there.
         """
         samples, (left, top) = self.samples, ([0, 1, 0, 1], [0, 0, 1, 1])
         angle, radius = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None] * np.array([0, *[1] * 12])
@@ -156,7 +156,7 @@ class _CheckSums:
 
     @cached_property
     def _kernels(self) -> tuple[AxisRows, AxisRows]:
-        """Kernels along x and y, which are the same if the window is square and lies on a diagonal."""
+        """Kernels along x and y, which are the same if the window is square and its centre has equal x and y."""
         (height, width), (x, y) = self.path.window.shape, self.path.window.centre
         across = AxisRows(self.path, self.samples, 0, self.dtype)
         same = height == width and x == y
@@ -190,7 +190,7 @@ def _remaining(
     directions: tuple[np.ndarray, np.ndarray],
     place: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Return the `remaining_factor` from the diffraction kernel itself, as a check of the factors of the sums."""
+    """Return the factor of `RemainingFactor`, but computed from the diffraction kernel itself."""
     (s, t), (u, v) = directions, place
     wavelength, distance = path.numbers(s.ndim)
     x, y = path.window.centre

@@ -1,4 +1,4 @@
-"""Crossings of a few rows and columns, at which the check of a PSF computes it (`window_check`).
+"""Crossings of a few rows and columns, where `window_check` computes a PSF once more.
 
 Rows are drawn at even steps of their cumulative probability. The probability is a mixture of four distributions. The
 first is uniform. The second is proportional to the square root of the intensity, like the error of the intensity if the

@@ -1,13 +1,13 @@
 """Soft edges for samples of several pupils at coarse tolerances, and the numbers of samples that they need.
 
-Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
-width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
+Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be at least half
+the width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
 diffracted at the edge of the pupil spreads further. A soft edge keeps this light out of the window. Softening the edge
 changes light only far from the geometrical rays of the edge, where there is little light.
 
-If most light of a strongly curved wave misses the window, the wave itself is smoothed with the edge (`curved_disk`).
-This removes light in directions far from the window. The number of samples is then almost independent of the
-directions of the rays at the edge.
+If most light of a strongly curved wave misses the window, and the aperture is a disk or a ring, the wave itself can be
+smoothed with the edge (`curved_disk`). This removes light in directions far from the window. The number of samples is
+then almost independent of the directions of the rays at the edge.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class WindowEdges:
 
     @cached_property
     def curvature(self) -> np.ndarray:
-        """Curvatures of the waves that are smoothed with the edge, in cycles per radius at the rim, (beam,)."""
+        """Curvatures of waves that are smoothed with the edge, in cycles per radius at the rim; else 0, (beam,)."""
         return self._choice[0]
 
     @property
@@ -96,7 +96,7 @@ class WindowEdges:
 
     @cached_property
     def finer_edges(self) -> list[SoftAperture]:
-        """Soft apertures that are as sharp as the finer samples of `window_check` allow, (beam,)."""
+        """Soft apertures for the finer samples of `window_check`, up to SHARPER times as sharp as `edges`, (beam,)."""
         return self._unless_mapped(self._finer_wide, partial(self._narrow, FINER * self.density, CARRIED_RIPPLES[1]))
 
     def _finer_wide(self) -> list[SoftAperture]:
@@ -135,7 +135,7 @@ class WindowEdges:
 
     @cached_property
     def _rim_curvature(self) -> np.ndarray:
-        """Mean cycles per radius of the rays at the rim, in the direction away from the axis, (beam,), in steps."""
+        """Mean cycles per radius of the rays at the rim, away from the axis, rounded to CURVATURE_STEP, (beam,)."""
         slopes, (along_x, along_y) = self.stack.slopes, self._to_middle
         r2 = np.square(slopes.x) + np.square(slopes.y)
         rim = self.geometry.to_middle(slopes.across).rim
@@ -186,7 +186,7 @@ class WindowEdges:
 
     @property
     def _widest(self) -> np.ndarray:
-        """Cycles per radius with which the narrow edges of the check do not extend beyond EDGE_REACH, (beam,)."""
+        """Least densities of samples at which the narrow edges of the check end within EDGE_REACH, (beam,)."""
         widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
         return np.asarray(widest + self.geometry.cycles / 2)
 

@@ -62,7 +62,7 @@ class PlannedRays(NamedTuple):
 
 @dataclass(frozen=True)
 class WindowGeometry:
-    """Light without reliefs, wavefronts and masks, and a window."""
+    """A window, and the light without reliefs, wavefronts and masks."""
 
     light: LightGeometry
     window: Grid

@@ -62,7 +62,7 @@ def window_image_errors(
 
 
 def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dtype: str) -> list[tuple[Any, Any]]:
-    """Return pairs of `_along` for rows and columns, which PSFs with the same samples share.
+    """Return pairs of matrices (`_along`) for rows and columns, which PSFs with the same samples share.
 
     With `cross_term`, there is a second pair. Mirrored matrices remain two pairs. Plain matrices are joined to one
     pair, (pupil, y, 2 · sample) and (pupil, 2 · x, sample), because a large product takes less time.

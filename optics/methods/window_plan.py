@@ -47,7 +47,7 @@ class WindowPlan:
 
     @cached_property
     def geometry(self) -> WindowGeometry:
-        """Light without reliefs and wavefronts, and the window."""
+        """The window, and the light without reliefs, wavefronts and masks."""
         return window_geometry(self.stack, self.window)
 
     @cached_property
@@ -94,7 +94,7 @@ class WindowPlan:
 
     @cached_property
     def elsewhere(self) -> np.ndarray:
-        """Sines for `SineGeometry`, in steps of a share of the largest sine, so that PSFs can share arrays, (beam,)."""
+        """Sines for `SineGeometry`, rounded to 1/ELSEWHERE of the largest, so that PSFs can share arrays, (beam,)."""
         step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
         return np.asarray(np.rint(self._rays.mean_sine / step) * step)
 
@@ -137,7 +137,7 @@ class WindowPlan:
         return plan_costs(self.window, self.ranks, across, finer, self.crossed)
 
     def _pitch(self, density: np.ndarray) -> np.ndarray:
-        """Return the largest spacing of sines at which a pupil has `density` samples per radius everywhere.
+        """Return the largest spacing of sines at which a pupil has at least `density` samples per radius everywhere.
 
         The distance of two points in the pupil is at most z/cos³θ times the distance of their sines, where z is the
         distance of the window, and θ the angle of the steepest ray.
@@ -159,7 +159,7 @@ class WindowPlan:
 
 
 def plan_costs(window: Grid, rank: Any, across: Any, finer: Any, crossed: Any = False) -> tuple[Any, Any]:
-    """Return the predicted time [s] and memory of a PSF; the arguments are numbers or arrays (beam,).
+    """Return the predicted time [s] and memory [bytes] of a PSF; the arguments are numbers or arrays (beam,).
 
     across, finer: numbers of samples along an axis of the pupil, and of those for the check.
     crossed: whether the sum includes `cross_term`.

@@ -43,7 +43,8 @@ class Derivatives:
     """Additional needs of a PSF whose derivatives are requested.
 
     moves: whether derivatives with respect to the distance are requested.
-    cells: cells between the knots of maps, across the pupil; 0 if no derivatives with respect to samples are requested.
+    cells: cells between the knots of maps, across the pupil; 0 if no derivatives with respect to samples of maps are
+        requested.
     """
 
     moves: bool = False
@@ -87,7 +88,7 @@ def window_ranks(
     tolerance: np.ndarray,
     derivatives: Derivatives | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the necessary ranks, (beam,), and whether `cross_term` is necessary. A rank that is too large is 0.
+    """Return the necessary ranks, (beam,), and whether `cross_term` is necessary. Ranks above MOST_RANK become 0.
 
     The rank is sufficient at the end points of rays, around which the light arrives. If derivatives are requested,
     light may move anywhere. The rank is then also sufficient on average over the whole window.

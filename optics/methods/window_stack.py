@@ -102,7 +102,7 @@ class WindowStack:
             yield size, None if path is None else path / wavelength
 
     def _straight(self, samples: WindowSamples, wavelength: float) -> Array:
-        """Return the waves behind the ideal lens times the areas of the samples, (source, η, ξ).
+        """Return the waves behind the ideal lens times areas and transmittance of the samples, (source, η, ξ).
 
         If no number of lens and sources carries a derivative, NumPy computes the waves.
         """
@@ -154,7 +154,7 @@ class _LensLight:
 
     @property
     def plain(self) -> _LensLight:
-        """The same light without derivatives, whose numbers can be compared."""
+        """The same light with plain numbers, so that it can be the key of a cache."""
         focal = None if self.focal_length is None else number(self.focal_length)
         return replace(self, focal_length=focal, sources=tuple(source.plain for source in self.sources))
 
@@ -169,6 +169,6 @@ class _LensLight:
 
 @cached_arrays(MOST_BYTES, lambda waves: waves.nbytes)
 def _fixed_waves(lens: _LensLight, samples: WindowSamples) -> np.ndarray:
-    """Return the waves behind a lens at samples, times their areas. Pupils often have the same lens and sources."""
+    """Return the waves of `WindowStack._straight` without derivatives. Pupils often have the same lens and sources."""
     found: np.ndarray = lens.waves(*samples.layout)
     return found

@@ -3,8 +3,9 @@
     U[y, x] = Σ_ba Σ_ηξ down[y, bη] P[η, ξ] kernel[b, a, η, ξ] across[x, aξ]
 
 P is the light behind the pupil, times the areas of its samples. `down` and `across` are Fourier kernels times the
-interpolation weights of the points (b, a) of the window, and `kernel` is the slow factor at these points. At rank 1,
-there is one such point, and the sum is the matrix Fourier transform of P times one factor. `down`, `across` and
+interpolation weights of the points (b, a) of the window, and `kernel` is the slow factor at these points, times
+1/(iλz). `down` and `across` may also contain the slow factor along their axes, by which `kernel` is then divided. At
+rank 1, there is one such point, and the sum is the matrix Fourier transform of P times one factor. `down`, `across` and
 `kernel` describe the geometry alone, so all light that passes the same samples shares them.
 
 `window_field` and `pupil_gradient` accept arrays of any library with the operators of NumPy, such as PyTorch, and any
@@ -69,7 +70,7 @@ def intensity_of(field: Any) -> Any:
 class WindowSums:
     """The arrays of `window_field` for one pupil and one window, without leading axes.
 
-    by_distance: function that returns the derivative of `kernel` with respect to the distance of the window [1/m].
+    by_distance: function that returns the derivative [1/m³] of `kernel` [1/m²] with respect to the window's distance.
     """
 
     kernel: np.ndarray

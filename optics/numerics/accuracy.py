@@ -73,7 +73,7 @@ class Plan:
     seconds: predicted time [s] of a call with compiled kernels on two cores; 0 without a prediction.
     options: all methods that were compared.
     derivative_error: upper bound of the relative L2 error of derivatives, for a random functional of the PSF. None: the
-        PSF carries no derivatives, or an approximation predicts no error of them.
+        PSF carries no derivatives, or the method is an approximation that predicts no error of them.
     """
 
     method: str
@@ -111,7 +111,7 @@ class Plan:
 
 
 def above(error: float, tolerance: float) -> str:
-    """Return the text of an error, with enough digits to show that it exceeds a tolerance: "0.0011" for 0.001."""
+    """Return an error as text, with enough digits to show that it exceeds a tolerance: "0.0011" if that is 0.001."""
     shown = (f"{error:.{digits}g}" for digits in range(1, 17))
     return next((text for text in shown if float(text) > tolerance), f"{error!r}")
 

@@ -1,4 +1,4 @@
-"""Checks of arguments. Each error names the argument, its value and the valid range in one line."""
+"""Checks of arguments. Each error names the argument, what is valid and, usually, the value."""
 
 import math
 from collections.abc import Iterable
@@ -43,9 +43,10 @@ LINE = 200  # most characters of a value in a message
 
 
 def shown(value: Any) -> str:
-    """Return `value` as a user would type it. NumPy's print options, which colour-science changes, have no effect.
+    """Return `value` as a user would type it. NumPy's print options, which colour-science sets, do not affect numbers.
 
-    A value that does not fit on one line is described by its type and shape.
+    A value (or an entry of a tuple or list) that does not fit on one line is described by its type, and its shape if it
+    has one.
     """
     if isinstance(value, np.generic):
         return repr(value.item())
@@ -97,7 +98,7 @@ def positive(
 def without_derivative(name: str, value: Any) -> Any:
     """Return `value`; ValueError about `name` if it, or an entry of it, carries a derivative, which would be lost.
 
-    The other checks of this module include this check, unless they are called with carried=True.
+    The other checks of numbers include this check, except `pair`, `plain_reals` and those with carried=True.
     """
     if type(value) is float:
         return value  # fast path: planning calls this thousands of times
@@ -112,7 +113,7 @@ def without_derivative(name: str, value: Any) -> Any:
 
 
 def vacuum_wavelength(value: Any) -> float:
-    """Return `value` [m] as a float; ValueError unless it is positive and at most 1 m.
+    """Return `value` [m] as a float; ValueError unless it lies in [1e-15, 1].
 
     The upper limit catches wavelengths in nanometres.
     """
@@ -165,7 +166,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
 
 
 def one_of(name: str, value: Any, options: Iterable[str]) -> str:
-    """Return `value`; ValueError about `name`, with the most similar option, unless it is one of the options."""
+    """Return `value`; ValueError about `name`, with a similar option if any, unless it is one of the options."""
     known = tuple(options)
     if not isinstance(value, str) or value not in known:
         raise ValueError(
@@ -193,13 +194,13 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
-    """Return (x, y) as floats; ValueError about `name` (two `what`) unless both are numbers within ±1e15."""
+    """Return (x, y) as floats; ValueError about `name`, as in `pair`, unless both are numbers within ±1e15."""
     x, y = pair(name, without_derivative(name, value), what)
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 
 def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
-    """Return both entries of `value`, with any derivatives. Otherwise, a ValueError says `name` must be two `what`."""
+    """Return both entries of `value`, with derivatives; ValueError unless it has two (`what`, for the message)."""
     try:
         x, y = value
     except (TypeError, ValueError):
@@ -233,7 +234,8 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
     """Return `value` as a float32 array (band, Y, X).
 
     Raises:
-        ValueError: the array does not have `bands` bands, is smaller than the shape `least`, or is not finite.
+        ValueError: the array does not have `bands` bands, is smaller than the shape `least`, or does not hold finite
+            real numbers without derivatives.
     """
     radiance = reals("radiance", value).astype(np.float32)
     fits = radiance.ndim == 3 and radiance.shape[0] == bands

@@ -192,7 +192,7 @@ def _turned(size: Any, waves: np.ndarray, dtype: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Operations:
-    """Operations on tensors in the memory of the processor that NumPy and SciPy compute, with their derivatives."""
+    """Operations that NumPy and SciPy compute on tensors in the memory of the processor, with their derivatives."""
 
     sparse_product: Any
     turned: Any

@@ -1,6 +1,6 @@
 """Predicted times of Fourier sums of complex NumPy arrays, which `optics.propagate` computes.
 
-Dr.Jit's products of `fourier.dft2` need real matrices and cost twice as much (optics.numerics.fourier_matrices).
+Sums of Dr.Jit fields need products of real matrices, which cost twice as much (optics.numerics.fourier_matrices).
 """
 
 from __future__ import annotations

@@ -105,11 +105,11 @@ def keep_copy(tensor: Array, numbers: np.ndarray) -> None:
 
 
 def number(value: Any) -> float:
-    """Return `value` as a float without derivative. A Dr.Jit array must have one element.
+    """Return `value` as a float without derivative. An array must have one element.
 
     Raises:
-        TypeError: the type of `value` is not numeric.
-        ValueError: an array has more than one element.
+        TypeError: the type of `value` is not numeric, or a NumPy array does not have one element.
+        ValueError: an array of Dr.Jit or a tensor with a gradient does not have one element, or a text is no number.
         BackendError: the array is on a device other than the selected one.
     """
     if type(value) is float:

@@ -132,7 +132,7 @@ def _cache_file() -> Path:
 
 
 def _cache_key(path: str) -> str:
-    """Return a cache key for this file and the versions of Dr.Jit and Python, for which alone a verdict is valid."""
+    """Return a cache key for this file and the versions of Dr.Jit and Python, since verdicts depend on them."""
     stat = os.stat(path) if os.path.exists(path) else None
     size, modified = (stat.st_size, stat.st_mtime_ns) if stat else (0, 0)
     return f"{path}|{size}|{modified}|drjit {_drjit_version()}|python {sys.version_info[:2]}"
@@ -141,7 +141,8 @@ def _cache_key(path: str) -> str:
 def _drjit_version() -> str:
     """Return Dr.Jit's version from the name of its dist-info folder.
 
-    importlib.metadata is imported only if the folder is missing, because the import takes as long as a PSF.
+    importlib.metadata is imported only if there is not exactly one such folder, because the import takes as long as a
+    PSF.
     """
     found = find_spec("drjit")
     if found is not None and found.origin is not None:

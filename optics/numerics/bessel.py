@@ -1,4 +1,4 @@
-"""Bessel functions: J₀ of Dr.Jit arrays, and J_m of NumPy arrays, which imports SciPy only for large arrays.
+"""Bessel functions: J₀ of Dr.Jit arrays, and J_m of NumPy arrays, for which SciPy is imported only if they are large.
 
 Dr.Jit has no Bessel functions, so J₀ is computed from Chebyshev series, which are fitted once to SciPy's values.
 

@@ -35,7 +35,7 @@ def even_seconds(shape_in: Shape, shape_out: Shape) -> float:
 
 
 def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int = 0) -> Field:
-    """Return Σ_j u[j] exp(± 2πi j·k / period), as in `fourier.dft2`, for samples k of the quarter `grid`.
+    """Return Σ_j u[j] exp(± 2πi j·k / period), as in `fourier.dft2`, for samples k of the quarter of `grid`.
 
     field: values u on the quarter of a plane of `shape` samples, or on some of its rows, which start at row `first`.
     """
@@ -54,7 +54,7 @@ def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int 
 def _cosines(
     types: Precision, n_out: int, n_in: int, period: Scalar, first: int = 0, count: int | None = None
 ) -> Array:
-    """Return the matrix (k, j) of the cosines with which samples contribute to frequencies, both counted from 0.
+    """Return the matrix (k, j) of the cosines by which samples j contribute to frequencies k, counted from 0.
 
     An entry is the contribution of sample j plus that of its mirror image.
 

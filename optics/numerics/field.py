@@ -1,4 +1,4 @@
-"""A sampled complex field and its phase factors."""
+"""A sampled complex field, or a phase factor by which it is multiplied."""
 
 from __future__ import annotations
 

@@ -5,9 +5,9 @@
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
 The period may have any value, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT
-can be used instead. `dft2` selects the faster of both by their predicted times (optics.numerics.cost). Dr.Jit's matrix
-product executes more operations per second, but SciPy's FFT needs fewer operations. Matrices are therefore faster for
-small windows, and the FFT is faster for large windows. In `dft2`, both are differentiable.
+can be used instead. `dft2` selects the faster of the two by their predicted times (optics.numerics.cost). Dr.Jit's
+matrix product executes more operations per second, but SciPy's FFT needs fewer operations. Matrices are therefore
+faster for small windows, and the FFT is faster for large windows. In `dft2`, both are differentiable.
 """
 
 from __future__ import annotations
@@ -193,10 +193,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
         return _fft_of_parts(parts, period, to, turn, types)
 
     class FourierSum(dr.CustomOp):
-        """The Fourier sum as a differentiable operation.
-
-        Its adjoint is the sum with the opposite sign, from the output's samples to the input's samples.
-        """
+        """The Fourier sum, differentiable. Its adjoint is the sum with the opposite sign, from output to input."""
 
         def eval(self, re: Array, im: Array) -> tuple[Array, Array]:
             return transform(re, im, shape, shape_in, sign)

@@ -98,7 +98,7 @@ def _quarter(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int)
 
 
 def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
-    """Return [re, im] of u[y, j] + u[y, -j] and of u[y, j] - u[y, -j], with j counted from 0."""
+    """Return [re, im] of u[y, j] + u[y, -j] and u[y, j] - u[y, -j] for j from 0; at j = 0, u[y, j] counts as 0."""
     types, (ny, nx) = field.types, field.evaluated().grid.shape
     shape = ny, nx // 2 + 1
     j, y = _counted(shape, types)

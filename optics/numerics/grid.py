@@ -29,7 +29,8 @@ class Grid:
     centre: position (x, y) of sample n//2, in the unit of dx.
 
     Raises:
-        ValueError: shape holds other than two whole numbers of at least 1, dx is not positive, or centre is not finite.
+        ValueError: shape is not two whole numbers of at least 1, dx is not within [1e-15, 1e15], or centre is not
+            finite.
     """
 
     shape: tuple[int, int]
