@@ -30,9 +30,9 @@ class Bands:
         return Bands(*(np.where(chosen, own, their) for own, their in pairs))
 
     def stepped(self, chosen: np.ndarray) -> Bands:
-        """Return bands of chosen beams whose densities are steps, so that pupils with similar light share all arrays.
+        """Return these bands, with the densities of the chosen beams rounded up to a few values per octave.
 
-        The passband grows with the density.
+        Pupils with similar light then have equal densities and share all arrays. The passband grows with the density.
         """
         density = in_steps(self.density)
         return Bands(density, self.passband * (density / self.density), self.around).where(chosen, self)

@@ -45,8 +45,7 @@ LINE = 200  # most characters of a value in a message
 def shown(value: Any) -> str:
     """Return `value` as a user would type it. NumPy's print options, which colour-science sets, do not affect numbers.
 
-    A value (or an entry of a tuple or list) that does not fit on one line is described by its type, and its shape if it
-    has one.
+    A value, or an entry of a tuple or list, is described by its type and shape if it does not fit on one line.
     """
     if isinstance(value, np.generic):
         return repr(value.item())
@@ -234,8 +233,7 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
     """Return `value` as a float32 array (band, Y, X).
 
     Raises:
-        ValueError: the array does not have `bands` bands, is smaller than the shape `least`, or does not hold finite
-            real numbers without derivatives.
+        ValueError: the array has not `bands` bands, is smaller than `least`, or holds more than finite real numbers.
     """
     radiance = reals("radiance", value).astype(np.float32)
     fits = radiance.ndim == 3 and radiance.shape[0] == bands
