@@ -127,7 +127,8 @@ class RunConfig:
         """Check the genes and settings that only some tasks have, and the number of frames rendered per action.
 
         Raises:
-            ConfigError: the task lacks a gene or a changed setting, or does not allow this number of frames.
+            ConfigError: the task does not have a gene of the genome or a changed setting, or does not allow this
+                number of frames.
         """
         for name in OPTIONAL_GENES:
             if name in self.genome and not self.card.has_gene(name):

@@ -29,8 +29,8 @@ SEGMENT_STEPS = 8
 class FrameRolloutBuffer(RolloutBuffer):
     """Rollout buffer that yields observations without stacks, for `evolve.learning.eye_features`.
 
-    At the start of an episode, the memory is not yet full. As in the environments, the first frame of the episode fills
-    the missing places.
+    At the start of an episode, the memory is not yet full. As in the environments, `EyeFeatures` then fills it with
+    copies of the episode's first frame.
     """
 
     observation_space: spaces.Dict

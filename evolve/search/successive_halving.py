@@ -52,7 +52,7 @@ def steps(config: RunConfig) -> int:
 
 
 def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
-    """Return the number of steps after which training from `begin` to `end` steps stops if it does not stop early.
+    """Return the step at which training from step `begin` to `end` actually ends, unless it stops early.
 
     It is at least `end`, because training consists of whole rollouts of n_envs x n_steps steps. The steps between two
     evaluations (`eval_interval`) are rounded up to whole rollouts.

@@ -30,7 +30,7 @@ class HasDirections(Protocol):
 
     @property
     def elsewhere(self) -> float | np.ndarray:
-        """Sines along y, relative to the pupils' centres, at which the factor along x is evaluated; or vice versa."""
+        """Sine along the other axis at which the factor along x or y is evaluated, minus that of the pupil's centre."""
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (x, y) [m] of the pupils at these sines, which are relative to the pupils' centres."""

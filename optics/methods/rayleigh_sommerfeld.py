@@ -163,7 +163,7 @@ def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool 
     """Return the nodes of an aperture, from a cache if possible.
 
     halved: True to return only the nodes on one side of the x axis, for mirror-symmetric pupils and points on the x
-        axis. Both sides then contribute the same.
+        axis. Both sides then contribute the same, so the weights of nodes off the axis are doubled.
     """
     count = aperture.node_count(cycles, digits) or LARGE_RULE
     rules = _small_rules if count <= SMALL_RULE else _large_rules if count <= LARGE_RULE else _largest_rule

@@ -94,7 +94,8 @@ class SineSamples:
     def light(self, beam: Beam, dtype: str) -> np.ndarray:
         """Return the result of `field` as a complex NumPy array (y, x), without derivatives.
 
-        dtype: type of the real and imaginary parts, in which the phase is rounded, "float32" or "float64".
+        dtype: type of the real and imaginary parts, to which the phase is rounded after whole waves are subtracted,
+            "float32" or "float64".
         """
         x, y, weight = self.layout
         if beam.pupil.mask is not None:

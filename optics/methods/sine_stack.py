@@ -38,8 +38,8 @@ class SineGeometry:
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the outermost samples with light, (pupil,).
-    elsewhere: sines along y, relative to those of the pupils' centres, at which `axis_kernel.AxisFactor` evaluates the
-        factor along x, and the reverse, (pupil,).
+    elsewhere: sines along the other axis at which `axis_kernel.AxisFactor` evaluates the factor along x or y, minus
+        those of the pupils' centres, (pupil,).
     """
 
     distance: np.ndarray

@@ -106,7 +106,7 @@ class _CheckSums:
 
     @cached_property
     def _interpolation(self) -> tuple[np.ndarray, np.ndarray, RemainingFactor]:
-        """Interpolation points in sines, (pupil, a), their error, (stack,), and the factor at pairs of points.
+        """Sines of interpolation points, (pupil, a), errors (see `apart`), and the factor at all pairs of sines.
 
         The interpolated factor is compared with that of the kernel itself in the middle and at the rim of the pupil.
         The search starts with a number of points that is usually sufficient for the phase there.

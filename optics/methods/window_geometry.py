@@ -42,13 +42,14 @@ class PathSlopes(NamedTuple):
 
 
 class PlannedRays(NamedTuple):
-    """Points of the pupils whose rays determine the rank of the slow factor.
+    """Points of the pupils whose rays determine how many Chebyshev points interpolate the slow factor (its rank).
 
     some: their indices in `disk_points`.
     at: points (x, y) [m] relative to the middle of the window, (beam, ray).
-    scale: displacement [m] of a ray on its way to the window for a slope of 1, (beam, ray).
+    scale: displacement [m] of a ray at the window that a slope of 1 of the optical path causes, (beam, ray).
     blur: distance [m] by which diffraction spreads the light, (beam, 1).
-    directions: sines of the lines from the middle of the window, relative to those of the pupil's centre, (beam, ray).
+    directions: sines of the lines from the middle of the window to the points, minus those of the line to the pupil's
+        centre, (beam, ray).
     sine2: sum of the squares of both sines, (beam, ray).
     """
 

@@ -32,7 +32,7 @@ STEEP = 1e-2  # choice: a printed plan shows the error of scalar theory if it is
 
 
 class AccuracyError(ValueError):
-    """No method can meet the requested accuracy. The message states the reason, and usually a remedy.
+    """The result cannot be computed to the requested accuracy. The message states the reason, and usually a remedy.
 
     what: description of the problem.
     remedy: settings that would work; omitted unless the caller can change them.

@@ -55,7 +55,7 @@ class Ommatidium:
         return self.lens.pupil() if isinstance(self.lens, FacetLens) else self.lens
 
     def _beam(self, wavelength: float) -> Beam:
-        """Return axial light of a vacuum wavelength [m], from the lens to the end of the rhabdom.
+        """Return axial light of a vacuum wavelength [m], from the lens to the end of the rhabdom that faces it.
 
         Raises:
             ValueError: the principal plane of the lens lies behind the end of the rhabdom.

@@ -84,9 +84,10 @@ def encircled_energy(
 def _around(
     result: PSFResult, middle: tuple[float, float], radius: float, edge: float
 ) -> tuple[PSFResult, SoftEdge | None]:
-    """Return a PSF whose samples are sufficient for sums within a circle, and the kernel (None for means over cells).
+    """Return a PSF whose samples are sufficient for sums within a circle, and the kernel that smooths the circle.
 
-    The samples are fine enough, and they extend beyond the circle by the width of the kernel.
+    The samples are fine enough, and they extend beyond the circle by the width of the kernel. If the samples are means
+    over cells, the result is the same PSF and None.
 
     radius: radius [m] of the circle.
     edge: distance [m] from the circle's centre to the outermost samples.

@@ -127,7 +127,7 @@ def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: f
 
 
 def _looser(error: float) -> str:
-    """Return advice to use the next tolerance of one digit above this error; empty if it would be 1 or more."""
+    """Return advice to use this error, rounded up to one digit, as the tolerance; empty if that is 1 or more."""
     step = 10.0 ** math.floor(math.log10(error))
     enough = step * math.ceil(error / step)
     return f"; tolerance={enough:.3g} needs fewer samples" if enough < 1 else ""

@@ -38,8 +38,8 @@ DIGITS = 10.0  # choice: digits of the maximum without aberration
 def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     """Return the maximum of the PSF relative to that of the same aperture and mask without aberration, (wavelength,).
 
-    The result for a `WhitePSF` is (type,). The wave without aberration is spherical and converges on the point where
-    the axis hits the sensor. Its field at this point is, with L = √(z² + r²),
+    The result for a `WhitePSF` has one value per receptor type, (type,). The wave without aberration is spherical and
+    converges on the point where the axis hits the sensor. Its field at this point is, with L = √(z² + r²),
 
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
@@ -48,15 +48,16 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     factor of the integrand. For a circle without a mask, the modulus of U is |1 - z/L - ikz ln(L/z)|, with L at the
     rim. The maximum is searched near the brightest samples. If the samples are too coarse, finer samples are computed
     there. The maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the maxima without
-    aberration, with the same weights; if its requests are unknown, by the maximum at its mean wavelength.
+    aberration, with the same weights. If `result.can_recompute` is False, it is divided by the maximum without
+    aberration at the mean wavelength.
 
     with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
         ValueError: `result` is not a PSF, or with_error is not a bool.
         AccuracyError: the maximum lies outside the window, or the PSF is brighter at a point outside the window that
-            rays reach. The same error results if the samples are too coarse and finer ones cannot be computed. The
-            message states which samples are sufficient.
+            rays reach. The same error results if the samples are too coarse and finer ones cannot be computed (the
+            message states which samples are sufficient), or if no peak is found.
     """
     import drjit as dr
 

@@ -108,7 +108,7 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations)
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
-        """Seed each world with its own seed at the next reset; None: the world continues its random numbers.
+        """Seed each world with its own seed at the next reset; None: the world draws this seed itself.
 
         An episode is then the same as in a single environment with this seed.
 

@@ -186,8 +186,8 @@ class EyeRenderer:
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
         """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32.
 
-        The unit is that of `sim.mirror`: white that faces a light of diffuse 1 gives D65, which is 1 at 560 nm. Errors:
-        see `signals`.
+        The unit is that of `sim.mirror`: a white surface that faces a light with `diffuse` = 1 has the spectrum of
+        D65, scaled to 1 at 560 nm. Errors: see `signals`.
         """
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())

@@ -93,8 +93,8 @@ class Outcome:
     terminated: True if the task ends the episode, (row,) bool
     success: True if the task is accomplished, (row,) bool
     failure: the worlds that could not continue, by index, each with the reason; their episodes end
-    over: True if a world's episode ends even if no row is terminated, for example because of an animal that does not
-        learn, (world,) bool; None: False in all worlds
+    over: True if a world's episode ends even if no row is terminated, for example because the task ends it for an
+        animal that does not learn and thus has no row, (world,) bool; None: False in all worlds
     changed: indices of the worlds in which the task moved bodies after the action, (k,) int
     info: additional entries of each row's `info`; None: no additions
     proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, value);

@@ -179,7 +179,7 @@ class Simulation:
         )
 
     def _any_learner(self, rows: np.ndarray) -> np.ndarray:
-        """Return whether a condition (learners · n,), learners first, holds for a learner of each world, (n,) bool."""
+        """Return whether a condition (learners · n,), learners first, holds for any learner in a world, (n,) bool."""
         return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 
     def poses(self) -> Poses:

@@ -39,7 +39,7 @@ class Primitive:
 
 
 def _into_ball(o: Array, d: Array) -> Array:
-    """Return the distance at which a ray from o along d enters the unit ball; infinite without entry."""
+    """Return t for which o + t d enters the unit ball; infinite if the ray starts inside or does not hit."""
     square = dr.squared_norm(d)
     nearest = -dr.dot(o, d) / square
     p = dr.fma(d, nearest, o)

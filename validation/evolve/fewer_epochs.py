@@ -7,10 +7,9 @@ respectively.
 **Method.** An epoch is one pass over the samples of an update. After `decay_after` training steps, learning slows down:
 the change of the weights per update has to fall in inverse proportion to the number of steps so far. There are two ways
 to achieve this: smaller optimiser steps in the same number of epochs, or optimiser steps of the same size in fewer
-epochs. The second way moves the weights about as far in less time. Both ways first reduce the optimiser step. After
-150,000 training steps, the optimiser step is half as large as at the start, and until then both ways give bit-identical
-results. From then on, the first way reduces the optimiser step further. The second way reduces the number of epochs
-instead, from 10 to 3 (`least_epochs`).
+epochs. The second way moves the weights about as far in less time. Up to 150,000 training steps, both ways reduce the
+optimiser step to half its initial size, and give bit-identical results. From then on, the first way reduces the
+optimiser step further. The second way reduces the number of epochs instead, from 10 to 3 (`least_epochs`).
 
 Each row compares the same training runs (task, seed, eyes) with a constant and with a falling number of epochs. All
 runs have 500,000 steps, a receptor noise of σ = 0.01, eyes 45° wide with perfect lenses, and networks of 64 units. In
@@ -27,7 +26,7 @@ the number of epochs.
 **Bounds.** In no task does the mean return fall by more than two standard errors. In every task, CPU time falls by at
 least a twentieth.
 
-**Limits.** The saving is limited, because only three of ten epochs are omitted over a whole training run of this
+**Limits.** The saving is limited, because on average only three of ten epochs are omitted over a training run of this
 length. Everything else takes as long as before, including the ten evaluations of a training run. In navigation, the
 animals have learnt the task after 150,000 steps and the return cannot rise further, so only the time differs. In a
 training run of a million steps, updates have five epochs on average.

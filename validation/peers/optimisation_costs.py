@@ -1,8 +1,8 @@
 """Costs of optimisation: roughness, modes, pixels and distances
 
 How long does a step of a lens design take, and which error does its PSF have? One step is a PSF with its gradient with
-respect to all heights, pixels or Zernike coefficients. At a tolerance of 0.01, a step takes 6 to 20 ms with an
-error of at most 2.5e-3. A matrix Fourier transform without a predicted error takes 0.5 to 0.9 ms, or 8 ms
+respect to all heights, pixels or Zernike coefficients. At a tolerance of 0.01, a step takes 6 to 20 ms, or 42 ms for 48
+PSFs, with an error of at most 2.5e-3. A matrix Fourier transform without a predicted error takes 0.5 to 0.9 ms, or 8 ms
 for 48 PSFs, for an error of at most 0.01.
 
 **Method.** The pupils have a radius of 1 mm, a focal length of 10 mm (f/5), and one of three kinds of design
@@ -22,8 +22,8 @@ the time of the plain transform, with gradient, for the smallest number of sampl
 no number of samples is sufficient.
 
 **Limits.** Other programs ran on both cores of the machine during the measurement. CPU times are then longer than on an
-idle machine, so compare only ratios within the table. The direction sines of the plain transform are approximations,
-which limits its error to between 3e-4 and 5e-3.
+idle machine, so compare only ratios within the table. The direction sines of the plain transform are approximations, so
+its error cannot fall below 3e-4 to 5e-3, depending on the design.
 
     python -m validation.peers.optimisation_costs [--repeated N] [--out DIR] [--docs DIR]
 """

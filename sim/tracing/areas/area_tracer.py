@@ -142,7 +142,7 @@ class AreaTracer:
 
     @property
     def places(self) -> int:
-        """Number of rows of a world's table of illuminated bodies; 0 if light that bodies reflect is neglected."""
+        """Number of rows of a world's table of illuminated bodies; 0 if the level of light is `DIRECT`."""
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
