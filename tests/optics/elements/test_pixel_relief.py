@@ -281,12 +281,6 @@ def test_bad_heights_are_named(heights):
         PixelRelief(heights)
 
 
-def test_a_stack_says_that_it_cannot():
-    pupil = Pupil(1e-4, PixelRelief(RANDOM))
-    with pytest.raises(ValueError, match="PixelRelief has jumps"):
-        optics.propagate_through([pupil, optics.FreeSpace(1e-3)], wavelength=WAVELENGTH, out_dx=1e-6, out_shape=(9, 9))
-
-
 def test_a_flat_relief_is_known_to_be_flat_unless_it_may_change():
     """A flat relief is rotationally symmetric, except if derivatives with respect to its heights are requested."""
     assert PixelRelief(np.full((3, 3), 1e-7)).rotationally_symmetric
