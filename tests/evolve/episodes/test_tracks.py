@@ -39,16 +39,20 @@ def test_a_track_is_that_of_the_recorded_episode(run, episode):
 def test_animals_with_different_eyes_start_in_the_same_places_of_unseen_mazes():
     config = assemble("maze", assignments=MAZES)
     other = replace(PHENOTYPE, n_eyes=3, resolution=(2, 3))
-    some, others = (tracks(one, config, policy_of(one), 7, 6, "test") for one in (PHENOTYPE, other))
+    policy = policy_of(PHENOTYPE)
+    some, others = (
+        tracks(PHENOTYPE, config, policy, 7, 6, "test"),
+        tracks(other, config, policy_of(other), 7, 6, "test"),
+    )
     assert len({track.plan.bounds for track in some}) > 1
     for one, two in zip(some, others, strict=True):
         np.testing.assert_array_equal(one.position[0], two.position[0])
         assert one.plan.bounds == two.plan.bounds
         low, high = np.reshape(one.plan.bounds, (2, 2))
         assert ((one.position > low) & (one.position < high)).all()
-    final = final_episodes(PHENOTYPE, config, policy_of(PHENOTYPE), 7, 6)
+    final = final_episodes(PHENOTYPE, config, policy, 7, 6)
     np.testing.assert_allclose([track.total for track in some], final.returns, rtol=1e-6)
-    starts = [[tuple(track.position[0]) for track in tracks(PHENOTYPE, config, policy_of(PHENOTYPE), 7, 6, mode)]
+    starts = [[tuple(track.position[0]) for track in tracks(PHENOTYPE, config, policy, 7, 6, mode)]
               for mode in ("training", "evaluation", "test")]  # fmt: skip
     assert starts[0] != starts[1] != starts[2]
 
