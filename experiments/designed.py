@@ -18,11 +18,10 @@ from evolve.learning.training_rung import TrainingRung
 from evolve.search.job import Job
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.worker import evaluate_candidate, prepare_device
-from evolve.store.atomic_files import write_whole
 from evolve.store.evaluation import Evaluation
 from experiments.glass import paraboloid
 from experiments.page import Page, exit_code, parser
-from experiments.store import Origin, read_rows, rounded, write_rows
+from experiments.store import Origin, read_answer, read_rows, rounded, write_answer, write_rows
 
 __all__ = ["Design", "Experiment", "HeldOut", "Trained", "crossed", "evaluate_and_test", "main", "train_all"]
 
@@ -262,16 +261,14 @@ def main(experiment: Experiment, arguments: Sequence[str] | None = None) -> int:
 def _made(experiment: Experiment, chosen: Namespace) -> None:
     data = chosen.docs / "data" / f"{experiment.name}.csv"
     data.parent.mkdir(parents=True, exist_ok=True)
-    said = data.with_suffix(".txt")
     if chosen.compute:
         _train(experiment, data, chosen.workers)
     rows = read_rows(Trained, data)
     if not rows:
         raise ValueError(f"{data} holds no animals; train some with --compute")
     if chosen.answer:
-        write_whole(said, f"{chosen.answer}\n".encode())
-    answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
-    experiment.page(rows, Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
+        write_answer(data, chosen.answer)
+    experiment.page(rows, Origin.read(data.with_suffix(".json")), read_answer(data)).publish(chosen.docs)
 
 
 def _train(experiment: Experiment, data: Path, workers: int) -> None:

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from evolve.search.null_model import fitness_spread
-from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 from evolve.store.versions import commits
 from experiments.candidates import Row, complete, rows_of
 from experiments.drift import Drift, drifted, of_the_end
 from experiments.means import last_mean
 from experiments.page import Page, exit_code, markdown_table, parser
-from experiments.store import Origin, read_rows, write_rows
+from experiments.store import Origin, read_answer, read_rows, write_answer, write_rows
 
 __all__ = [
     "Quantities",
@@ -27,7 +26,6 @@ __all__ = [
     "null_model",
     "null_table",
     "stored",
-    "write_answer",
 ]
 
 Quantities = Mapping[str, Callable[[Row], float]]  # quantities that are compared with the null model
@@ -234,11 +232,6 @@ def collect(
         stem.with_suffix(".txt").unlink(missing_ok=True)
 
 
-def write_answer(stem: Path, answer: str) -> None:
-    """Store the answer on the page, in Markdown."""
-    write_whole(stem.with_suffix(".txt"), f"{answer}\n".encode())
-
-
 def _named(texts: Sequence[str]) -> list[tuple[str, Run]]:
     """Return runs with the names of their groups.
 
@@ -272,5 +265,5 @@ def stored(stem: Path) -> Store:
     if not rows:
         raise ValueError(f"{stem.with_suffix('.csv')} holds no runs; collect some with --runs GROUP=DIR ...")
     metadata, drift = read_rows(RunMetadata, _beside(stem, "runs")), read_rows(Drift, _beside(stem, "drift"))
-    said = _text(stem.with_suffix(".txt")).strip() or NOT_JUDGED
-    return Store(rows, metadata, drift, Origin.read(stem.with_suffix(".json")), said)
+    answer = read_answer(stem, NOT_JUDGED)
+    return Store(rows, metadata, drift, Origin.read(stem.with_suffix(".json")), answer)

@@ -22,12 +22,12 @@ from evolve.store.directory import Run
 from experiments.candidates import Row
 from experiments.contrast import Contrast, contrast
 from experiments.drift import SEEDS, shade
-from experiments.evolved import Store, collect, conduct_table, stored, write_answer
+from experiments.evolved import Store, collect, conduct_table, stored
 from experiments.facet_searches import FIRST_SEEDS, LIGHTS, LOOKS, searches
 from experiments.means import LAST, last_values, of_generation
 from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
 from experiments.planned_searches import finished_run
-from experiments.store import RECORDS
+from experiments.store import RECORDS, write_answer
 
 __all__ = ["LEVEL", "PRIMARY", "QUANTITIES", "compared", "complete_pairs", "main", "outcome", "page"]
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from experiments.designed import Trained, train_all
 from experiments.drift import SEEDS as RANDOM_SEARCHES
 from experiments.drift import shade
-from experiments.evolved import Store, collect, conduct_table, stored, write_answer
+from experiments.evolved import Store, collect, conduct_table, stored
 from experiments.eye_factors_design import LEARNER, TASKS
 from experiments.eye_search_best import best_table, designs, random_table
 from experiments.eye_search_records import complete_groups
@@ -32,7 +32,7 @@ from experiments.eye_search_tests import (
 from experiments.eye_searches import SEEDS
 from experiments.means import LAST, last_mean, of_generation
 from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
-from experiments.store import RECORDS, read_rows
+from experiments.store import RECORDS, read_rows, write_answer
 
 __all__ = ["main", "page"]
 

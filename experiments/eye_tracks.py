@@ -21,11 +21,10 @@ from evolve.episodes.tracks import Track, tracks
 from evolve.learning.animal_task import animal_task
 from evolve.learning.policy import load_policy
 from evolve.search.worker import evaluate_candidate, prepare_device
-from evolve.store.atomic_files import write_whole
 from experiments.designed import Design
 from experiments.eye_factors_design import CAMERA, COMPOUND, LEARNER, TASKS, in_task
 from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
-from experiments.store import Origin, read_rows, write_rows
+from experiments.store import Origin, read_answer, read_rows, write_answer, write_rows
 from sim.tasks.batch_task import BatchTask
 from sim.worlds.ground_plan import GroundPlan
 
@@ -213,14 +212,12 @@ def _made(chosen: Namespace) -> None:
     data = chosen.docs / "data" / f"{NAME}.csv"
     if chosen.compute:
         _compute(data)
-    said = data.with_suffix(".txt")
     if chosen.answer:
-        write_whole(said, f"{chosen.answer}\n".encode())
+        write_answer(data, chosen.answer)
     played, places = read_rows(Played, data), read_rows(Place, _of_places(data))
     if not played:
         raise ValueError(f"{data} contains no episodes; compute them with --compute")
-    answer = said.read_text(encoding="utf-8").strip() if said.exists() else "(not written yet)"
-    page(played, places, Origin.read(data.with_suffix(".json")), answer).publish(chosen.docs)
+    page(played, places, Origin.read(data.with_suffix(".json")), read_answer(data)).publish(chosen.docs)
 
 
 def _compute(data: Path) -> None:

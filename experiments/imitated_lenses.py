@@ -38,7 +38,7 @@ from experiments.fitness_landscape import (
 from experiments.glass import blur, power
 from experiments.means import LAST
 from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
-from experiments.store import RECORDS, Origin, read_rows, write_rows
+from experiments.store import RECORDS, Origin, read_answer, read_rows, write_rows
 
 __all__ = ["CASES", "Check", "Contents", "Searched", "page", "searched"]
 
@@ -266,14 +266,13 @@ def _made(chosen: Namespace) -> None:
             print(f"{case}: Strehl ratio {_range([row.strehl for row in rows if row.case == case])}", flush=True)
         write_rows(rows, stored)
         Origin.here((time.process_time() - began) / 3600).write(stored.with_suffix(".json"))
-    answer = stored.with_suffix(".txt")
     contents = Contents(
         rows=read_rows(Searched, stored),
         lives=lives,
         landscape=landscape,
         check=Check.from_runs(behind_glass(run), landscape),
         origin=Origin.read(stored.with_suffix(".json")),
-        answer=answer.read_text(encoding="utf-8").strip() if answer.exists() else "(not written yet)",
+        answer=read_answer(stored),
     )
     page(contents).publish(chosen.docs)
 

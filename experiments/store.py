@@ -13,7 +13,7 @@ from typing import Any, TypeVar, get_type_hints
 from evolve.store.atomic_files import write_whole
 from evolve.store.versions import machine, machines, present, recorded
 
-__all__ = ["DATA", "RECORDS", "Origin", "read_rows", "rounded", "write_rows"]
+__all__ = ["DATA", "RECORDS", "Origin", "read_answer", "read_rows", "rounded", "write_answer", "write_rows"]
 
 DATA = Path("docs/results/data")
 RECORDS = Path(__file__).parent / "records"  # settings of runs, and a line per candidate
@@ -31,6 +31,20 @@ def read_rows(kind: type[Row], path: Path) -> list[Row]:
     types = get_type_hints(kind)
     with path.open(encoding="utf-8", newline="") as file:
         return [kind(**{name: types[name](text) for name, text in line.items()}) for line in csv.DictReader(file)]
+
+
+def read_answer(stem: Path, otherwise: str = "(not written yet)") -> str:
+    """Return the stored answer on a page; `otherwise` if there is none.
+
+    stem: path of the page's data without an ending
+    """
+    path = stem.with_suffix(".txt")
+    return (path.read_text(encoding="utf-8").strip() if path.exists() else "") or otherwise
+
+
+def write_answer(stem: Path, answer: str) -> None:
+    """Store the answer on a page, in Markdown; see `read_answer`."""
+    write_whole(stem.with_suffix(".txt"), f"{answer}\n".encode())
 
 
 def rounded(value: float) -> float:

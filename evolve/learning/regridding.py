@@ -19,7 +19,7 @@ class Regridding:
     """Linear map from the signals of a retina to the inputs of an encoder, the same for all eyes and channels.
 
     retina: rows and columns of the receptors
-    wiring: settings, of which `pool_side` and `repeat_side` are used
+    wiring: settings; only `pool_side` and `repeat_side` are used
 
     The attribute `shape` contains the rows and columns of the inputs. The map is not a PyTorch module, because it has
     no parameters and no state.

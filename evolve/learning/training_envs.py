@@ -19,7 +19,7 @@ class TrainingEnvs:
 
     training: environments in which the policy is trained
     selection: environments of the evaluations during training, which select the best policy
-    fitness: environments in which the fitness is measured after training; their layouts are those of `selection`
+    fitness: environments in which the fitness is measured after training, in the layouts of `selection`
 
     All three compute reflections of light in the same way. Training and selection use at most
     `learning.rays_per_receptor` rays for each receptor, because the noise of rendering averages out in learning.

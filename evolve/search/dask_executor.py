@@ -47,7 +47,7 @@ class DaskExecutor:
 
     The executor is a context manager. A candidate whose worker dies is evaluated again, up to 3 times in
     total. If the connection to the scheduler is lost, all unfinished jobs are submitted again after reconnecting, and
-    their attempts are counted anew.
+    their attempts are counted again from 0.
 
     scheduler: the scheduler, or its address
     function: "module:name" of the function that evaluates a candidate; it takes the arguments of

@@ -91,7 +91,7 @@ def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watch
 
 
 def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Keep as many candidates under evaluation as a population has; a new proposal replaces each finished candidate."""
+    """Keep one population of candidates under evaluation; a new proposal replaces each finished candidate."""
     under_way: dict[int, Proposal] = {}
 
     def refill() -> list[Proposal]:
@@ -144,7 +144,7 @@ def _record(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher
 def _after(before: Candidate, candidate: Candidate) -> Candidate:
     """Return a candidate after a rung, with seconds and episode failures summed over this and all earlier rungs.
 
-    If training failed in this rung, steps and learning curve are those of the rung before.
+    If training failed in this rung, steps and learning curve are taken from the rung before.
 
     before: the candidate as recorded after the rung before
     """

@@ -2,9 +2,9 @@
 
 The derivative of the light behind the pupil with respect to one sample of a map is proportional to a cardinal spline
 times the light (for a mask, the light without it). This spline is a different cubic polynomial in every cell between
-two knots, whatever the values of the map are. Derivatives with respect to samples of a flat map therefore have as much
-detail as those of a rough map. Samples of the pupil that resolve only the light give wrong derivatives. Quadrature
-nodes in each cell are used instead.
+two knots, whatever the values of the map are. Derivatives with respect to samples of a flat map therefore have the same
+detail as derivatives for a rough map. Samples of the pupil that resolve only the light give wrong derivatives.
+Quadrature nodes in each cell are used instead.
 """
 
 from __future__ import annotations

@@ -38,9 +38,9 @@ class Bands:
         return Bands(density, self.passband * (density / self.density), self.around).where(chosen, self)
 
 
-def in_steps(values: np.ndarray) -> np.ndarray:
-    """Return values that are rounded up to EDGES steps per octave."""
-    return np.asarray(2.0 ** (np.ceil(EDGES * np.log2(values) - 1e-9) / EDGES))
+def in_steps(values: np.ndarray, count: int = EDGES) -> np.ndarray:
+    """Return values rounded up to a few per octave; count: their number."""
+    return np.asarray(2.0 ** (np.ceil(count * np.log2(values) - 1e-9) / count))
 
 
 def medians(values: np.ndarray) -> np.ndarray:

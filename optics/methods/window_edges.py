@@ -181,7 +181,7 @@ class WindowEdges:
         sharp = CARRIED_CYCLES + CARRIED_RIM_CYCLES * rim + orders + cells * CELL_CYCLES
         sharp = sharp * (self.tolerance / 0.01) ** CARRIED_EXPONENT
         density = np.maximum(direct + sharp + self._masks, self._widest)
-        density = 2.0 ** (np.ceil(CARRIED_STEPS * np.log2(density) - 1e-9) / CARRIED_STEPS)
+        density = in_steps(density, CARRIED_STEPS)
         return Bands(density, np.zeros_like(density), np.zeros_like(density))
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "Option",
     "Plan",
     "above",
+    "rounded_up",
     "size_of",
 ]
 
@@ -114,6 +116,12 @@ def above(error: float, tolerance: float) -> str:
     """Return an error as text, with enough digits to show that it exceeds a tolerance: "0.0011" if that is 0.001."""
     shown = (f"{error:.{digits}g}" for digits in range(1, 17))
     return next((text for text in shown if float(text) > tolerance), f"{error!r}")
+
+
+def rounded_up(error: float) -> float:
+    """Return an error rounded up to one significant digit, for advice on a sufficient tolerance."""
+    step = 10.0 ** math.floor(math.log10(error))
+    return step * math.ceil(error / step)
 
 
 def size_of(count: float) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.accuracy import AccuracyError
+from optics.numerics.accuracy import AccuracyError, rounded_up
 from optics.numerics.arguments import flag, in_range, positive
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.grid import Grid
@@ -128,8 +128,7 @@ def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: f
 
 def _looser(error: float) -> str:
     """Return advice to use this error, rounded up to one digit, as the tolerance; empty if that is 1 or more."""
-    step = 10.0 ** math.floor(math.log10(error))
-    enough = step * math.ceil(error / step)
+    enough = rounded_up(error)
     return f"; tolerance={enough:.3g} needs fewer samples" if enough < 1 else ""
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from optics.elements.pupil import Pupil
-from optics.numerics.accuracy import AccuracyError
+from optics.numerics.accuracy import AccuracyError, rounded_up
 from optics.numerics.arguments import flag, in_range, reals, shown, whole
 from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.grid import Grid, OnWindow
@@ -204,17 +204,15 @@ def white_psf(
 
 
 def _remedy(count: int, worst: float, allowed: float, tolerance: float) -> str:
-    """Return what to change if `count` wavelengths are too few: their number, or the tolerance if it is the largest.
+    """Return advice if `count` wavelengths are too few: more wavelengths or, if these exceed MOST_WAVES, a tolerance.
 
     worst, allowed: error of the sum over wavelengths, and the largest error that is allowed
     """
     more = 2 * math.ceil(count * (1.2 * worst / allowed) ** 0.25 / 2) + 1
     if more <= MOST_WAVES:
         return f"waves={more} or 'auto'"
-    enough = tolerance * worst / allowed
-    if enough > 0.5:
-        return "a light or receptors with a smoother spectrum"
-    return f"tolerance={math.ceil(100 * enough) / 100:g}" if enough > 0.1 else f"tolerance={1.05 * enough:.2g}"
+    enough = rounded_up(tolerance * worst / allowed)
+    return f"tolerance={enough:.3g}" if enough <= 0.5 else "a light or receptors with a smoother spectrum"
 
 
 def _weighed(result: PSFResult, catches: np.ndarray, ends: tuple[float, float]) -> WhitePSF:

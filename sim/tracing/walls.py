@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from optics.numerics.kept_values import KeptValues
+from optics.numerics.read_only import ReadOnlyArrays
 from sim.scene import shapes, surfaces
 from sim.scene.model_hash import MOST_MODELS, model_hash
 
@@ -29,7 +30,7 @@ class NoClosedForm(ValueError):
 
 
 @dataclass(frozen=True)
-class Walls:
+class Walls(ReadOnlyArrays):
     """Walls and floor of a world.
 
     lower, upper: corners of the walls' footprints [m], (n, 2)
