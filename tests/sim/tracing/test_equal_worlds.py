@@ -55,6 +55,27 @@ def test_walls_follow_the_height_of_the_eyes():
         walls_of(model, static, np.array([0.0, 0.1]))
 
 
+MOVABLE = """
+<mujoco>
+  <worldbody>
+    <geom type="box" size=".1 .1 .1"/>
+    <body mocap="true" pos="1 0 0"><geom type="box" size=".1 .1 .1"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_geoms_that_move_to_the_same_place_coincide_there():
+    model = mujoco.MjModel.from_xml_string(MOVABLE)
+    found = []
+    for place in (1.0, 0.0, 1.0):
+        data = mujoco.MjData(model)
+        data.mocap_pos[0, 0] = place
+        mujoco.mj_forward(model, data)
+        found.append(coincidences(data, [0, 1]).pairs)
+    assert found == [(), ((0, 1),), ()]
+
+
 SURFACES = """
 <mujoco>
   <asset>
@@ -62,6 +83,9 @@ SURFACES = """
     <material name="t" texture="t" texuniform="true"/><material name="u" texture="t" rgba=".5 1 1 1"/>
     <texture name="v" type="2d" builtin="checker" width="8" height="8" rgb1="0 0 1" rgb2="0 1 0"/>
     <material name="v" texture="v" texuniform="true"/>
+    <texture name="w" type="cube" builtin="checker" width="8" height="8" rgb1="0 0 1" rgb2="0 1 0"/>
+    <material name="w" texture="w"/>
+    <mesh name="tetrahedron" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/>
   </asset>
   <worldbody>
     <light dir="0 0 -1"/>
@@ -74,6 +98,8 @@ SURFACES = """
     <geom name="box of another material" type="box" size=".1 .2 .3" pos="-4 0 1" material="v"/>
     <geom name="red wall" type="plane" size="1 1 .1" pos="6 0 1" rgba="1 0 0 1"/>
     <geom name="red box" type="box" size=".1 .2 .3" pos="8 0 1" rgba="1 0 0 1"/>
+    <geom name="plane without its cube texture" type="plane" size="1 1 .1" pos="10 0 1" material="w"/>
+    <geom name="mesh with a cube texture" type="mesh" mesh="tetrahedron" pos="12 0 1" material="w"/>
     <geom name="grey" type="sphere" size=".1" pos="0 2 1"/>
     <geom name="small grey" type="sphere" size=".05" pos="0 3 1"/>
     <geom name="painted grey" type="sphere" size=".1" pos="0 4 1"/>
