@@ -20,4 +20,4 @@ def model_hash(model: mujoco.MjModel) -> bytes:
     """Return a hash of the whole content of a model."""
     saved = np.empty(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, saved)
-    return hashlib.blake2b(saved).digest()
+    return hashlib.blake2b(saved.data).digest()
