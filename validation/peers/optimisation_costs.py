@@ -1,8 +1,8 @@
 """Costs of optimisation: roughness, modes, pixels and distances
 
 How long does a step of a lens design take, and which error does its PSF have? One step is a PSF with its gradient with
-respect to all heights, pixels or Zernike coefficients. At a tolerance of 0.01, a step takes 6 to 20 ms, or 42 ms for 48
-PSFs, with an error of at most 2.5e-3. A matrix Fourier transform without a predicted error takes 0.5 to 0.9 ms, or 8 ms
+respect to all heights, pixels or Zernike coefficients. At a tolerance of 0.01, a step takes 5 to 18 ms, or 36 ms for 48
+PSFs, with an error of at most 1.0e-3. A matrix Fourier transform without a predicted error takes 0.4 to 1.0 ms, or 8 ms
 for 48 PSFs, for an error of at most 0.01.
 
 **Method.** The pupils have a radius of 1 mm, a focal length of 10 mm (f/5), and one of three kinds of design
@@ -21,9 +21,9 @@ the time of the plain transform, with gradient, for the smallest number of sampl
 `optics`. "In tolerance" is its time for the smallest number of samples whose error is at most 0.01. A dash means that
 no number of samples is sufficient.
 
-**Limits.** Other programs ran on both cores of the machine during the measurement. CPU times are then longer than on an
-idle machine, so compare only ratios within the table. The direction sines of the plain transform are approximations, so
-its error cannot fall below 3e-4 to 5e-3, depending on the design.
+**Limits.** The machine was idle during the measurement. Times of another run on it differ by up to a third, so compare
+only ratios within the table. The direction sines of the plain transform are approximations, so its error cannot fall
+below 3e-4 to 5e-3, depending on the design.
 
     python -m validation.peers.optimisation_costs [--repeated N] [--out DIR] [--docs DIR]
 """

@@ -1,8 +1,8 @@
 """Whole populations: PSFs per CPU second and their errors
 
 How many PSFs of different eyes can be computed per CPU second, and how accurately? At a tolerance of 0.01, `psf_batch`
-computes 2633 PSFs per CPU second with a median error of 4.9e-04, and `psf` computes 261 with the same error. The
-fastest peer, prysm with 32 samples, computes 2929 with a median error of 6.9e-03. Only rhabdom predicts the error of
+computes 1919 PSFs per CPU second with a median error of 4.9e-04, and `psf` computes 213 with the same error. The
+fastest peer, prysm with 32 samples, computes 2506 with a median error of 6.9e-03. Only rhabdom predicts the error of
 each PSF, which takes a part of its time.
 
 **Method.** The eyes resemble the eyes in an evolutionary search: pupil radii of 15 to 40 µm, a relief of 4 x 4 control
