@@ -37,6 +37,7 @@ __all__ = [
     "PIXEL_NODE_GEOMETRY",
     "PROFILE_ENTRY",
     "PROFILE_SAMPLE",
+    "PSF_CALL",
     "PUPIL_SAMPLE",
     "RAY",
     "RAY_BYTES",
@@ -72,6 +73,8 @@ CALL = {
     "rayleigh_sommerfeld": 1e-3,
 }
 DFT_CALL = 2e-4  # per Fourier sum
+# A new plan and the check of a PSF. Samples for the light in the window are planned first, others after comparisons.
+PSF_CALL = {"window": 5e-3, "other": 8e-3}
 PASSAGE_CALL = {"angular_spectrum": 4e-3, "separable_kernel": 1e-3}  # per call of `optics.propagate` at a new distance
 
 # Seconds per sample, entry, node or pair.

@@ -49,7 +49,7 @@ from optics.methods.smooth_spectrum import smooth_spectrum
 from optics.methods.window_rank import DERIVATIVE_ERROR
 from optics.methods.window_sampling import WindowSampling, window_sampling
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_BYTES, MOST_SECONDS, AccuracyError, Option, Plan, size_of
-from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
+from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, PSF_CALL, WINDOW_SAMPLE
 from optics.point_spread.window_cost import check_seconds, check_window, window_bytes, window_seconds
 
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
@@ -186,8 +186,9 @@ def _sampling_error(problem: Problem) -> float:
 
 
 def _seconds(option: Sampling, problem: Problem) -> float:
-    """Return the time of the whole PSF: the sum for the method, the window and the spot check."""
-    return option.seconds + window_seconds(problem) + check_seconds(problem, option)
+    """Return the time of the whole PSF: the plan, the sum for the method, the window and the spot check."""
+    call = PSF_CALL["window" if isinstance(option, WindowSampling) else "other"]
+    return call + option.seconds + window_seconds(problem) + check_seconds(problem, option)
 
 
 def _bytes(option: Sampling, problem: Problem) -> float:

@@ -118,12 +118,18 @@ def test_limits_include_the_window():
     problem = problem_of()
     seconds, size = window_cost.window_seconds(problem), window_cost.window_bytes(problem, sampling())
     option = sampling(seconds=2.0, size=MOST_BYTES - size)
-    assert planner._seconds(option, problem) == pytest.approx(2.0 + seconds)
+    assert planner._seconds(option, problem) == pytest.approx(2.0 + seconds + cost.PSF_CALL["other"], rel=1e-9)
     assert planner._within(option, problem, planner._seconds(option, problem))
     assert not planner._within(option, problem, 2.0)
     assert not planner._within(sampling(seconds=2.0, size=MOST_BYTES - size + 1), problem, 60.0)
     assert planner._cost(option, problem) == (False, 2.0)
     assert planner._cost(sampling(size=MOST_BYTES), problem) == (True, 1.0)
+
+
+def test_window_samplings_are_planned_sooner(monkeypatch):
+    other = planner._seconds(sampling(), problem_of())
+    monkeypatch.setattr(planner, "WindowSampling", SimpleNamespace)
+    assert other - planner._seconds(sampling(), problem_of()) == pytest.approx(3e-3)
 
 
 def test_verdicts():
