@@ -135,7 +135,8 @@ def _images(
     At coarse tolerances, PyTorch computes members with the same pupil and sensor distance as one stack, on the device
     `place`. Dr.Jit computes all other members.
 
-    light, fixed: the light with tensors in place of `numbers`, and without derivatives.
+    light: the pupils, distances and angle, which contain the tensors `numbers`, by name.
+    fixed: the same with plain numbers, without derivatives.
     """
     convert = partial(on_device, place) if numbers or place.type != "cpu" else np.asarray
     found = light.coarse_images(fixed, wavelengths, view, convert)

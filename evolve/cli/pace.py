@@ -74,16 +74,19 @@ class Pace:
 
 
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
-    """Return the pace for each animal, with the slowest of all workers' times. All workers measure at the same time.
+    """Return how fast one worker process trains and evaluates each animal (its pace), by the animal's name.
+
+    All workers measure at the same time. If several workers train the same animal, each quantity of the pace is the one
+    that predicts the longest run.
 
     animals: animals that are trained for the measurement, by name
     workers: number of worker processes
 
     Raises:
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
-        ConfigError: the user task fails or has several mounts that no animal would use, or an animal cannot be
-            evaluated on this machine, for example because its eyes cannot be computed. The message names the animal and
-            the reason.
+        ConfigError: the user task fails, or it has several mounts although its method `place` uses only one, or an
+            animal cannot be evaluated on this machine, for example because its eyes cannot be computed. The message
+            states the reason, and names the animal if there is one.
         ExecutorError: a worker process died.
     """
     tried = list(islice(cycle(animals), max(workers, len(animals))))
@@ -180,9 +183,10 @@ def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Pat
 
 
 def _with_short_rollouts(learning: LearningConfig) -> LearningConfig:
-    """Return the settings with the shortest rollouts that consist of whole batches, if these are shorter.
+    """Return the settings with rollouts shortened to the smallest number of steps that fills whole batches.
 
-    The time per step hardly changes, because an update takes a constant time per batch.
+    Rollouts that are already shorter than this are not changed, unless they have only one step per environment, which
+    becomes two. The measured time per step hardly changes, because an update takes a constant time per batch.
     """
     whole_batches = math.lcm(learning.batch_size, learning.n_envs) // learning.n_envs
     return replace(learning, n_steps=max(2, min(learning.n_steps, whole_batches)))

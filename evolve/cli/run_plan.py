@@ -39,7 +39,8 @@ class RunPlan:
     config: settings of the run
     directory: run directory
     workers: number of worker processes
-    paces: measured paces, by name of the animal in `animals`; {} if they have not been measured
+    paces: how fast a worker trains and evaluates each of the two animals in `animals`, by the animal's name; {} if this
+        has not been measured
     """
 
     config: RunConfig
@@ -52,7 +53,9 @@ class RunPlan:
         return cls(config, directory, config.workers or cores())
 
     def measured(self) -> RunPlan:
-        """Return the plan with the paces of this machine, which are measured in a few seconds.
+        """Return the plan with measured `paces`: how fast a worker on this machine trains and evaluates an animal.
+
+        The measurement takes a few seconds.
 
         Raises:
             BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -90,9 +93,10 @@ class RunPlan:
 
     @property
     def disk_bytes(self) -> int:
-        """Predicted size of policies, record, report and EXR files [bytes], for the larger of the animals in `animals`.
+        """Predicted size of policies, record, report and EXR files of the run [bytes].
 
-        The prediction requires measured paces.
+        Policies and EXR files of the two animals in `animals` differ in size. For each kind of file, the larger size is
+        used. The size of a policy is part of the paces, so the plan must come from `measured`.
         """
         policy = max(pace.policy_bytes for pace in self.paces.values())
         pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
@@ -155,7 +159,11 @@ class RunPlan:
         return [*lint(self.config), *(["the disk is too small for this run"] if short else [])]
 
     def record(self) -> dict[str, Any]:
-        """Return the plan as JSON values; predictions are {} or None if the paces have not been measured."""
+        """Return the plan as JSON values by name.
+
+        The predicted time ("hours") and disk space ("disk_bytes") follow from the measured speed of training ("pace").
+        Before this measurement, "hours" and "pace" are {}, and "disk_bytes" is None.
+        """
         config = self.config
         opening = {g.name: config.genome[g.name].opens_at for g in Genotype(config.genome).open_genes}
         return {
@@ -185,7 +193,10 @@ def steps_each(config: RunConfig) -> str:
 
 
 def _gene_lines(config: RunConfig) -> list[str]:
-    """Return lines that list the open genes of each cluster, with the generation in which they open."""
+    """Return lines that list, for each cluster, the open genes, which are the genes that the search varies.
+
+    Genes that the search varies only from a later generation on have a separate line, which states this generation.
+    """
     genes = Genotype(config.genome).open_genes
     lines = []
     for cluster in CLUSTERS:

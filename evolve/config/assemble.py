@@ -134,8 +134,8 @@ def _read_back(written: Source) -> RunConfig:
 def _user_settings(source: Source, code: TaskCode | None) -> Source:
     """Return the settings of a user's file or option `--set`. The file may be the config.toml of another run.
 
-    The format of such a file must be one whose settings still have the same meaning. A file cannot select a user task,
-    because only the command line or a call may name code that is executed.
+    The config.toml must have format 2 or a later one, because settings of format 1 can have another meaning. A file
+    cannot select a user task, because only the command line or a call may name code that is executed.
     """
     if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(
@@ -250,7 +250,9 @@ def _merge(below: Tree, above: Tree) -> Tree:
 
 
 def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
-    """Check that animals with these eyes have the genes that a source names individually, not through a group.
+    """Check that animals with these eyes have each gene whose own settings a source contains.
+
+    Settings of a group of genes, such as `genome.optical`, are not checked: they apply to those genes that exist.
 
     Raises:
         ConfigError: a gene does not exist for these eyes or in this task.
@@ -278,7 +280,7 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
 
 
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
-    """Return the RunConfig from the checked trees of `layers`. Later trees override earlier ones and the defaults."""
+    """Return the configuration from `trees`, the checked settings of each source; later trees override earlier ones."""
     merged = _merged(trees)
     eye, card = EyeConfig(**merged.get("eye", {})), card_of(merged["task"])
     assert card is not None  # guaranteed by `_checked`

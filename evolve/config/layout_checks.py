@@ -21,9 +21,10 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 
 
 def check_layouts(world: WorldConfig) -> None:
-    """Check the names and sizes in the settings of layouts, and that settings without effect have their defaults.
+    """Check the settings of layouts, the arrangements of walls in courses and mazes.
 
-    Settings of random families have no effect on fixed layouts, and settings of fixed layouts none on random families.
+    Layouts are either fixed, or a family of random layouts (`world.layouts`). Each kind has settings that do not affect
+    the other kind. Settings without effect must have their defaults, and names and sizes must be valid.
 
     Raises:
         ConfigError: a name is unknown, a size is even, or a changed setting has no effect.

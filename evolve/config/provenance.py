@@ -32,7 +32,10 @@ class Source:
     def place(self, key: str) -> str | None:
         """Return the location of `key` in this source, such as "mine.toml, line 7"; None if the source does not set it.
 
-        key: dotted name. A setting of a gene counts as set if the source sets it for the gene's cluster or family
+        A source may set a gene's setting for a whole group of genes, for example `genome.optical.open` for all optical
+        genes. The location is then that of the group's setting.
+
+        key: dotted name of the setting, such as "genome.dispersion.open"
         """
         for path in _spellings(key):
             if not _holds(self.tree, path):

@@ -49,7 +49,11 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
 
 
 def _patches(eye: EyeConfig) -> list[list[str]]:
-    """Return lists of the genes of 4 x 4 heights: without symmetry and, for symmetric reliefs, also with it."""
+    """Return lists of the names of the genes that determine the 4 x 4 points of a relief, one name for each point.
+
+    The first list is for a relief without symmetry. If the eyes have symmetric reliefs, there is a second list, in
+    which several points have the same gene.
+    """
     return [representatives(PATCH, symmetric) for symmetric in (False, True)[: 1 + eye.relief_symmetric]]
 
 

@@ -95,9 +95,11 @@ class WorldConfig:
 
     @property
     def test(self) -> dict[str, Any]:
-        """Arguments of `sim.build_world` that define the worlds of final results.
+        """Arguments of `sim.build_world` that define the worlds in which final results are measured.
 
-        These are the test layouts of a family. Without a family, they are the worlds in which fitness is evaluated.
+        If the layouts are a family of random layouts (`world.layouts`), these worlds have the layouts of its test set,
+        which neither training nor selection uses. If layouts are fixed, they are the worlds in which fitness is
+        evaluated.
         """
         return {**self.evaluation, **self._walls("test")}
 

@@ -54,14 +54,16 @@ def preset_about(name: str) -> dict[str, Any]:
 
 
 def preset_sources(name: str | None, scale: str | None) -> list[Source]:
-    """Return the sources of a preset: its settings, then its scale, whose settings override them.
+    """Return the sources of a preset: first its general settings, then those of a scale, which override them.
+
+    Scales are alternative settings of a preset for shorter and longer runs. A preset without them has one source.
 
     name: name of the preset; None: no preset, and the result is []
     scale: name of the scale; None: "laptop", if the preset has several scales
 
     Raises:
-        ConfigError: the preset or the scale is unknown, or `scale` is given although there is no preset, or the preset
-            has only one scale.
+        ConfigError: the preset is unknown, or it has no scale with this name. A `scale` without a preset, or for a
+            preset with only one scale, is also an error.
     """
     if name is None:
         if scale is not None:

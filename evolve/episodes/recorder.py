@@ -266,9 +266,12 @@ def _play(
 
 
 def _on_ground(infos: list[Mapping[str, Any]]) -> dict[str, np.ndarray]:
-    """Return positions [m] and headings [rad] before each action by name; {} if the task's `info` lacks them.
+    """Return the animal's "position" [m] and "heading" [rad] before each action; {} if the task's `info` lacks one.
 
-    These values are exact, in contrast to headings that are computed from rotation matrices.
+    These values are exact, in contrast to headings that are computed from rotation matrices. The arrays have the shapes
+    (action, 2) and (action,).
+
+    infos: the task's `info` before each action
     """
     if not all(np.shape(info.get("position", ())) == (2,) and "heading" in info for info in infos):
         return {}

@@ -30,7 +30,7 @@ SLACK = 1e-9  # tolerance for rounding errors: eyes in contact must not count as
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
     """Return the width [m] of a retina with this number of receptors along its width. The eye has the same width.
 
-    sizes: settings of the eyes, here and in the other functions
+    sizes: settings of the eyes; the other functions of this module have the same argument
     """
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
 
@@ -160,10 +160,11 @@ def _degrees(tangent: float) -> float:
 def _thinned(wanted: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
     """Return the numbers of eyes and of receptors along the width that fit and are closest to `wanted`.
 
-    The distance between two pairs of numbers is the sum of the squared logarithms of their ratios. With this distance,
-    the repair halves both numbers rather than dividing one of them by four. If the repair always reduced the same
-    number, evolution would drift towards animals in which the other number is large. Selection, not the repair, should
-    choose between eyes and receptors.
+    This function is part of the repair of animals whose eyes would overlap: it reduces their numbers of eyes and of
+    receptors. The distance between two pairs of numbers is the sum of the squared logarithms of their ratios. With this
+    distance, the repair halves both numbers rather than dividing one of them by four. If the repair always reduced the
+    same number, evolution would drift towards animals in which the other number is large. Selection, not the repair,
+    should choose between eyes and receptors.
 
     The required space depends on the number of gaps between eyes, eyes - 1. The ratio of two numbers of eyes is
     therefore computed from eyes - 0.5, the mean of the numbers of eyes and of gaps. This preserves the proportion of

@@ -261,7 +261,7 @@ def _gene(
     unit: str,
     meaning: str,
 ) -> Gene:
-    """Return a gene that is open by default.
+    """Return a gene that is open by default: the search varies it, unless the settings of a run freeze it.
 
     valid: (low, high) of the valid values
     search: (low, high, start), the default search range and start value

@@ -28,7 +28,7 @@ class Genotype:
 
     @cached_property
     def open_genes(self) -> tuple[Gene, ...]:
-        """Open genes, in the order of the genome."""
+        """Genes that the search varies in this run (open genes), in the order of their coordinates in a genome."""
         return tuple(gene for name, gene in ALL_GENES.items() if name in self.uses and self.uses[name].open)
 
     @property
@@ -69,7 +69,10 @@ class Genotype:
         return values
 
     def count(self, steps: int) -> float:
-        """Return the number of genotypes if each open real gene has `steps` distinct values."""
+        """Return the number of genotypes if each real gene that the search varies has `steps` distinct values.
+
+        An integer gene that the search varies has all whole numbers of its search range. All other genes are fixed.
+        """
         sizes = [
             self.uses[g.name].high - self.uses[g.name].low + 1 if g.kind == "integer" else steps
             for g in self.open_genes

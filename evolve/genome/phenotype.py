@@ -146,9 +146,10 @@ class Phenotype:
         )
 
     def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
-        """Return the waveguide that each receptor of a camera eye forms, at most as wide as the receptor.
+        """Return the waveguide that the rhabdom of each receptor of a camera eye forms; None if there is none.
 
-        It is None for receptors without rhabdoms, which are rectangles, and for compound eyes.
+        The waveguide is at most as wide as the receptor. Receptors that have no rhabdoms form no waveguides: they are
+        rectangles that absorb all incident light. The result is also None for compound eyes; see `ommatidium`.
         """
         if self.rhabdom_diameter_um is None or self.facet_diameter_um is not None:
             return None
@@ -175,7 +176,7 @@ class Phenotype:
         """Return the eyes for the simulation.
 
         Raises:
-            ValueError: a field is outside the range that `sim.Eyes` allows.
+            ValueError: an attribute of this phenotype is outside the range that `sim.Eyes` allows.
         """
         import optics
         import sim
@@ -206,7 +207,7 @@ class Phenotype:
         medium: "air", "clear_ocean", "coastal_water" or "fog"; a camera eye is immersed in it; compound eyes ignore it
 
         Raises:
-            ValueError: the medium is unknown, or a field is outside the range that `sim.Eyes` allows.
+            ValueError: the medium is unknown, or an attribute is outside the range that `sim.Eyes` allows.
         """
         import optics
         import sim
@@ -274,7 +275,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
 
 
 def repaired(genome: NDArray[np.float64], config: Settings) -> tuple[str, ...]:
-    """Return the names of the genes whose values the repair of overlaps changes; () for a genome without overlaps.
+    """Return the names of the genes that `develop` changes because eyes or receptors would overlap; () for none.
 
     Raises:
         ValueError: the genome is invalid; see `develop`.

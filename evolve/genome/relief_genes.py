@@ -35,12 +35,14 @@ def representatives(points: int, symmetric: bool) -> list[str]:
 
 
 def refined(relief: Floats, points: int) -> Floats:
-    """Return the surface of a 4 x 4 patch as points x points heights at cell centres, (points²,).
+    """Return a relief as heights at the centres of points x points equal cells, in row-major order (y, x).
 
-    The conversion is exact: the patch is a single bicubic polynomial, which the cubic spline through its heights
-    reproduces. A relief that already has points x points heights is returned unchanged.
+    The given relief may be a B-spline patch of 4 x 4 control points. Its conversion is exact: the patch is a single
+    bicubic polynomial, which the cubic spline through the heights reproduces. A relief that already has points x points
+    heights is returned unchanged. The result is flat, (points²,).
 
     relief: control points of a 4 x 4 patch, or heights, in row-major order (y, x); the array may be flat
+    points: number of cells along each side of the relief
 
     Raises:
         ValueError: the relief has neither 4 x 4 nor points x points heights.

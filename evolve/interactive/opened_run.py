@@ -101,8 +101,8 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ValueError: `task` is not a `sim.Task`, has no mounts or several kinds of eyes, or its `place` fails or does
-                not return one mount for each eye.
+            ValueError: `task` is not a `sim.Task`, or it defines no mounts, or it defines several kinds of eyes, or its
+                method `place` fails or does not return one mount for each eye.
             OSError: the policy's file cannot be read.
         """
         from evolve.episodes.recorder import trained_policy
@@ -255,16 +255,16 @@ class OpenedRun(Run):
     ) -> list[Path]:
         """Play an episode of a candidate, write the views of its eyes as spectral EXR files, and return their paths.
 
-        The files are those of the command `evolve export`; `sim.read_exr` reads them.
-
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
         every: number of actions from one file to the next, 1 to 1,000,000
-        out: folder of the files; None: `exr` in the run directory
+        out: folder of the files, which are those of the command `evolve export` and which `sim.read_exr` reads; None:
+            `exr` in the run directory
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, or the user task was not named on opening the run or fails.
+            ConfigError: an argument is invalid, or the user task was not named when the run was opened, or its module
+                cannot be executed.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
             RuntimeError: a method of the user task fails at the start of the episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.

@@ -51,9 +51,10 @@ def owned(owner: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, str
 
 
 def sealed(content: bytes) -> bytes:
-    """Return the content of a safetensors file with its checksum in place of the placeholder of `owned`.
+    """Return the content of a checkpoint file, in which a SHA-256 checksum replaces a placeholder.
 
-    content: content with the placeholder, from which the checksum is computed
+    content: content of the safetensors file, whose metadata come from `owned` and contain the placeholder, 64 zeros.
+        The checksum is computed from this content
     """
     return _with_checksum(content, BLANK, hashlib.sha256(content).hexdigest())
 

@@ -159,8 +159,13 @@ class EyeFeatures(BaseFeaturesExtractor):
             self.felt.adapt(felt.reshape(-1, felt.shape[-1]))
 
     def _at_each_step(self, codes: Tensor, age: Tensor) -> Tensor:
-        """Return the features at each step, (eye, feature, sample), from codes (eye, code, memory - 1 + step, segment).
+        """Return the features of each eye at each step, which depend on the codes of the last `memory` frames.
 
+        A code is the encoder's output for a frame of one eye. A segment is a sequence of steps of one world. Its frames
+        are those of its steps, preceded by memory - 1 earlier ones. The result has the axes (eye, feature, sample),
+        where samples are the pairs (step, segment) in row-major order.
+
+        codes: codes of all frames of all segments, (eye, element of the code, frame, segment)
         age: steps since the first frame of the episode, (step, segment)
         """
         layer, unit = self.temporal

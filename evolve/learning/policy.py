@@ -106,11 +106,11 @@ class PolicyConfig:
         return spaces.Dict(known | {entry.name: entry.space for entry in self.beside})
 
     def record(self) -> dict[str, Any]:
-        """Return the shape as JSON values.
+        """Return the shape of the policy as JSON values.
 
-        The record of a run contains a hash of each policy file. All versions must therefore write a policy as the same
-        bytes. Older versions had neither a list of other entries nor a choice of wiring, so shapes that those versions
-        could describe are still written in their form.
+        The record of a run contains a hash of each policy file, so all versions must write a policy as the same bytes.
+        Older versions stored neither `wiring` nor `beside`, the observation's entries other than the eyes' signals.
+        Shapes that these versions could describe are therefore still written without these values.
         """
         left_out = {"beside"} | ({"wiring"} if self.wiring == DIRECT else set())
         left_out |= set() if self.directions else {"directions"}
@@ -125,7 +125,7 @@ class PolicyConfig:
 
     @classmethod
     def from_record(cls, stored: Mapping[str, Any]) -> PolicyConfig:
-        """Return the shape from the values that `record` returned.
+        """Return the shape of a policy from the values that `record` returned for it.
 
         Raises:
             KeyError: an entry is missing.

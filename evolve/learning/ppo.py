@@ -242,15 +242,22 @@ def train(
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
-    """Return whether none of the last `patience` evaluations exceeds the best before them; False if none is before."""
+    """Return whether the mean return has not improved in the last `patience` evaluations.
+
+    It has not improved if none of these evaluations has a higher mean return than the best of the earlier evaluations.
+    Without earlier evaluations, the result is False.
+
+    curve: (training steps, mean return) of each evaluation so far
+    """
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
-    """Return (mean, standard deviation) of each element of untrained actions.
+    """Return (mean, standard deviation) of each element of the actions that an untrained policy draws.
 
-    `learning.first_speed` sets both for the element "speed".
+    For the element "speed", the setting `learning.first_speed` determines both numbers. For the others, they are 0 and
+    0.5.
     """
     speed = (2 * config.first_speed - 1, config.first_speed)
     return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

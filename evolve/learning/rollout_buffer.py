@@ -27,10 +27,10 @@ SEGMENT_STEPS = 8
 
 
 class FrameRolloutBuffer(RolloutBuffer):
-    """Rollout buffer that yields observations without stacks, for `evolve.learning.eye_features`.
+    """Rollout buffer that yields each frame once instead of in several stacks, for `evolve.learning.eye_features`.
 
-    At the start of an episode, the memory is not yet full. As in the environments, `EyeFeatures` then fills it with
-    copies of the episode's first frame.
+    An agent with memory observes a stack of its last frames. At the start of an episode, there are too few frames for
+    a stack. `EyeFeatures` then adds copies of the episode's first frame, as the environments do.
     """
 
     observation_space: spaces.Dict

@@ -35,14 +35,14 @@ class UnusedSettingWarning(UserWarning):
 
 
 def check_settings(config: RunConfig) -> None:
-    """Refuse a user task with mounts (places for eyes) that no animal would use; warn about other idle settings.
+    """Refuse a user task with mounts (places for eyes) that no animal would use. Warn about other unused settings.
 
-    The default method `place` of a task spreads an animal's eyes around a single mount. Existing runs are not checked,
-    so they can always be continued and replayed.
+    The default method `place` of a task spreads an animal's eyes around a single mount, so that other mounts would stay
+    empty. Existing runs are not checked, so they can always be continued and replayed.
 
     Warns:
-        UnusedSettingWarning: the task defines a value that the run's genome or settings determine, or auxiliary
-            entries, which evolving eyes lack.
+        UnusedSettingWarning: the task defines `eye` or `fidelity`, but the run's genome or settings determine them. Or
+            it defines `auxiliary` (additional signals of receptors, such as depth), which evolving eyes do not have.
 
     Raises:
         ConfigError: the task has several mounts and does not define `place`, the user has not named its code, or its
@@ -99,7 +99,9 @@ def check_layouts(config: RunConfig) -> None:
 
 
 def try_task(config: RunConfig) -> None:
-    """Build a user task with an animal of the genes' start values, and take a few random actions; skip built-in tasks.
+    """Build a user task with one animal, and take a few random actions in it. Built-in tasks are skipped.
+
+    Each gene of the animal has its start value.
 
     Raises:
         ConfigError: the user has not named the task's code, or the task's module, model, eyes or methods fail; the

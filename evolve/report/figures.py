@@ -1,4 +1,6 @@
-"""Figures of a whole run: fitness, costs, success and genes over the generations, descent, and learning curves.
+"""Figures of a whole run: fitness, costs, success and genes over the generations, a family tree, and learning curves.
+
+The family tree shows the candidates and the line of descent of the best one.
 
 Each public function draws one figure, and returns it as an SVG element.
 """

@@ -57,13 +57,13 @@ class QuantityDrift:
 
 @dataclass(frozen=True)
 class Drift:
-    """Comparison of runs with searches with random fitness.
+    """Comparison of the animals of runs with those of searches whose fitness is random.
 
     of: number of runs
-    generations: generations over which means are computed, counted from 0
-    searches: number of searches
-    moved: quantities, with their values
-    costs: True if the searches subtract costs
+    generations: generations over whose candidates the means are computed, counted from 0
+    searches: number of searches with random fitness
+    moved: compared quantities, such as genes, each with its values in the runs and in the searches
+    costs: True if the searches subtract the costs of eyes and brain from a random task fitness
     """
 
     of: int
@@ -74,17 +74,20 @@ class Drift:
 
     @property
     def random(self) -> str:
-        """Random quantity that the searches maximise, as text: "fitness" or "task fitness minus costs"."""
+        """Description of the random numbers that the searches maximise, "fitness" or "task fitness minus costs".
+
+        If there are costs, only the task fitness is random.
+        """
         return "task fitness minus costs" if self.costs else "fitness"
 
     def as_plain_values(self) -> dict[str, Any]:
-        """Return the comparison as JSON values."""
+        """Return the comparison of the runs with the searches with random fitness as JSON values."""
         first, last = self.generations[0], self.generations[-1]
         moved = [asdict(one) for one in self.moved]
         return {"generations": [first, last], "searches": self.searches, "random": self.random, "moved": moved}
 
     def lines(self) -> list[str]:
-        """Return the comparison as a table for a terminal."""
+        """Return the comparison of the runs with the searches with random fitness as lines of a table, with notes."""
         rows = [("", "run" if self.of == 1 else f"mean of {self.of} runs", "null model", "95 % of its searches", "p")]
         for one in self.moved:
             numbers = (f"{one.mean:.4g}", f"{one.median:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{one.p:.2g}")

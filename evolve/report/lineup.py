@@ -41,9 +41,10 @@ def lineup(run: Run) -> Html:
 
 
 def _heading(generation: int) -> str:
-    """Return the heading of the first animal.
+    """Return the heading of the first animal, the best of the first generation in which a candidate succeeded.
 
-    generation: generation of the animal; it is not 0 if all candidates of the earlier generations have failed
+    generation: number of this generation. It is above 0 if all candidates of generation 0 have failed. The heading then
+        adds "the first to succeed".
     """
     return f"Generation {generation}’s best{', the first to succeed' if generation else ''}"
 

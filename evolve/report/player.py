@@ -88,9 +88,10 @@ def _from_above(plan: GroundPlan) -> Html:
 
 
 def _sights(episode: Episode) -> Html:
-    """Return a pair of canvases for each eye, which show its signals with noise and the signals without noise.
+    """Return two canvases for each eye, one for its signals with noise and one for signals without noise.
 
-    The signals without noise are those behind a perfect lens or, for compound eyes, those of the same ommatidia.
+    For a lens eye, the signals without noise are those that its receptors would have behind a perfect lens. For a
+    compound eye, they are the signals of its own ommatidia.
     """
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution

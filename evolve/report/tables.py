@@ -73,7 +73,10 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
 
 
 def _best_spread(best: Candidate) -> str:
-    """Return the 95 % interval of the fitness in words, after task fitness and costs if there are costs."""
+    """Return the 95 % interval of the best candidate's fitness in words.
+
+    If the candidate has costs, the text begins with its task fitness and its costs.
+    """
     spread = _spread(best.returns, best.costs)
     if not best.costs:
         return spread

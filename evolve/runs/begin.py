@@ -92,7 +92,8 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
 
     Raises:
         ConfigError: a setting is invalid, the optimizer is unknown, random layouts cannot be drawn or two of them are
-            equal, or the user task fails or has several mounts that no animal would use; the message is one line.
+            equal, the user task fails, or it has several mounts (places for eyes) but no method `place` that would
+            use them; the message is one line.
         RunError: the run or the animal of `start_from` does not exist, or its record is damaged.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """

@@ -87,11 +87,14 @@ class Voice(OwnedStream):
         return len(text)
 
     def _judge(self, fault: OSError | ValueError) -> None:
-        """Report a fault, or raise it if the stream is not patient.
+        """Handle an error of the stream that receives the text: raise it, print a note on stderr, or ignore it.
+
+        If `patient` is True, nothing is raised, and the command continues without this output. If `name` is None, only
+        a closed pipe or terminal can be raised.
 
         Raises:
-            BrokenPipeError: the pipe or terminal has been closed, and the stream is not patient.
-            OSError: another fault has occurred, the stream is not patient, and it has a name.
+            BrokenPipeError: the pipe or terminal has been closed, and `patient` is False.
+            OSError: another fault has occurred, `patient` is False, and `name` is not None.
         """
         number = fault.errno if isinstance(fault, OSError) else errno.EBADF
         if number in (errno.EPIPE, errno.EIO):  # a closed pipe or terminal
@@ -121,9 +124,10 @@ def say(text: str, end: str = "\n", flush: bool = False) -> None:
 
 @contextmanager
 def voices(patient: bool, private: bool = False) -> Iterator[None]:
-    """Replace stdout and stderr by Voices within the context.
+    """Replace stdout and stderr within the context by streams that escape control characters; see `Voice`.
 
-    patient: see `Voice`; stderr is always patient
+    patient: True to continue without output after an error of stdout, such as a closed pipe; False: raise the error.
+        Errors of stderr are never raised
     private: True if only `say` writes to stdout, and all other output goes to stderr. False: `print` writes to stdout,
         too
     """

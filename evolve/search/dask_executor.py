@@ -58,7 +58,8 @@ class DaskExecutor:
     count: number of workers when the context was entered
 
     Raises:
-        ConfigError: the address of the scheduler is malformed; on entry, it requires certificates, but there are none.
+        ConfigError: the address of the scheduler is malformed. On entry: the address begins with tls://, but no
+            certificates for encrypted connections are given.
         ExecutorError: on entry, Dask is not installed, the scheduler does not answer, or no worker is connected.
     """
 

@@ -37,7 +37,11 @@ _prepared = False
 
 
 class UnfitWorker(RuntimeError):
-    """A worker cannot evaluate candidates, or its numbers would differ; the message states the reason in one line."""
+    """A worker cannot evaluate candidates, or has other software than the sender of its jobs.
+
+    With other software, its results could differ from those of other workers. The message states the reason in one
+    line.
+    """
 
 
 class _Unwanted(Exception):
@@ -163,9 +167,10 @@ def _content(path: Path) -> bytes:
 
 
 def _prepare(order: Order) -> None:
-    """Compare the versions of the software with the sender's, and prepare Dr.Jit at the first call in this process.
+    """Compare the versions of this worker's software with the sender's, and prepare Dr.Jit.
 
-    A version that is unknown here or there, such as a commit, is not compared.
+    Dr.Jit is prepared only at the first call in this process. A version that the worker or the sender does not know is
+    not compared, for example the commit if the code is not in a git repository.
 
     Raises:
         UnfitWorker: a version differs, or Dr.Jit cannot be prepared.

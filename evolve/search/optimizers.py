@@ -151,9 +151,9 @@ class Named:
 class CMA(Named):
     """CMA-ES (Hansen and Ostermeier 2001), implemented by pycma, which is called through nevergrad.
 
-    The initial step size is `search.sigma`. CMA-ES samples candidates around a weighted mean of the better half of the
-    last population with known fitness. The members of this better half are recorded as the parents of each new
-    candidate.
+    The initial step size is `search.sigma`. As soon as the fitness of all candidates of a population is known, CMA-ES
+    computes a weighted mean of the better half of this population. It samples new candidates around this mean. The
+    members of the better half are recorded as the parents of each new candidate.
 
     nevergrad has an option for noisy functions, but its CMA-ES uses this option only to recommend a single best genome.
     The option is not set, because the best candidate is taken from the record.

@@ -83,10 +83,12 @@ class Scheduler:
             ) from None
 
     def require_answer(self) -> None:
-        """Check that the scheduler answers, with these certificates, before a run starts.
+        """Check, before a run starts, that the scheduler answers.
+
+        If the address begins with tls://, the certificates of this object are used, or those in Dask's own settings.
 
         Raises:
-            ConfigError: the address requires certificates, but there are none.
+            ConfigError: the address begins with tls://, but there are no certificates.
             ExecutorError: the scheduler does not answer within 5 s, or Dask is not installed.
         """
         self.security()

@@ -53,7 +53,10 @@ class SignsOfLife:
         self._workers_s = 0.0 if alive else self._workers_s + passed
 
     def forget(self, address: str) -> None:
-        """Forget a worker that was removed. If the next answer still contains this worker, it counts as new."""
+        """Forget a worker that was removed from the scheduler.
+
+        If the next list of workers from the scheduler still contains this worker, it counts as a new worker.
+        """
         self._silent_s.pop(address, None)
         self._last_seen.pop(address, None)
 
@@ -72,7 +75,7 @@ class SignsOfLife:
 
     @property
     def exhausted(self) -> bool:
-        """True if the silence has lasted for `patience_s`."""
+        """True if the scheduler, or every worker, has given no sign of life for at least `patience_s`."""
         return self.silence_s >= self.patience_s
 
     @property

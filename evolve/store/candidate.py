@@ -66,7 +66,7 @@ class Candidate:
 
     @property
     def place(self) -> Place:
-        """Place of the candidate in the search."""
+        """Id of the candidate, its generation, and its number in this generation."""
         return Place(self.id, self.generation, self.index)
 
     @property
@@ -111,7 +111,7 @@ class Candidate:
         """Return the candidate as a record restores it: with escaped, shortened text, and NaN for infinity in a list.
 
         If a value of the outcome has the wrong type or is outside the range that a record allows, the candidate counts
-        as failed. Of its outcome, only the reason remains, and seconds and episode failures if they can be recorded.
+        as failed. Its outcome is then the reason, with `seconds` and `episode_failures` if both can be recorded.
 
         Raises:
             ValueError: another value, such as the genome or the seed, cannot be recorded.

@@ -284,7 +284,7 @@ def _require_no_run(path: Path) -> None:
 
 
 def _require_plain(path: Path) -> None:
-    """Check that those files of a run that exist are regular files, and that those folders that exist are folders."""
+    """Check that a run's files are regular files, and its folders are directories. Those that are missing pass."""
     for name in (CONFIG, VERSIONS, CANDIDATES, RunLock.NAME):
         require_regular(path / name)
     for name in (POLICIES, TRAININGS, *PRODUCTS):

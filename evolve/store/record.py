@@ -100,10 +100,12 @@ class Record:
         return False
 
     def _leave_out(self, damage: str) -> None:
-        """Ignore a damaged line and all lines after it.
+        """Ignore a damaged line and all lines after it, if the field `before_damage` is True.
+
+        damage: message about the damaged line
 
         Raises:
-            RunError: `before_damage` is false.
+            RunError: `before_damage` is False, so that a damaged line is an error.
         """
         if not self.before_damage:
             raise RunError(f"{damage}; --before-damage uses only the {len(self.lines)} lines before it")
@@ -142,7 +144,10 @@ class Record:
         self.candidates = _with(self.candidates, candidate)
 
     def cut_off_unused(self) -> None:
-        """Remove ignored lines from the file. If one of them is damaged, first copy the file to `*.damaged-N`.
+        """Remove from the file the lines that were ignored when it was read.
+
+        These are an unfinished last line, or a damaged line and all lines after it. If there is a damaged line, the
+        file is first copied to `candidates.jsonl.damaged-N`.
 
         Raises:
             RunError: the file cannot be written.
@@ -166,10 +171,14 @@ class Record:
 
 
 def _require_readable(candidate: Candidate, path: Path) -> None:
-    """Check that the line of a candidate restores an equal candidate. Results of `Candidate.recordable` pass the check.
+    """Check that a candidate stays the same if it is written as a line of the record and read back from this line.
+
+    Results of `Candidate.recordable` pass the check.
+
+    path: file of the record, for the message
 
     Raises:
-        RunError: the line would restore a different candidate, or could not be read back.
+        RunError: reading the line back would give a different candidate, or would fail.
     """
     try:
         if candidate == candidate.recordable():
@@ -187,7 +196,12 @@ def _furthest(lines: Lines) -> tuple[Candidate, ...]:
 
 
 def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
-    """Return the result of `_furthest` after the line of `new` is added, without a pass over all lines."""
+    """Return the candidates of a record, in the order of ids, after a line for the candidate `new` is appended to it.
+
+    The result is that of `_furthest`, but is found without a pass over all lines of the record.
+
+    candidates: result of `_furthest` before the line is appended
+    """
     at = bisect_left(candidates, new.id, key=lambda candidate: candidate.id)
     known = at < len(candidates) and candidates[at].id == new.id
     if known and candidates[at].rung > new.rung:

@@ -98,8 +98,8 @@ def machines(run: Path) -> list[str]:
 def run_id(run: Path) -> str:
     """Return the id of a run, which does not depend on its directory: 16 hexadecimal digits of a SHA-256.
 
-    It is computed from all entries of the first start, such as the time, the checksums of the settings, and the
-    versions. If no start is recorded, it is "".
+    The id is computed from everything that versions.json records about the first start of the run, such as the time,
+    the checksums of the settings, and the versions of the software. If no start is recorded, the id is "".
     """
     starts = _starts(run)
     return hashlib.sha256(json.dumps(starts[0], sort_keys=True).encode()).hexdigest()[:16] if starts else ""

@@ -135,12 +135,12 @@ class Aperture(ABC):
         """
 
     def nodes(self, cycles: float, digits: float) -> Nodes:
-        """Return quadrature nodes for integrands with spatial frequencies up to `cycles` cycles per R.
+        """Return quadrature nodes for integrands with spatial frequencies up to `cycles` cycles per pupil radius.
 
         For integrands of at most 1, sums over the nodes have an error of at most 10^-digits times the area.
 
-        The limit `cycles` applies to the local frequency of the integrand at every point and in every direction.
-        Frequencies of a varying amplitude count as well.
+        The limit `cycles` applies to the local frequency of the integrand at every point and in every direction. If the
+        amplitude of the integrand varies, the frequencies of this variation count as well.
 
         Raises:
             ValueError: cycles is outside [0, 1e5], or digits is outside [0, 16].

@@ -1,8 +1,9 @@
 """Converging and diverging waves behind disks and rings, convolved with the kernel of a soft edge.
 
-A curved wave contains all directions from the direction at its centre to the direction at its rim. After the
-convolution, it contains only directions up to the stopband of the kernel. Light that leaves in other directions is
-removed, and light up to the passband, including the light that the hard edge diffracts, stays unchanged.
+A curved wave contains all directions from the direction at its centre to the direction at its rim. Each direction
+corresponds to a spatial frequency, and the convolution acts as a low-pass filter. It removes light in directions beyond
+the stopband of the kernel. In directions up to the passband of the kernel, all light stays unchanged. This includes
+light that the hard edge diffracts into these directions.
 """
 
 from __future__ import annotations
@@ -57,7 +58,11 @@ def _rule(first: float, last: float, cycles: float) -> tuple[np.ndarray, np.ndar
 
 @lru_cache(maxsize=16)
 def _weights(levels: int, count: int) -> np.ndarray:
-    """Return the weights (level, point) that interpolate from Chebyshev points to the middle of equal steps."""
+    """Return the weights that interpolate a function on [-1, 1] from Chebyshev points, array (level, point).
+
+    levels: number of equal steps into which [-1, 1] is divided; the function is interpolated in the middle of each
+    count: number of Chebyshev points
+    """
     return chebyshev_basis((2 * np.arange(levels) + 1) / levels - 1, count).astype(np.float32)
 
 

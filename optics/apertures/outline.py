@@ -93,9 +93,12 @@ class Outline(ReadOnlyArrays):
         return np.concatenate(found)
 
     def crossings(self, y: np.ndarray) -> np.ndarray:
-        """Return the positions x at which the edge crosses horizontal lines at `y`, ascending, (line, crossing).
+        """Return the ascending positions x at which the edge crosses horizontal lines, array (line, crossing).
 
-        All lines must have the same number of crossings, so no `turning` height may lie between them.
+        All lines must cross the same segments and arcs. There must therefore be no height between the lines at which a
+        crossing begins, ends or passes a corner (see `turning`).
+
+        y: heights of the lines, (line,)
         """
         y = np.asarray(y, dtype=np.float64)
         middle = float(y.mean())
@@ -142,7 +145,8 @@ class Outline(ReadOnlyArrays):
     def tangent(self) -> np.ndarray:
         """Heights of the tops and bottoms of the circles to which the arcs belong, even if an arc ends before them.
 
-        Near such a height, the position of a crossing changes like a square root.
+        Near such a height, the position x at which an arc crosses a horizontal line changes with the height of the line
+        like a square root.
         """
         _, cy, radius, _, _ = self.arcs.T
         return read_only(np.unique(np.concatenate([cy - radius, cy + radius])))

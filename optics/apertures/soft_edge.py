@@ -65,7 +65,10 @@ class SoftEdge:
 
     @property
     def cycles(self) -> float:
-        """Cycles of the kernel's highest frequency, `stopband`, from its centre to its end."""
+        """Number of cycles of a wave of the frequency `stopband` over the kernel's radius `reach`.
+
+        The kernel contains no frequencies above `stopband`, to within `ripple`.
+        """
         return self.reach * self.stopband
 
     def ring(self, r: np.ndarray) -> np.ndarray:
@@ -143,12 +146,14 @@ def _positive_root(a: float, b: float, c: float, d: float) -> float:
 
 
 def _beta(ripple: float) -> float:
-    """Return Kaiser's parameter β for a ripple in two dimensions.
+    """Return Kaiser's parameter β of a radial window whose kernel in the plane has a given ripple.
 
-    Kaiser's rule applies to one dimension. In the plane, side lobes from all directions add up at frequency 0. The sum
-    is up to 7 times a ripple of 0.5, 20 times a ripple of 1e-6, and 50 times a ripple of 1e-12, for the worst width of
-    the passband. The kernel is therefore designed for ripples that are 10, 27 and 82 times smaller (a choice).
-    tests/optics/apertures/test_aperture.py checks that the spectrum stays below the ripple.
+    Kaiser's rule applies to one dimension. In the plane, side lobes from all directions add up at frequency 0. For the
+    worst width of the passband, their sum is up to 7 times a ripple of 0.5, 20 times a ripple of 1e-6, and 50 times a
+    ripple of 1e-12. Kaiser's rule is therefore applied to a smaller ripple. The chosen factors, 10, 27 and 82 for these
+    ripples, leave a margin. tests/optics/apertures/test_aperture.py checks that the spectrum stays below the ripple.
+
+    ripple: largest deviation of the kernel's spectrum from 1 in the passband and from 0 in the stopband.
     """
     return kaiser_beta(ripple**1.08 / 9)
 

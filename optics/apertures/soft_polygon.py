@@ -77,14 +77,16 @@ def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, 
 
 
 class _Line:
-    """Contribution W(d, s) of a piece of a line to the transmittance at a point.
+    """Contribution W(d, s) of a piece of a straight edge to the soft-edged transmittance at a point.
 
-    The piece extends from the foot of the perpendicular from the point to a distance s along the line. d is the signed
-    length of the perpendicular.
+    The piece begins at the foot of the perpendicular from the point to the edge, and ends at a distance s along the
+    edge. d is the signed length of the perpendicular, positive if the point lies on the inner side.
 
-    The kernel covers a disc around the point, whose radius is the kernel's reach. Parts of the line outside this disc
-    contribute the angle that they subtend. If the piece ends outside, half the chord within the disc contributes a
-    value tabulated for a half-plane. A piece that ends within the disc contributes ∫ d H(r) dt.
+    The kernel that softens the edge covers a disc around the point. If the piece ends within this disc, its
+    contribution is the integral ∫ d H(r) dt, where t runs from 0 to s, r² = d² + t², and H is that of `radial_table`.
+    If the piece ends outside the disc, its contribution is that of the infinite half-line, minus the angle that the
+    rest of the half-line subtends, divided by 2π. The half-line's value is tabulated: an infinite line is the edge of a
+    half-plane. If the edge misses the disc, the piece contributes the angle that it subtends, divided by 2π.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -102,7 +104,12 @@ class _Line:
         self.count = dr.opaque(types.Index, half)
 
     def between(self, d: Array, start: Array, end: Array) -> Array:
-        """Return the contribution of a line from `start` to `end` at the signed distance d (positive inside)."""
+        """Return the contribution of a piece of a straight edge to the transmittance at points.
+
+        d: signed distance of the line from each point, positive if the point lies on the inner side.
+        start, end: ends of the piece, as positions along the line, measured from the foot of the perpendicular from
+            each point.
+        """
         import drjit as dr
 
         near = dr.abs(d) < self.reach
@@ -112,12 +119,16 @@ class _Line:
         return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
 
     def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
-        """Return the contribution W(d, s) of a line from its foot to the distance s.
+        """Return the contribution W(d, s) of a piece of a straight edge to the transmittance at points.
 
-        near: whether the line's distance from each point is less than the kernel's reach, so that the disc of this
-            radius around the point contains a chord of the line.
+        The piece begins at the foot of the perpendicular from each point to the edge, and ends at the signed distance s
+        along the edge. d is the signed length of the perpendicular, positive if the point lies on the inner side.
+
+        near: True if |d| is less than the kernel's reach. The disc of this radius around the point then contains a
+            chord of the line.
         half: half the length of the chord.
-        chord: contribution of half the chord; 0 if there is no chord.
+        chord: contribution of the infinite half-line that begins at the foot; 0 if there is no chord.
+        zero: zeros, one for each point.
         """
         import drjit as dr
 

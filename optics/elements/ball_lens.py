@@ -1,4 +1,7 @@
-"""Gradient-index ball lenses, such as those of fish: their focus, and the pupil with their wavefront."""
+"""Gradient-index ball lenses, such as those of fish: their focus, and a pupil that has the same effect on light.
+
+The wavefront of this pupil is that of the light behind the lens.
+"""
 
 from __future__ import annotations
 

@@ -22,7 +22,8 @@ __all__ = ["Beam"]
 class Beam:
     """Light of one vacuum wavelength [m] from a source through a pupil to a plane at `distance` [m].
 
-    The numbers of the pupil, all distances and the source's angle may carry derivatives.
+    The distance, the source's distance and angle, and the pupil's radius, focal length, relief, refractive index n,
+    wavefront and mask may carry derivatives.
     """
 
     pupil: Pupil

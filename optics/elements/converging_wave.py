@@ -27,16 +27,19 @@ ON_Z = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class ConvergingWave:
-    """Samples of a wave near a sphere around a point of the image plane.
+    """Samples of a wave that converges on a point of the image plane, read from an object of another optics program.
 
-    sines: unit vectors from this point to the samples, as components along the image plane's axes x and y, (2, n).
-    ahead: distance [m] by which the wavefront is ahead of the sphere, times the refractive index, (n,).
-    rim: rim of the pupil, in sines.
+    The wavefront is compared with the reference sphere, whose centre is this point.
+
+    sines: components along the image plane's axes x and y of the unit vectors from the point to the samples, array
+        (axis, sample).
+    ahead: distance [m] by which the wavefront is ahead of the sphere, times the refractive index, array (sample,).
+    rim: rim of the pupil, in the unit of `sines`.
     on_plane: rim [m] of the pupil on its plane, which lies `distance` in front of the image.
     distance: radius of the sphere [m].
     wavelength: vacuum wavelength [m].
     position: the point (x, y) [m] on the image plane; None if the other program's object does not contain it.
-    height: distance [m] from the origin of the object's coordinates to the image plane, perpendicular to the plane and
+    height: distance [m] from the origin of that object's coordinates to the image plane, perpendicular to the plane and
         positive in the direction of the light; None if the object does not contain it.
     """
 
@@ -100,16 +103,19 @@ def is_of_samples(system: Any) -> bool:
 
 
 def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave:
-    """Return the wave of an object with pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves].
+    """Return the wave of an object of another program that describes the light in a pupil by rays.
 
+    system: the object, such as optiland's WavefrontData. Its attributes are pupil_x, pupil_y, pupil_z and radius [mm],
+        and opd [waves].
     wavelength: vacuum wavelength [m].
     image_normal: normal of the image plane in the object's coordinates. None: the z axis. The x axis of the image plane
         is the projection of the object's x axis.
 
     Raises:
         ValueError: a number of the object or the normal is invalid, the attributes have different lengths, no ray has
-            light, the samples lie on another sphere than `radius` or on a line, the pupil is obscured or not convex, or
-            a pupil that is neither a circle nor an ellipse is sampled too coarsely.
+            light, the sphere through the samples has a radius other than the attribute `radius`, the samples lie on a
+            line, the pupil is obscured or not convex, or a pupil that is neither a circle nor an ellipse is sampled too
+            coarsely.
     """
     normal = _unit(ON_Z if image_normal is None else image_normal)
     x, y, z, opd, intensity = _alike(system)
@@ -138,10 +144,11 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
 
 
 def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWave:
-    """Return the wave of an object with the attributes data (complex), dx [mm] and wavelength [µm].
+    """Return the wave of an object of another program that describes the light in a pupil by samples on a grid.
 
-    system: the object. Its samples lie on a plane that is parallel to the image plane.
-    wavelength: vacuum wavelength [m]. The wavelength of the object must be equal to it.
+    system: the object, such as prysm's Wavefront. Its attributes are data (complex), dx [mm] and wavelength [µm]. The
+        samples in `data` lie on a plane that is parallel to the image plane.
+    wavelength: vacuum wavelength [m], which must be equal to the object's wavelength.
     distance: distance [m] of the samples from the image plane.
 
     Raises:

@@ -31,13 +31,17 @@ APART = 1e-9  # rounding: borders that are closer, in pupil radii, are the same
 
 @dataclass(frozen=True)
 class DerivativeKnots:
-    """Cells between the knots of all maps that carry derivatives.
+    """Cells of the pupil's square in which derivatives with respect to the samples of maps are smooth.
 
-    borders: ascending borders of the cells along x and along y, in units of the pupil's radius, from -1 to 1. They
-        include the borders of a relief of pixels.
-    splines: number of cubic splines, 1 or 2, by which the derivatives multiply the light in each cell. It is 2 if a
-        mask and a relief or wavefront carry derivatives.
-    maps: names, rows and columns of the maps, such as "height: 32 x 32".
+    A map is a relief, wavefront or mask that is given by samples and interpolated by cubic splines. The splines are
+    different polynomials on both sides of a knot, a row or column of samples. The knots of all maps that carry
+    derivatives divide the square into rectangular cells.
+
+    borders: ascending borders of the cells, the same along x and along y, in units of the pupil's radius, from -1 to 1.
+        They include the borders between the pixels of a relief of pixels.
+    splines: number of cubic splines, 1 or 2, that are factors of a derivative of the light, in addition to the light of
+        the other parts of the pupil. It is 2 if the mask and also the relief or wavefront carry derivatives.
+    maps: names, rows and columns of the maps that carry derivatives, such as "height: 32 x 32".
     names: names of these maps, as arguments of `Pupil`.
     """
 
@@ -47,19 +51,23 @@ class DerivativeKnots:
     names: tuple[str, ...]
 
     def without_maps(self, pupil: Pupil) -> Pupil:
-        """Return the pupil without the maps.
+        """Return the pupil without the maps (relief, wavefront or mask) that carry derivatives.
 
-        The cells between knots resolve the maps, so the bandwidth of the other parts determines the nodes in a cell.
+        In each cell, these maps are polynomials of low degree. The number of quadrature nodes in a cell is therefore
+        planned for the bandwidth of the pupil that is returned.
         """
         without: dict[str, Any] = dict.fromkeys(self.names)
         return replace(pupil, **without)
 
 
 def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
-    """Return the cells that derivatives with respect to samples of maps require; None if no derivative requires any.
+    """Return the cells of the pupil between the knots of the maps that carry derivatives; None without such maps.
 
-    A derivative with respect to the refractive index is proportional to the height, so it requires the cells of the
-    relief, too.
+    A map is a relief, wavefront or mask that is given by samples. The derivative of the light with respect to a sample
+    is a cubic spline, which is a single polynomial only in each cell between two knots. The derivative with respect to
+    the relief's refractive index is proportional to the height, so a relief counts if its index carries a derivative.
+
+    wavelength: vacuum wavelength [m], at which the relief counts only if its index differs from its surroundings.
     """
     maps = dict(_maps(pupil, wavelength))
     if not maps:
@@ -76,7 +84,11 @@ def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
 
 
 def carries_derivatives(beam: Beam) -> bool:
-    """Return whether any number of the beam's pupil or source, or its distance, carries a derivative."""
+    """Return True if a derivative is requested with respect to any input of the beam.
+
+    Such inputs are the distance of the sensor plane, the distance and angle of the source, and the radius, focal
+    length, relief, refractive index, wavefront and mask of the pupil.
+    """
     pupil = beam.pupil
     numbers: list[Any] = [pupil.aperture_radius, pupil.thin_lens_focal_length, beam.distance, beam.source.distance]
     numbers += beam.source.angle

@@ -30,14 +30,17 @@ RMS_DIGITS = 8.0
 
 @dataclass(frozen=True, eq=False)
 class ExitPupil:
-    """An exit pupil with its wavefront.
+    """The exit pupil and the wavefront of a lens that was computed by another optics program.
+
+    Both were read from an object of that program, such as optiland's WavefrontData or prysm's Wavefront. The wavefront
+    is relative to the reference sphere, whose centre is the image point in that program.
 
     pupil: an ideal lens focused on the centre of the reference sphere, with the wavefront as Zernike modes. Its PSF at
-        `distance` has the axes of the image plane, and its origin is the centre of the sphere.
-    distance: radius [m] of the reference sphere, whose centre is the image position in the other program.
-    residual: root mean square [m] of the difference between wavefront and fit.
+        `distance` has the axes of the image plane, and the PSF's origin is the centre of the sphere.
+    distance: radius [m] of the reference sphere.
+    residual: root mean square [m] of the difference between the wavefront and the fitted Zernike modes.
     position: centre (x, y) [m] of the sphere, in coordinates along the image plane from the origin of the object's
-        coordinates; None if the object does not contain it (prysm).
+        coordinates; None if the object does not contain this position, as with prysm's Wavefront.
     sines: components (x, y) along the image plane of the direction of the light at the pupil's centre. (0, 0):
         perpendicular to the image plane.
     wave: the samples from the other program.
@@ -80,12 +83,13 @@ class ExitPupil:
 
     @property
     def image_height(self) -> float:
-        """Position [m] of the image plane relative to the origin of the object's coordinates.
+        """Distance [m] of the image plane from the origin of the coordinates of the other program's object.
 
-        It is measured perpendicular to the plane, and is positive in the direction of the light.
+        The distance is measured perpendicular to the plane. It is positive if the plane lies behind the origin, in the
+        direction of the light.
 
         Raises:
-            ValueError: the object does not contain it (prysm).
+            ValueError: the object does not contain this distance, as with prysm's Wavefront.
         """
         if self.wave.height is None:
             raise ValueError("the position of the image plane is unknown: this object does not contain it")

@@ -94,7 +94,7 @@ class HumanEye:
 
     @cached_property
     def pupil(self) -> Pupil:
-        """Pupil of the eye, for `optics.psf` and other functions. Use `focal_length` as their sensor distance."""
+        """Pupil of the eye, for functions such as `optics.psf`. Pass them `focal_length` as the sensor's distance."""
         humour = medium("chromatic_eye")
         paraboloid = BSplineRelief.paraboloid(0.0, 1 / SURFACE, self.aperture_radius)
         reported = self._reported

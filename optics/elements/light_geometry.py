@@ -104,9 +104,13 @@ def _kept(beam: tuple[float, ...]) -> LightGeometry:
 
 @lru_cache(maxsize=4)
 def disk_points(across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return positions along an axis, and points (x, y) of the square grid inside the unit disk.
+    """Return the points of a square grid that lie inside the unit disk.
 
-    across: number of points across the disk. RIM: points on the rim instead, and no positions along an axis.
+    The result contains the positions of the grid's columns (or rows) from -1 to 1, array (column,), and the coordinates
+    x and y of the points, arrays (point,).
+
+    across: number of points along a diameter. If it is RIM (0), the points lie evenly spaced on the rim of the disk,
+        and the array of positions is empty.
     """
     if across == RIM:
         angle = 2 * np.pi * np.arange(ANGLES) / ANGLES

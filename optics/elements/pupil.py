@@ -156,7 +156,7 @@ class Pupil:
 
     @property
     def pixels(self) -> int:
-        """Number of the relief's square pixels across the pupil; 0 if it has none or all heights are equal."""
+        """Number of square pixels across the pupil; 0 unless the relief consists of such pixels of unequal height."""
         return 0 if self.height is None else int(self.height.pixels)
 
     def image_distance(self, source_distance: float) -> float:
@@ -209,11 +209,11 @@ class Pupil:
         return replace(self, height=None)
 
     def index_step(self, wavelength: float) -> Scalar:
-        """Return the relief's index n(λ) minus the index in front of the pupil, which surrounds the relief."""
+        """Return the index n(λ) of the relief minus that of the medium around it, which lies in front of the pupil."""
         return self.n.step(wavelength, self.index_before(wavelength))
 
     def bends(self, wavelength: float) -> bool:
-        """Return whether there is a relief whose index differs from its surroundings or carries a derivative."""
+        """Return True if there is a relief and its `index_step` is not 0 or carries a derivative."""
         step = self.index_step(wavelength)
         return self.height is not None and (is_differentiable(step) or step != 0)
 
@@ -262,14 +262,14 @@ class Pupil:
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
-        """First requested wavelength for each set of refractive indices; equal indices give equal slopes."""
+        """First wavelength requested with each set of refractive indices; `slopes` reuses its result for that set."""
         return {}
 
     def scatter(self, wavelength: float, share: float) -> float:
         """Return the frequency [1/m] along x and y beyond which at most a fraction `share` of the light is scattered.
 
-        Square pixels, masks and fine detail of maps scatter light away from geometrical rays. The result is the sum of
-        their frequencies. Callers add the frequency that corresponds to the slopes of the rays (Carson's rule).
+        Pixels or fine detail of the relief, fine detail of the wavefront, and the mask each scatter light up to some
+        frequency. The result is the sum of the three. Callers add that of the geometrical rays' slopes (Carson's rule).
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))

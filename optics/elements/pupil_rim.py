@@ -81,11 +81,13 @@ class Rim:
 def rim_around(lit: np.ndarray, dark: np.ndarray | None = None) -> Rim:
     """Return the rim of a convex pupil from the positions (2, n) of its illuminated samples.
 
-    Circle and oval are least-squares fits to all corners of the convex hull. If a grid has an even number of samples
-    and one at the centre, it extends farther to one side, where a single sample may lie on the rim. This sample must
-    not determine the fit. If neither fits, the rim is the hull. If there are also dark samples, each edge of the hull
-    is moved outwards: half way to the nearest dark sample or, if none is near, to the circle or oval around all
-    samples.
+    The rim is a circle or an oval if one of them fits the corners of the samples' convex hull. The fit is by least
+    squares to all corners, so that no single corner determines it. For example, a grid of an even number of samples
+    extends farther to one side if one of its samples is at the centre, and a single sample on that side may then lie on
+    the rim.
+
+    If neither fits, the rim is the hull. If `dark` samples are also given, each edge of the hull is moved outwards:
+    half way to the nearest dark sample or, if none is near, to the circle or oval around all samples.
 
     dark: positions (2, m) of samples without light. None: unknown.
 
@@ -123,10 +125,15 @@ def _hull(points: np.ndarray) -> Any:
 
 
 def _cut(hull: Any, dark: np.ndarray, apart: float) -> np.ndarray:
-    """Return the hull's corners after its edges were moved half way to dark samples or out to the rim of all samples.
+    """Return the corners of the hull of a pupil's illuminated samples after its edges were moved outwards.
 
-    apart: distance between samples. A dark sample limits an edge if it lies in front of the edge (not beyond its ends),
-        and less than NEXT times this distance away.
+    Dark samples are those without light. An edge is moved half way to the nearest dark sample that limits it. An edge
+    that no dark sample limits is moved to the circle or oval around all samples, with and without light. A dark sample
+    limits an edge if it lies in front of the edge, less than NEXT (3) times `apart` away, and less than `apart` beyond
+    the ends of the edge.
+
+    dark: positions of the dark samples, array (sample, 2).
+    apart: distance between neighbouring samples.
     """
     from scipy.spatial import HalfspaceIntersection
 

@@ -41,7 +41,11 @@ def turned(field: Vector, before: Vector, after: Vector) -> Vector:
 
 
 def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
-    """Return the direction of a source's light, and its field: the unit vector x (0) or y (1), turned with it."""
+    """Return the direction of a source's light in front of the pupil, and its electric field, as unit vectors.
+
+    Light along the z axis would have its field along x (`axis` = 0) or along y (`axis` = 1). The field is turned by the
+    shortest rotation that turns the z axis into the direction of the light.
+    """
     x, y = (math.tan(angle) for angle in source.angle)
     length = math.hypot(x, y, 1)
     along = (x / length, y / length, 1 / length)
@@ -86,7 +90,7 @@ class RayField(Mask):
 
     @property
     def pupil(self) -> Pupil:
-        """The pupil with this mask."""
+        """The pupil of `beam`, with this `RayField` as its mask."""
         return replace(self.beam.pupil, mask=self)
 
     def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
@@ -101,9 +105,11 @@ class RayField(Mask):
         return found if own is None else found * own.amplitude(x, y, radius)
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return a bandwidth that includes the path, the pupil's own mask and, behind a lens, the rays' directions.
+        """Return the spatial frequency [1/m] above which the mask's amplitude varies by less than `level`.
 
-        These directions have singularities at the imaginary distances ±i f from the axis, with the focal length f.
+        It is the sum of the frequencies for the optical path (times 2), for the pupil's own mask and, with a lens, for
+        the directions of the rays. These directions, as functions of the distance from the axis, have singularities at
+        the imaginary distances ±i f, where f is the focal length.
         """
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)

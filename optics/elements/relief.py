@@ -199,7 +199,11 @@ class HeightMap(Relief):
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbours if it exceeds half the span of at least 16 x 16 samples; else 0."""
+        """Largest difference [m] between neighbouring samples if the map has jumps; otherwise 0.
+
+        A map has jumps if this difference is more than half of that between the highest and the lowest sample, and if
+        there are at least 16 rows and 16 columns of samples.
+        """
         many = min(self._heights.shape) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0

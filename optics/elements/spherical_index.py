@@ -41,11 +41,14 @@ class SphericalIndex:
 
     @classmethod
     def from_function(cls, relative: Callable[[np.ndarray], np.ndarray]) -> SphericalIndex:
-        """Interpolate a relative index, a function of the relative distance r/R, at Chebyshev points in (r/R)².
+        """Interpolate the index n of a sphere relative to its medium, at Chebyshev points in (r/R)².
+
+        relative: function that returns n for an array of r/R, the distance from the centre divided by the radius.
 
         Raises:
-            ValueError: n r decreases somewhere, at values below 1 (that just outside the sphere) and below that at the
-                surface. Light could then stay inside.
+            ValueError: light could stay inside the sphere, because n r/R decreases outwards somewhere. A decrease is
+                allowed at values above 1, which is the value just outside the surface, or above the value just inside
+                the surface.
         """
         found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
         t = np.linspace(0, 1, 20 * TERMS)

@@ -1,7 +1,8 @@
 """Cubic splines through the samples of a map, at positions from -1 to 1 across the map's square.
 
-The spline is a sum of B-splines. Their coefficients follow from the samples, also beyond both ends. Values at fixed
-points are the product of a sparse matrix and these coefficients.
+The spline is a sum of B-splines. Their coefficients are computed from the samples. Along each axis there is one
+coefficient for each sample, and there are further ones beyond the first and the last sample, where the spline is
+extrapolated. Values at fixed points are the product of a sparse matrix and these coefficients.
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ FEW = 128  # choice: number of samples up to which a product with `spline_matrix
 
 
 def is_open_grid(x: Array, y: Array) -> bool:
-    """Return whether x is a NumPy row and y a NumPy column. The map's values are then a product of matrices."""
+    """Return True if x is a row (1, column) and y a column (row, 1), both of NumPy.
+
+    They describe the points of a rectangular grid. A spline's values at these points are a product of matrices.
+    """
     return library(x) is np and x.ndim == y.ndim == 2 and len(x) == 1 and y.shape[1] == 1
 
 
@@ -106,9 +110,11 @@ def _basis(at: bytes, n: int) -> np.ndarray:
 
 
 def _coefficients(samples: np.ndarray) -> np.ndarray:
-    """Return B-spline coefficients c = s - s''/6 of the cubic spline s through samples, along axis 0.
+    """Return the B-spline coefficients c = s - s''/6 of the cubic spline s through samples, along axis 0.
 
-    Beyond both ends, the first two coefficients have the same form, and the others continue linearly.
+    There is one coefficient for each sample, and there are further ones beyond the first and the last sample. On either
+    side, the two next to the samples also follow from this equation, with the spline continued. Those farther out
+    continue the two on a straight line.
     """
     from scipy.interpolate import make_interp_spline
 

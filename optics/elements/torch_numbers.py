@@ -1,4 +1,4 @@
-"""Numbers of pupils and other objects that are tensors of PyTorch and require a gradient."""
+"""Search pupils and other objects for attributes that are tensors of PyTorch and require a gradient."""
 
 from __future__ import annotations
 

@@ -37,7 +37,8 @@ class Mask(ABC):
     def detail(self, light: float, radius: float) -> float:
         """Return the frequency [1/m] along x and y beyond which the mask scatters at most a given amount of light.
 
-        light: this amount, averaged over the disk of the pupil, in units of the incident light.
+        light: amount of light that may be scattered beyond this frequency, averaged over the disk of the pupil, as a
+            fraction of the incident light.
         radius: radius of the pupil [m].
         """
         return self.bandwidth(math.sqrt(light), radius)
@@ -49,7 +50,10 @@ class Mask(ABC):
 
     @property
     def radius(self) -> float | None:
-        """Radius [m] over which the mask is known. None: it equals the pupil's radius, or is unlimited."""
+        """Radius [m] of the area in which the mask's amplitude is defined; for a square, half of its side.
+
+        None: the area is as wide as the pupil, or unlimited.
+        """
         return None
 
     @property
@@ -87,11 +91,13 @@ class GaussianMask(Mask):
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """Return the frequency f [1/m] beyond which the mask sends at most a given amount of light.
+        """Return the frequency f [1/m] along x and y beyond which the mask scatters at most a given amount of light.
 
-        The fraction exp(-2π²w²f²) of the transmitted light lies beyond f, for the waist w.
+        If the waist is w, the fraction exp(-2π²w²f²) of the transmitted light lies beyond f.
 
-        light: this amount, averaged over the disk of the pupil, in units of the incident light.
+        light: amount of light that may be scattered beyond f, averaged over the disk of the pupil, as a fraction of the
+            incident light.
+        radius: radius of the pupil [m].
         """
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)
@@ -142,7 +148,10 @@ class MaskMap(Mask):
             )
 
     def _most(self) -> float:
-        """Return the largest magnitude of the amplitude within the circle that the square encloses."""
+        """Return the largest magnitude of the amplitude that the spline reaches.
+
+        It is searched within the largest circle in the square that the samples cover.
+        """
         n = FINER * self._map.knots
         at = (np.arange(n) + 0.5) * 2 / n - 1
         return float(np.abs(self._map.on_grid(at)[np.hypot(*np.meshgrid(at, at)) <= 1]).max())

@@ -156,7 +156,7 @@ class Zernike(Aberration):
         return total
 
     def ahead_at(self, x: np.ndarray, y: np.ndarray, like_array: Array) -> Array:
-        """Return the result of `ahead` at positions of NumPy, whose polynomials wavefronts share.
+        """Return the result of `ahead` at (x, y) [radii], from cached values of the polynomials at these positions.
 
         like_array: array of NumPy or PyTorch, which determines the library and the device of the result.
         """
@@ -191,7 +191,10 @@ class Zernike(Aberration):
         return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return 0: a mode has only n/2 cycles, and its slopes, in proportion to n², account for higher frequencies."""
+        """Return 0, because a Zernike polynomial has no fine detail that scatters light away from the rays.
+
+        It has only n/2 cycles across the circle. Its slopes grow with n² at the rim, so rays reach farther.
+        """
         return 0.0
 
     @property

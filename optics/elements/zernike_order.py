@@ -62,7 +62,10 @@ def fringe_mode(j: int) -> Mode:
 
 
 def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
-    """Return coefficients by mode from {number: coefficient}, or from a row that starts with number 1.
+    """Return a dictionary {(n, m): coefficient} of coefficients that are given by the numbers of a numbering.
+
+    given: {number: coefficient}, or a sequence of coefficients, the first of which has the number 1.
+    mode: function that converts a number to a mode (n, m), such as `noll_mode`.
 
     Raises:
         ValueError: the argument is of another kind, a number does not exist, or a coefficient is not finite.

@@ -42,8 +42,9 @@ def choose_bands(
     receptors: `Receptors`, or a name or peak wavelengths for `optics.receptors_of`.
     kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
         side of a receptor. None: the kernel is the same for all wavelengths.
-    white: fraction of a white surface's signal that kernels transmit if they are wide enough to contain all light.
-        None: the fraction that the given kernels transmit.
+    white: signal of a white surface with kernels that contain all light, relative to the signal if no light were lost.
+        Behind a pupil, it is the pupil's `transmission`. Errors are divided by it. None: the signal with the given
+        kernels, whose windows may omit some light.
 
     Raises:
         ValueError: the tolerance is outside its range, or the receptors are invalid.
@@ -72,10 +73,13 @@ def choose_bands(
 
 
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
-    """Return the largest error for the coloured surfaces of `choose_bands`, over all phases φ and all channels.
+    """Return the largest error of any channel's signal for surfaces with a sinusoidal reflectance, in daylight.
 
-    It is half the modulus of the error of Σ w d e^{2πiλ/Λ}, with the bands' weights w, daylight d, and the width Λ of
-    `range_nm`.
+    The reflectance is (1 + cos(2πλ/Λ + φ))/2, where Λ is the width of `range_nm`, and φ is the phase with the largest
+    error. This error is half the modulus of the error of the sum Σ w d e^{2πiλ/Λ} over bands, where w are the bands'
+    weights and d is daylight.
+
+    exact: the bands that define the correct signal.
     """
     period = (range_nm[1] - range_nm[0]) * 1e-9
 

@@ -33,14 +33,16 @@ class Sensor:
 
     pixels: number of pixels (height, width).
     pitch: side [m] of a square pixel, whose whole area is sensitive.
-    filters: "bayer" for rows of red, green and of green, blue, repeated over the sensor; or any `receptors` of an
-        `Eye`: `Receptors` with measured quantum efficiencies, a mosaic, or the name of an animal's receptors. Without a
-        mosaic, every pixel has all types. The filters of "bayer" and "rgb" have peaks at 600, 520 and 460 nm.
+    filters: colour filters of the pixels. "bayer": red and green pixels alternate in the first row, green and blue
+        pixels in the second row, and both rows are repeated over the sensor. Any value of an Eye's argument `receptors`
+        is also valid, such as the name of an animal's receptors, or `Receptors` that have measured quantum efficiencies
+        or are arranged in a mosaic. Without a mosaic, every pixel has all types of filters. The filters of "bayer" and
+        "rgb" have peaks at 600, 520 and 460 nm.
     photon_budget: illuminance of the scene, exposure time, and quantum efficiency at the filters' peaks.
     full_well: number of electrons at which a pixel saturates.
     read_noise: standard deviation [electrons] of the noise of reading a pixel.
-    bits: bits of a digital number, 1 to 16. The largest number belongs to `full_well`. None: electrons, which are not
-        rounded.
+    bits: bits of a digital number, 1 to 16. A pixel with `full_well` electrons has the largest number. None: the result
+        is the number of electrons, which is not rounded.
     bands: number of spectral bands of the scene, 1 to 64.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Integrals of sampled functions over the cells of a retina.
+"""Integrals of sampled functions over the cells of a retina, the equal rectangles into which it is divided.
 
 A matrix maps samples to the integrals of the spline through them.
 """
@@ -30,11 +30,12 @@ FEWER = ((2.0, 1e-2, 0.5), (1.0, 1e-3, 0.25))
 
 
 def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
-    """Return the number of samples that integrals over cells need per cycle of the highest frequency.
+    """Return how finely an image must be sampled for accurate integrals of it over the cells of a retina.
 
-    The error of the integrals is then within a third of the tolerance.
+    The result is the number of samples per cycle of the image's highest spatial frequency. The error of the integrals
+    is then within a third of the tolerance. Cells are the equal rectangles into which the retina is divided.
 
-    cycles: number of cycles of the highest frequency per cell.
+    cycles: width of a cell, in cycles of the highest frequency.
     """
     if tolerance <= FINE_TOLERANCE:
         return FINE * (FINE_TOLERANCE / tolerance) ** (1 / ORDER)
@@ -44,11 +45,12 @@ def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
 
 @dataclass(frozen=True)
 class Tiles:
-    """Cells in a row.
+    """A row of cells, the equal rectangles into which a retina is divided.
 
     count: number of cells.
-    size: side of a cell [m].
-    from_cell: True if light comes from a whole cell of the scene, which has the same size; False if from a point.
+    size: side of a cell along the row [m].
+    from_cell: True if the light comes from all over a cell of the scene, whose geometric image is as large as a cell of
+        the retina. False if the light comes from a single point.
     """
 
     count: int
@@ -58,13 +60,14 @@ class Tiles:
 
 @lru_cache(maxsize=16)
 def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
-    """Return a matrix (cell, sample) that maps samples to integrals over cells, along one axis.
+    """Return a matrix (cell, sample) that maps samples of a PSF along one axis to its integrals over a row of cells.
 
-    The integrand is the spline through the samples. The cells lie around the middle sample.
+    The integrand is the spline through the samples. The row of cells is centred on the middle sample.
 
-    If tiles.from_cell is True, the integrals are also averaged over all source positions in a scene cell: PSF ⊗ cell ⊗
-    cell. The spline's coefficients c solve C c = s, where s are the samples and C contains the B-splines at them. The
-    integrals are Q c, where Q contains the B-splines' integrals over cells. The matrix is therefore Q C⁻¹.
+    If tiles.from_cell is True, light comes from all points of a cell of the scene. The integrals are then averaged over
+    these points, which makes them PSF ⊗ cell ⊗ cell. The spline's coefficients c solve C c = s, where s are the samples
+    and C contains the B-splines at them. The integrals are Q c, where Q contains the B-splines' integrals over cells.
+    The matrix is therefore Q C⁻¹.
 
     samples: number of samples.
     pitch: distance [m] between neighbouring samples.
@@ -94,9 +97,11 @@ def _knots(x: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _over_samples(integrals: np.ndarray, degree: int) -> np.ndarray:
-    """Return the matrix Q C⁻¹ (cell, sample), where C contains the B-splines at the samples.
+    """Return the matrix Q C⁻¹, which maps samples to the integrals of the spline through them over the retina's cells.
 
-    integrals: Q, the integrals of B-splines over cells, (cell, B-spline).
+    C contains the values of the B-splines at the samples. The shape is (cell, sample).
+
+    integrals: Q, the integrals of the B-splines over the cells, array (cell, B-spline).
     """
     from scipy.linalg import solve_banded
 

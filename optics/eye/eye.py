@@ -103,8 +103,8 @@ class Eye(EyeSpec):
     def psf(self, z: Scalar = math.inf) -> PSFResult:
         """Return the PSF on the retina for a point at the distance z [m] along the axis.
 
-        The point lies in the viewing direction of the patch. The window loses less than the fraction `tolerance` of the
-        light (exceptions: see `kernel`). The PSF of the perfect lens is one sample with all power.
+        The point lies in the direction `eccentricity_deg`, seen by the middle of the retina. The window loses less than
+        the fraction `tolerance` of the light (exceptions: see `kernel`). A perfect lens has one sample with all power.
 
         Raises:
             ValueError: z is not positive.
@@ -123,8 +123,8 @@ class Eye(EyeSpec):
         It is the PSF, integrated over cells; ky and kx are odd. A receptor has samples_per_receptor² equal cells.
 
         z: distance [m] of the scene along the axis, positive or infinite.
-        direction_deg: direction (right, up) of the light from the axis (None: the patch's eccentricity). The centre
-            cell is its geometric image. Angles are -80 to 80.
+        direction_deg: angles (right, up) from the axis to a point source, -80 to 80 (None: `eccentricity_deg`). The
+            kernel's centre cell lies around the geometric image of this source.
 
         The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
         enough to lose less than the tolerance, except for light at more than 50° from the receptor's direction. Light
@@ -228,12 +228,12 @@ class Eye(EyeSpec):
             scene must exceed this height and this width by even numbers.
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or a map with one per cell (Y, X). In a map, near surfaces
-            hide far ones at jumps of depth (see `optics.eye.occlusion`). Behind them, far surfaces continue with their
-            nearest visible cell. Up to 17 different distances have one kernel each. If there are more, distances share
-            kernels within the tolerance.
-        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside their
-            range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
-            last call are cached. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
+            hide far ones at jumps of depth (see `optics.eye.occlusion`). The hidden part of a far surface looks like
+            its nearest visible cell. Up to 17 different distances have one kernel each. If there are more, distances
+            share kernels within the tolerance.
+        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. An object beyond the
+            kernels' range of distances is rendered with the kernel at the end of this range. The kernels of the last
+            call are cached. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
         polarization: (degree, angle_deg) of the light, for an eye with microvilli. These are the degree of linear
             polarisation in [0, 1], and the angle of the electric field, from right towards up. Each is a number or an
             array (band,), (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do
@@ -257,7 +257,7 @@ class Eye(EyeSpec):
         return to_user(found if rng is None else with_noise(self, found, rng))
 
     def _last_sight(self, samples_per_receptor: int, z: Any) -> KernelBank:
-        """Return `sight` for these samples and distances, from the preceding call of `see` if possible.
+        """Return the kernels of `sight` for scene distances z [m], which the last call of `see` may have cached.
 
         Kernels that depend on Dr.Jit arrays are computed again, because the arrays may carry derivatives.
         """

@@ -37,14 +37,14 @@ __all__ = ["EyeSpec"]
 
 @dataclass(frozen=True)
 class EyeSpec:
-    """Parameters of an eye, with the lengths and throughputs that follow from them without a PSF.
+    """Parameters of an eye, and quantities that follow from them, such as its focal length and its throughput.
 
-    `optics.Eye` documents the fields and adds PSFs, kernels and signals.
+    The quantities do not require a PSF. `optics.Eye` documents the fields and adds PSFs, kernels and signals.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
-        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance. In
-            an Eye with bands="auto", see also `optics.psf`.
+        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance. An
+            `Eye` with bands="auto" also computes PSFs, with the errors of `optics.psf`.
     """
 
     pupil: Pupil | None = None
@@ -177,7 +177,11 @@ class EyeSpec:
 
     @property
     def _on_tangent_plane(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Width and height of an average receptor at distance 1, and tangents (right, down) of the field's middle."""
+        """Size (width, height) of an average receptor, and position (right, down) of the field's middle.
+
+        Both are measured on the plane at distance 1 in front of the eye, perpendicular to its axis. A position on this
+        plane consists of the tangents of the angles from the axis.
+        """
         (height, width), distance = self.receptor_size, number(self.sensor_distance)
         return (width / distance, height / distance), tangents(self.eccentricity_deg)
 
@@ -279,5 +283,5 @@ class EyeSpec:
         return self.spectral_bands.band_values(radiance, self.receptors)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the spectral bands for `bands="auto"`. Only `Eye` can choose them; others raise a ValueError."""
+        """Raise a ValueError: only the subclass `Eye` can choose the spectral bands for `bands="auto"`."""
         raise ValueError("bands = 'auto': must be a number of bands, except in an Eye")

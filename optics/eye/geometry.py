@@ -94,9 +94,10 @@ def check_vertical(vertical_fov_deg: float | None, fov_deg: Scalar) -> None:
 
 
 def etendue(widest_pupil: float, receptor_area: float, focal: float) -> float:
-    """Return the etendue [m² sr] of a receptor of this area [m²], behind a pupil with a throughput of 1.
+    """Return the etendue [m² sr] of a receptor behind the eye's widest pupil, whose throughput is 1 by definition.
 
-    widest_pupil: diameter [m] of this pupil.
+    widest_pupil: diameter [m] of the widest pupil.
+    receptor_area: area [m²] of the receptor on the retina.
     focal: focal length [m].
     """
     return math.pi / 4 * receptor_area * (widest_pupil / focal) ** 2

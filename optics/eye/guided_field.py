@@ -1,10 +1,11 @@
 """Receptive fields of receptors that are waveguides: the fraction of the light on the pupil that their modes accept.
 
-A point source is imaged at the position v [m] relative to a waveguide. Let E(v) be the fraction of its light on the
-pupil that the waveguide accepts and absorbs. If a receptor occupies the area A of the retina, its kernel is E(v)/A,
-integrated over cells. For comparison, the signal of a receptor that absorbs all light is the mean of the image over the
-area A. The waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. For a
-source imaged at u and a receptor at r, the kernel is a function of r - u = -v. It is therefore E rotated by 180°.
+A point source is imaged at the position v [m] relative to a waveguide. Of the source's light on the pupil, the
+waveguide accepts and absorbs the fraction E(v). If a receptor occupies the area A of the retina, its kernel is E(v)/A,
+integrated over cells. These are the equal rectangles into which every receptor's area is divided. For comparison, the
+signal of a receptor that absorbs all light is the mean of the image over the area A. The waveguide stands where the ray
+through the pupil's centre hits the retina, and points at that centre. For a source imaged at u and a receptor at r, the
+kernel is a function of r - u = -v. It is therefore E rotated by 180°.
 """
 
 from __future__ import annotations
@@ -43,8 +44,9 @@ CELL_DIGITS = 4.0  # choice: digits of integrals over cells
 class Guide:
     """A waveguide on a retina.
 
-    focal: f [m]. A receptor at the distance x from the axis sees an angle with the tangent x/f.
-    cells: number of cells along a receptor's side.
+    focal: focal length f [m]. A receptor at the distance x from the axis sees an angle with the tangent x/f.
+    cells: number of cells along a receptor's side. Cells are the equal rectangles into which a receptor's area on the
+        retina is divided. The scene is divided into cells whose geometric images are these rectangles.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
     """
 
@@ -98,10 +100,14 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """Return the accepted fraction of a source's light, E, integrated over the cells of a window.
+    """Return E, the fraction of a source's light that a waveguide accepts and absorbs, integrated over cells.
 
-    The window is widened until it contains all of E except for a fraction of at most the tolerance, but not beyond the
-    half width of `spot` plus the radius of the waveguide's modes.
+    E depends on the source's direction. The cells form a window of directions around that of the receptor. The window
+    is widened until it contains the integral of E over all directions, except for a fraction of at most the tolerance.
+    Its half width is at most that of `spot` plus the radius of the waveguide's modes. The shape is (row, column), and
+    areas of cells are in squared tangents.
+
+    pitch: distance [m] between samples of the PSF on the retina.
     """
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
@@ -121,9 +127,11 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Cells in a row: their number, their side, and the sampling distance that resolves a receptor's field.
+    """A row of cells, the equal rectangles into which the scene is divided. Lengths are tangents of angles.
 
-    Lengths are tangents of angles.
+    count: number of cells.
+    side: side of a cell along the row.
+    pitch: distance between samples that resolves a receptor's field.
     """
 
     count: int
@@ -132,9 +140,12 @@ class _Cells:
     tolerance: float
 
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return tangents (cell, node) of quadrature nodes, from the middle of the row, and the weights of the nodes.
+        """Return the points at which a receptor's field is evaluated for its integrals over cells, and their weights.
 
-        The weights sum to a cell's side.
+        The points are quadrature nodes in every cell of the row, as an array (cell, node). They are tangents of angles,
+        minus that of the middle of the row. The weights (node,) sum to a cell's side.
+
+        from_cell: False for a single point in the centre of each cell.
         """
         middle = (np.arange(self.count) - (self.count - 1) / 2) * self.side
         if not from_cell:
@@ -145,7 +156,10 @@ class _Cells:
 
     @property
     def step(self) -> float:
-        """Pitch of samples of the receptor's field, as a sine."""
+        """Distance between samples of a receptor's field, as a difference of the sines of two directions.
+
+        It is less than `pitch`, because splines interpolate the samples twice.
+        """
         return self.pitch * samples_per_cycle(self.tolerance) / samples_per_cycle(self.tolerance / FINER)
 
 

@@ -1,11 +1,13 @@
 """Kernels of an eye for a scene with a range of distances and directions: the fewest within the tolerance.
 
-A kernel depends on the position of the light source. Kernels are computed at nodes, and interpolated linearly between
-them (see `kernel_interpolation`). The nodes are evenly spaced over the tangent plane. Along depth they are evenly
-spaced in inverse distance 1/z, because defocus is linear in 1/z, or they are the distances of the scene itself. The
-signal is then
+A kernel depends on the position of the light source. Kernels are computed for a few positions, the nodes, and
+interpolated linearly between them (see `kernel_interpolation`). The nodes are evenly spaced over the tangent plane.
+Along depth they are evenly spaced in inverse distance 1/z, because defocus is linear in 1/z, or they are the distances
+of the scene itself. The scene is divided into cells, one or more per receptor along each axis. The signal is then
 
-    signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
+    signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene,
+
+where l is a node, and share_l is its weight in the interpolation of the kernel of each cell.
 
 `occlusion` extends this sum to near surfaces that hide far ones.
 """
@@ -55,11 +57,12 @@ class KernelBank:
     parallax: float = 0.0
 
     def shares(self, inverse_distance: np.ndarray) -> list[Any]:
-        """Return the interpolation weight (Y, X) of each node in every cell of a scene, one array per node.
+        """Return the weights with which the kernels of the bank are interpolated for each cell of a scene.
 
-        For a single node, the only weight is the number 1.
+        The list contains one array (Y, X) of weights for each kernel, in the order of `kernels`. If there is a single
+        kernel, its weight is the number 1.
 
-        inverse_distance: 1/z [1/m] of the cells, (Y, X).
+        inverse_distance: 1/z [1/m] of the scene's cells, array (Y, X).
         """
         if len(self.kernels) == 1:
             return [1]
@@ -104,12 +107,13 @@ def prepare(
     resolution: number of receptors (height, width).
     samples_per_receptor: number of cells along a receptor's side.
     z: distances [m] in the scene, a number or an array.
-    counts: number of depth layers, and of zones across the longer side of the retina; or "auto", or "distinct" for one
-        layer at each distance.
+    counts: number of depth layers, and number of zones across the longer side of the retina. "auto": the smallest
+        number that meets the tolerance. "distinct", for depth layers only: one layer at each distance.
     tolerance: largest error of a receptor's signal, relative to the signal of a white surface.
     mean: number of cells along the side of the square over which errors are averaged, as in a receptor's signal (None:
         samples_per_receptor).
-    white: function that returns the fraction of the signal of a white surface that the kernels transmit.
+    white: function that returns the signal of a white surface with these kernels, divided by its signal with kernels
+        that lose no light. It is less than 1 behind masks and with waveguides.
 
     Raises:
         ValueError: a number or a distance is invalid, or there are too many distances for "distinct" layers.
@@ -171,9 +175,11 @@ def _rest(tolerance: float, spent: float | None) -> float | None:
 def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
     """Return the numbers (rows, columns) of nodes over the field, with similar spacing in both directions.
 
-    Along the longer side, the nodes of each of FIELD_COUNTS include those of all smaller counts.
+    Nodes are the positions for which kernels are computed.
 
-    across: number of nodes along the longer side of the retina.
+    across: number of nodes along the longer side of the retina. If it is one of FIELD_COUNTS, the nodes include those
+        of every smaller number in FIELD_COUNTS, so their kernels are reused.
+    resolution: number of receptors (height, width).
     """
     height, width = resolution
     finest = max(across - 1, 0)

@@ -33,10 +33,16 @@ class NodeError(AccuracyError):
 
 @dataclass(frozen=True)
 class Choice:
-    """The chosen numbers of nodes for one stage, with the reason: along depth, or along the two axes of the field.
+    """The numbers of nodes that were chosen for one stage, and the reason for the choice.
 
+    Nodes are the positions for which kernels are computed. One stage is the choice along depth, the other the choice
+    along the two axes of the field.
+
+    stage: "depth" or "field".
+    counts: number of nodes along each axis of the stage.
     predicted_error: error of a receptor's signal, relative to the signal of a white surface, for any scene at most as
         bright as white. None if the user requested the number.
+    why: the reason.
     """
 
     stage: str
@@ -55,11 +61,12 @@ def nodes(count: int) -> np.ndarray:
 
 
 def checks(counts: tuple[int, ...]) -> list[Place]:
-    """Return the places at which the error is measured, for these numbers of nodes along each axis.
+    """Return the places at which the interpolation error is measured, for these numbers of nodes along each axis.
 
-    With a single node, these are the ends of the range, or on two axes the corners and the middles of the sides. With
-    more, they are the points halfway between nodes along every axis with several nodes. If there are many such points,
-    only a few are used: evenly spaced ones along one axis, and on two axes those next to all four corners and a few
+    A single node lies in the middle of the range. The error is then measured at both ends of a range along one axis. In
+    a field with two axes, it is measured at the corners and at the middles of the sides. With more nodes, it is
+    measured halfway between nodes, along every axis with several nodes. If there are many such points, only a few are
+    used. Along one axis, these are evenly spaced. On two axes, they are the points next to all four corners and a few
     between them, because the error of a pupil without symmetry may be largest at any corner.
     """
     if max(counts) == 1:
@@ -73,7 +80,11 @@ def checks(counts: tuple[int, ...]) -> list[Place]:
 
 
 def _place(axes: Sequence[np.ndarray], shares: Iterable[float]) -> Place:
-    """Return the place at these fractions of the lists `axes` of positions: 0 is a list's first one, 1 its last one."""
+    """Return a place whose coordinate along each axis is selected from the list of positions along this axis.
+
+    axes: list of positions for each axis.
+    shares: for each axis, where in the list the coordinate is found, from 0 for the first position to 1 for the last.
+    """
     return tuple(float(axis[round(share * (len(axis) - 1))]) for axis, share in zip(axes, shares, strict=True))
 
 
@@ -85,11 +96,15 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 class NodeChoice:
     """Choice of the numbers of nodes for one stage: along depth, or along the two axes of the field.
 
+    Nodes are the positions for which kernels are computed.
+
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
-    white: function that returns the fraction of the signal of a white surface that the kernels transmit. It is less
-        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, a call takes long, because
-        it computes a kernel.
+    samples_per_receptor: number of cells along the side of the square over which errors are averaged.
+    white: function that returns the signal of a white surface with these kernels, divided by its signal with kernels
+        that lose no light. It is less than 1 behind masks and with waveguides. Errors are divided by it. With
+        waveguides, a call of this function takes long, because it computes a kernel.
+    known: kernels that have been computed, by place.
     """
 
     stage: str

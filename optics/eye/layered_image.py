@@ -65,11 +65,12 @@ class _Scene:
         return self._blurred([seen * share for share in self._shares(source, cells)], self.kernels)
 
     def passing(self, layer: Layer) -> Array:
-        """Return the fraction of the light from behind that passes a layer, (band, *shape).
+        """Return the fraction of the light from farther layers that passes a layer, at each cell of the retina.
 
-        Some cells of the layer hide nothing, because their surface continues in a farther layer. The farther layer does
-        not contain these cells again, so its light only comes through the part of the pupil that they leave open. The
-        hidden fraction is relative to this part.
+        Some cells of the layer belong to a surface that continues in a farther layer. They hide nothing of it, but the
+        farther layer has a gap in their place. Seen from a cell of the retina, they cover a part of the pupil, and
+        light of the farther layer comes only through the remaining part. The hidden fraction is therefore the part of
+        the pupil that hiding cells cover, divided by this remaining part. The shape is (band, *shape).
         """
         import drjit as dr
 
@@ -80,7 +81,10 @@ class _Scene:
         return dr.clip(1 - hidden, 0, 1)
 
     def _coverage(self, source: np.ndarray, cells: np.ndarray) -> Array:
-        """Return the fraction of the pupil that selected cells cover, (band, *shape)."""
+        """Return the fraction of the pupil that selected cells of the scene cover, seen from each cell of the retina.
+
+        The shape is (band, *shape). For the arguments, see `_Scene`.
+        """
         ones = np.ones_like(self.light)
         return self._blurred([ones * share for share in self._shares(source, cells)], self._whole)
 

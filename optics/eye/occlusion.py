@@ -85,7 +85,13 @@ def _least_jump(inverse_distance: np.ndarray, parallax: float) -> float:
 
 
 def _highest_neighbour(values: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return, for each cell, the highest value of itself and its neighbours, of selected cells only; else -inf."""
+    """Return, for each cell, the highest value among the selected ones of itself and its eight neighbours.
+
+    The result is -inf where none of these nine cells is selected.
+
+    values: value of each cell, array (Y, X).
+    cells: True for selected cells, array (Y, X).
+    """
     from scipy.ndimage import maximum_filter
 
     selected = np.where(cells, values, -math.inf)

@@ -30,10 +30,10 @@ def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
 
 
 def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, types: Precision) -> Array:
-    """Return the signals of channels c, `gathered` Σ_b weights[c, b] irradiance[b].
+    """Return the signals of channels c, `gathered` Σ_b weights[c, b] irradiance[b], as a Dr.Jit tensor (channel, y, x).
 
-    The irradiance is a Dr.Jit tensor (band, y, x), the result one of (channel, y, x).
-
+    irradiance: irradiance in spectral bands b, a Dr.Jit tensor (band, y, x).
+    weights: sensitivity of each channel in each band, array (channel, band).
     gathered: throughput of the aperture.
     """
 

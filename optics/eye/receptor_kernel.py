@@ -1,4 +1,8 @@
-"""Choice of a receptor's kernel: `guided_field` for a waveguide, else `visual_kernel`; 1 without a pupil."""
+"""Choice of the module that computes a receptor's kernel.
+
+The kernel comes from `guided_field` if receptors are waveguides, and otherwise from `visual_kernel`. An eye without a
+pupil is a perfect lens, whose kernel is a single cell with the value 1 in every band.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +55,9 @@ def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
 def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
     """Return the fewest spectral bands whose error is within the eye's tolerance, see `choose_bands`.
 
-    retina: a retina without wavelengths and with large cells.
+    retina: the eye's retina, with two cells along each side of a receptor. Its wavelengths may be empty, because they
+        are replaced by those of each number of bands that is tried.
+    direction: tangents (right, down) of the direction in which the kernels are computed.
     """
     if eye.pupil is None:
         return choose_bands(eye.tolerance, eye.receptors)

@@ -1,11 +1,11 @@
-"""Receptors of different sizes on a retina: rectangles in rows, over each of which the density has the same integral.
+"""Receptors of different sizes on a retina: rectangles that are arranged in rows.
 
-Coordinates are x to the right and y down in the visual field, from the middle of the retina. Their units are the width
-and the height of an average receptor: the retina of h x w receptors is [-w/2, w/2] x [-h/2, h/2]. Each row extends over
-the whole width and has w receptors, whose widths differ from row to row. The heights of rows follow from the density's
-mean along x. The widths in a row follow from the density's mean along y over the height of this row (the conditional
-distribution, Rosenblatt, Ann. Math. Stat. 23, 470, 1952). The rectangles leave no gaps, and an array of signals remains
-an image (row, column).
+The integral of the receptors' density is the same over every rectangle. Coordinates are x to the right and y down in
+the visual field, from the middle of the retina. Their units are the width and the height of an average receptor: the
+retina of h x w receptors is [-w/2, w/2] x [-h/2, h/2]. Each row extends over the whole width and has w receptors, whose
+widths differ from row to row. The heights of rows follow from the density's mean along x. The widths in a row follow
+from the density's mean along y over the height of this row (the conditional distribution, Rosenblatt, Ann. Math. Stat.
+23, 470, 1952). The rectangles leave no gaps, and an array of signals remains an image (row, column).
 """
 
 from __future__ import annotations
@@ -99,7 +99,13 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack([x, y], axis=-1)
 
     def counted(self, places: np.ndarray) -> np.ndarray:
-        """Return positions (x, y) in coordinates that count receptors, (..., 2): the inverse of `places`."""
+        """Convert positions (x, y) on the retina to coordinates in which every receptor is 1 wide and 1 high.
+
+        This is the inverse of `places`. The receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2] in
+        the result, an array (..., 2).
+
+        places: positions (x, y), in units of the width and the height of an average receptor, array (..., 2).
+        """
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         x, y = np.moveaxis(places, -1, 0)
         i = np.clip(np.searchsorted(self.rows, y, side="right") - 1, 0, height - 1)

@@ -33,7 +33,7 @@ class SensorPixels:
         """Return one pixel around each sample of a window, with the window's pitch as its side.
 
         cutoff: highest frequency [1/m] of the intensity.
-        tolerance: relative error of the means.
+        tolerance: largest relative error of the intensity's means over pixels.
         """
         side = window.dx
         pitch = min(side, 1 / (samples_per_cycle(tolerance, cutoff * side) * cutoff))

@@ -29,7 +29,7 @@ Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (b
 
 @dataclass(frozen=True)
 class Description:
-    """Limits of an eye in white daylight, in the middle of its field. Frequencies [cycles/degree] are visual angles.
+    """Limits of an eye in white daylight, at the field's centre. Frequencies are in cycles per degree of visual angle.
 
     relative_aperture: a, the pupil's diameter relative to that of a pupil with a throughput of 1.
     throughput: a², times the open fraction of the aperture's disk, times the mask's transmission.
@@ -252,7 +252,7 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
 def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
     """Return the full width [m] at half maximum of a receptor's sensitivity to white daylight, along x.
 
-    The sensitivity is PSF ⊗ receptor aperture, or that of a waveguide.
+    The sensitivity is the PSF convolved with the receptor's aperture, or the kernel of a receptor with a waveguide.
     """
     if eye.pupil is None:
         return eye.receptor_pitch
@@ -270,7 +270,9 @@ def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
 
 
 def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
-    """Return the acceptance width [m] of a receptor with a waveguide, see `_acceptance`, from a spline of its kernel.
+    """Return the full width [m] at half maximum, along x, of the sensitivity of a receptor with a waveguide.
+
+    The kernel contains the sensitivity to white light from each cell of the scene. A spline interpolates between cells.
 
     diameter: diameter [m] of the waveguide.
     """

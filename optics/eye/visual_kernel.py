@@ -1,4 +1,4 @@
-"""Receptive fields behind a pupil: the window that contains the light, and the PSF integrated over cells."""
+"""Receptive fields behind a pupil: a window that contains the light, and the PSF integrated over the retina's cells."""
 
 from __future__ import annotations
 
@@ -71,11 +71,11 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """Half the side [m] of the square for the rays alone, without diffraction, see `_half_side`."""
+        """Half the side [m] of a square that contains the rays, without diffraction (`_half_side`); at most `half`."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:
-        """Return samples around the geometric image that cover the square, with a margin of `beside` samples."""
+        """Return a grid that covers the square around the geometric image, and `beside` more samples on each side."""
         side = 2 * (math.ceil(self.half / pitch) + beside) + 1
         return Grid((side, side), pitch, self.centre)
 
@@ -128,9 +128,9 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float]) -> PSFResult:
-    """Return the PSF of a point at distance z [m], with a loss below the fraction `tolerance` at every wavelength.
+    """Return the PSF of a point at distance z [m]. It lacks at most `retina.tolerance` of the light of any wavelength.
 
-    If the relief is too steep for this, light farther from the image than a side of the retina counts as blocked.
+    If a relief is too steep for this, light farther from the image than a side of the retina counts as blocked.
 
     direction: tangents (right, down) of the point's direction in the visual field.
 
@@ -142,12 +142,12 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
 
 
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
-    """Return the result of `compute` for the area that the light reaches.
+    """Return the result of `compute` for the square that the light reaches.
 
-    If `compute` refuses a steep relief, the area is limited to the longer or else to the shorter side of the retina.
+    If this fails for a steep relief, half its side is limited to the retina's longer side, then to its shorter side.
 
     Raises:
-        AccuracyError: `compute` fails for each area. The error is that for the first one.
+        AccuracyError: `compute` fails for every square. The error is the one for the first square.
     """
     errors: list[AccuracyError] = []
     for most in (math.inf, max(retina.size), min(retina.size)):
@@ -167,13 +167,13 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
 
 
 def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
-    """Return the area that the light reaches.
+    """Return the square around the geometric image that the light reaches.
 
-    most: largest half side [m]. If it is the longer side of the retina, the area contains the light that arrives at any
+    most: largest half side [m]. With the retina's longer side, the square contains the light that arrives at any
         receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
 
     Raises:
-        CellsError: the area has too many cells.
+        CellsError: too many cells, into which receptors are divided, would be necessary along the square's side.
     """
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)
@@ -269,11 +269,11 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
 
 
 def _beyond_edge(pupil: Pupil, fraction: float) -> float:
-    """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts this fraction of the light.
+    """Return the change δ [1/m] of frequency beyond which an aperture's hard edge diffracts this fraction of the light.
 
-    δ is relative to undiffracted light. The squared spectrum of a straight edge, integrated over frequencies above f,
-    is 1/(2π²f) per length. An aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ), a disk 1/(π²Rδ)
-    (Airy pattern, Born & Wolf, §8.5.2). The fraction is larger behind a mask brighter along the edge than on average.
+    Diffraction changes the frequency of light by δ. The squared spectrum of a straight edge, integrated over changes
+    above δ, is 1/(2π²δ) per length. An aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ), a disk
+    1/(π²Rδ) (Airy pattern, Born & Wolf, §8.5.2). Behind a mask that is brighter along the edge, the fraction is larger.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * fraction)
@@ -283,7 +283,7 @@ def _beyond_edge(pupil: Pupil, fraction: float) -> float:
 def _rim(pupil: Pupil) -> float:
     """Return the mean intensity behind the mask along the aperture's edge, divided by its mean over the aperture.
 
-    The result is 1 without a mask. It is at least 1, because the intensity next to a dark edge may rise steeply.
+    It is 1 without a mask. Values below 1 are replaced by 1: a steep rise of intensity near a dark edge also diffracts.
     """
     import drjit as dr
 

@@ -84,7 +84,10 @@ def whole_spectrum(problem: Problem) -> list[GridSampling]:
 
 
 def split_spectrum(problem: Problem) -> list[GridSampling]:
-    """Return samplings with which the split spectrum meets the problem's tolerance."""
+    """Return samplings for which propagation with the paraxial part split off meets the problem's tolerance.
+
+    Fresnel's integral adds the paraxial part of the phase after the rest of the propagation.
+    """
     return _samplings(problem, "split_angular_spectrum")
 
 
@@ -111,10 +114,13 @@ def _sampling(problem: Problem, taper: Taper, method: str) -> GridSampling:
 
 
 def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
-    """Return the period [m] and the number of its samples at the window's pitch.
+    """Return the period [m] after which the field repeats, and the number of its samples at the window's pitch.
 
-    The period covers the window and all light that could wrap around into it from a pupil that ends `outermost` [m]
-    from the axis, except for negligible light beyond the problem's `reach`.
+    Fourier transforms on a grid repeat the field after each period. The period is so long that the light of these
+    copies does not reach the window. Light farther from the axis than the problem's `reach` is an exception, because it
+    is negligible except behind a steep relief.
+
+    outermost: distance [m] from the axis at which the pupil ends.
     """
     beam = outermost + taper.blur + problem.distance * taper.tangent
     # Light beyond `reach` is negligible, except behind steep pupils, so it may wrap around to the rim of the window.
@@ -166,8 +172,8 @@ def _spectrum_cost(how: GridSampling, dtype: str) -> tuple[float, float]:
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
     """Return the field over the window, U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10).
 
-    U₀ is the field behind the pupil, F the Fourier transform and H the transfer function. A split spectrum omits a
-    phase that does not affect the intensity.
+    U₀ is the field behind the pupil, F the Fourier transform and H the transfer function. If the paraxial part of the
+    propagation is split off, the result lacks a phase that does not affect the intensity.
     """
     spectrum = _spectrum(beam, how, types)
     found = arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)
@@ -186,9 +192,9 @@ def _spectrum(beam: Beam, how: GridSampling, types: Precision) -> Field:
 
 
 def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return the field over the window that results from this spectrum in the pupil's plane.
+    """Return the field over the window that results from this spectrum of the field in the pupil's plane.
 
-    For a split spectrum, a phase that does not affect the intensity is omitted.
+    If the paraxial part of the propagation is split off, the result lacks a phase that does not affect the intensity.
     """
     spectrum = spectrum * transfer(beam, problem, how, precision(problem.dtype))
     if how.is_whole:
@@ -227,7 +233,11 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return the field over the window: Fresnel's integral of the field in the relay plane adds the paraxial part."""
+    """Return the field over the window, with the paraxial part of the propagation, which `spectrum` still lacks.
+
+    `spectrum` contains the rest of the propagation. A Fourier transform gives the field in an intermediate plane, the
+    relay plane. From there to the window, Fresnel's integral adds the paraxial part.
+    """
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

@@ -1,7 +1,8 @@
 """The diffraction kernel along one axis of the window, relative to its value at the middle of the window.
 
-It is the Fourier kernel times the slow factor (see `slow_factor`) along this axis, and depends on one sine and one
-position.
+The kernel is a Fourier kernel times a factor that varies slowly over the window (see `slow_factor`). Along one axis,
+both depend on a single position in the window and on a single sine, the direction of a point of the pupil along this
+axis as seen from the middle of the window.
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ class HasDirections(Protocol):
 
     @property
     def elsewhere(self) -> float | np.ndarray:
-        """Sine along the other axis at which the factor along x or y is evaluated, minus that of the pupil's centre."""
+        """Sine along y at which the slow factor along x is evaluated, and the reverse.
+
+        The sine of the pupil's centre is subtracted.
+        """
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the points (x, y) [m] of the pupils at these sines, which are relative to the pupils' centres."""
@@ -40,10 +44,12 @@ class HasDirections(Protocol):
 class AxisFactor:
     """The slow factor along x (0) or y (1), relative to its value at the middle of the window.
 
-    Along the other axis, the sine is that of the pupil's centre plus `elsewhere`. The points of the pupil, and the
-    factor at the middle of the window, are computed once.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window. Along
+    the other axis, the sine of all points of the pupil is that of the pupil's centre plus `samples.elsewhere`. The
+    points of the pupil, and the factor at the middle of the window, are computed once.
 
-    sines: sines along the axis, minus that of the pupil's centre, as an array with as many dimensions as the positions.
+    sines: sines of the points along the axis, minus the sine of the pupil's centre. The array has as many dimensions as
+        the positions for which `at` is called.
     """
 
     path: Path
@@ -65,7 +71,7 @@ class AxisFactor:
 
     @cached_property
     def pupil(self) -> tuple[Pair, Pair, Pair]:
-        """Points of the pupil, their directions, and the slow factor at the middle of the window."""
+        """Points of the pupil, their directions, and amplitude and phase of the slow factor in the window's middle."""
         kind, elsewhere = self.sines.dtype, self.samples.elsewhere
         none = np.zeros((1,) * self.sines.ndim, kind)
         other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
@@ -89,20 +95,21 @@ def axis_factor(path: Path, samples: HasDirections, axis: int, sines: np.ndarray
 
 
 def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, dtype: str) -> np.ndarray:
-    """Return the Fourier kernel times `axis_factor`, (stack, place, sample), complex.
+    """Return the diffraction kernel along x (0) or y (1), relative to its value at the middle of the window.
 
-    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window.
+    The result, the product of the Fourier kernel and `axis_factor`, is a complex array (pupil, position, sample).
 
-    places: positions [m] along the axis, relative to the middle of the window, (stack, place).
+    places: positions [m] along the axis, relative to the middle of the window, (pupil, position).
     dtype: "float32" or "float64".
     """
     return np.asarray(turned(*_whole(path, samples, axis, samples.at, places), dtype))
 
 
 def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
-    """Return `axis_kernel` for all columns (0) or rows (1) of the window, (stack, place, sample).
+    """Return the diffraction kernel along x (0) or y (1) at all columns or rows of the window, see `axis_kernel`.
 
-    If amplitude and phase are smooth, they are interpolated from a few sines and positions.
+    If amplitude and phase are smooth, they are interpolated from a few sines and positions. The result is a complex
+    array (pupil, column or row, sample).
     """
     at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
     if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):

@@ -67,10 +67,12 @@ def _divided(opening: Aperture, borders: tuple[float, ...], halvings: int) -> Pi
 
 
 def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
-    """Return the errors of derivatives for 1 to MOST_NODES nodes along a cell, (MOST_NODES,).
+    """Return the relative errors of derivatives for 1 to MOST_NODES nodes along a cell, (number of nodes,).
 
-    z: half the phase [rad] that the wave gains across a cell, at points that are evenly spread over the opening.
-    cut_share: fraction of the area that lies in cut cells.
+    z: half the phase [rad] that the light behind the pupil gains across a cell, at points that are evenly spread over
+        the opening.
+    splines: number of splines by which the derivatives multiply this light.
+    cut_share: fraction of the opening's area in cells that the edge of the aperture cuts.
     """
     place = np.searchsorted(WAVES, z)
     if place.max() >= len(WAVES):
@@ -85,9 +87,12 @@ def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _tails(splines: int) -> np.ndarray:
-    """Return the sum of the integrand's Chebyshev coefficients from each degree on, for z in WAVES, (z, degree).
+    """Return the sum of the integrand's Chebyshev coefficients from each degree on, (wave, degree).
 
-    splines: number of splines whose product with the wave is integrated.
+    The integrand is a wave e^{izt} times splines, where t in [-1, 1] is the position across a cell. The table WAVES
+    contains the values of z, half the phase [rad] that the wave gains across the cell.
+
+    splines: number of splines by which the wave is multiplied.
     """
     from scipy.special import jv
 

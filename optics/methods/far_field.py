@@ -1,7 +1,8 @@
-"""The Rayleigh-Sommerfeld integral by Fourier transforms onto directions.
+"""The Rayleigh-Sommerfeld integral by Fourier transforms of the light in the pupil, as functions of direction.
 
-One transform is computed for each of a few points of the window (nodes). Between the nodes, a slow factor is
-interpolated.
+The kernel of the integral is a Fourier kernel times a factor that varies slowly over the window. One transform, with
+the factor of one point of the window (a node), is computed for each of a few nodes. The results are interpolated
+between the nodes.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class FarFieldSampling:
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square that contains the power of the rounding errors, see `Sampling.plane`."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -81,9 +82,10 @@ class FarFieldSampling:
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
-    """Return a list with one sampling: directions that oversample the field, and the nodes that the slow factor needs.
+    """Return a list with one sampling: directions that oversample the field, and nodes in the window.
 
-    The list is empty if the method is not suitable for the window.
+    The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is interpolated between the nodes. The
+    list is empty if the method is not suitable for the window.
     """
     half = problem.window.half_width
     sine = half / math.hypot(half, problem.distance)
@@ -125,7 +127,11 @@ def _seconds(how: FarFieldSampling, problem: Problem) -> float:
 
 
 def _nodes(problem: Problem, count: int) -> WindowNodes:
-    """Return the nodes at which the slow factor must be evaluated, selected from `count` nodes along each axis."""
+    """Return the nodes of the window at which the slow factor of `_far_field` must be evaluated.
+
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The nodes are selected from a square of
+    `count` x `count` Chebyshev points.
+    """
     # The width of a single sample is 0, but the half angle must be positive.
     half_angle = math.atan2(max(problem.window.half_width, problem.window.dx), problem.distance)
     if count <= FEW:
@@ -221,7 +227,10 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
 
 def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
-    """Return the slow factor G(ξ; x) of `_far_field` on the pupil's grid, without a constant phase.
+    """Return the factor by which the diffraction kernel differs from a Fourier kernel, on the pupil's grid.
+
+    This is the factor G(ξ; x) of the integrand in `_far_field`, apart from the constant -i. For a fixed point ξ of the
+    pupil, it varies slowly with the point x of the window.
 
     tan_x, tan_y: tangents x/z and y/z of the point x of the window.
     """

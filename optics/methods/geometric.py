@@ -74,7 +74,10 @@ class RaySampling:
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return infinity, because rounding errors do not spread rays."""
+        """Return the width [m] of the square over which rounding errors are spread, here infinity.
+
+        Rounding errors shift rays, but do not scatter light over the window, see `Sampling.plane`.
+        """
         return math.inf
 
     @property
@@ -97,7 +100,8 @@ class PinholeSampling:
         """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
-            ValueError: derivatives are requested. They do not exist, because the light jumps from cell to cell.
+            ValueError: derivatives are requested. They do not exist: when the ray moves, the light jumps from one
+                sample of the window to the next.
         """
         import drjit as dr
 
@@ -115,7 +119,10 @@ class PinholeSampling:
         return types.Float(padded_for_packets(image))
 
     def plane(self, problem: Problem) -> float:
-        """Return infinity, because rounding errors do not occur."""
+        """Return the width [m] of the square over which rounding errors are spread, here infinity.
+
+        All light is in one sample, so rounding errors add none to others, see `Sampling.plane`.
+        """
         return math.inf
 
 
@@ -204,11 +211,11 @@ def _quadratic_basis(t: Array) -> tuple[Array, Array, Array]:
 
 
 def _ray_error(problem: Problem) -> float:
-    """Return the relative L2 error of the ray density.
+    """Return the relative L2 error of an intensity that is computed from the density of rays.
 
-    The error is due to the fringes along the rim of the shadow, which are as wide as a Fresnel zone or a cell. The
-    error exceeds 1 if rays cross, if a mask scatters light, or if hit points are concentrated in an area that is
-    smaller than diffraction or cells allow.
+    Rays lack the fringes of diffraction along the rim of the shadow. The width of the wrong rim is the sum of a Fresnel
+    zone and a cell of the window, over which a ray is spread. The error exceeds 1 if rays cross, if a mask scatters
+    light, or if the rays hit so small an area that diffraction or the size of a cell determines the spot.
 
     If the rays magnify the pupil by m, the fringes of an edge are those at the distance z/m without a lens, magnified
     by m. The reason is that a quadratic phase only scales Fresnel's integral (Goodman, eq. 4-17).

@@ -71,7 +71,7 @@ class HankelSampling:
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square that contains the power of the rounding errors, see `Sampling.plane`."""
         return 2 * (self.line.radius + problem.radius)
 
     @property
@@ -80,9 +80,11 @@ class HankelSampling:
 
 
 def hankel(problem: Problem) -> list[HankelSampling]:
-    """Return samplings whose nodes resolve the phases of both integrals, one for each taper of the spectrum.
+    """Return samplings whose quadrature nodes resolve the phases of both Hankel transforms.
 
-    The list is empty unless the problem is rotationally symmetric.
+    The transforms are integrals over the radius in the pupil, and over the frequencies of the spectrum. There is one
+    sampling for each taper, a function that fades the spectrum out before grazing incidence. The list is
+    empty unless the problem is rotationally symmetric.
     """
     if not problem.symmetric:
         return []

@@ -31,12 +31,14 @@ MOST_BYTES = 288_000_000  # choice, limited by memory: largest matrix between pu
 
 @dataclass(frozen=True)
 class LowRankSampling:
-    """Samples of the pupil, and the rank of the slow factor over the window.
+    """Samples of the pupil, and the points of the window that are necessary to interpolate the slow factor.
 
-    rank: number of Chebyshev points per axis of the window.
-    half_width: distance [m] from the window's centre within which these points lie.
-    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. It is 1
-        if samples are sines.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window.
+
+    rank: number of Chebyshev points along each axis of the window, between which the factor is interpolated.
+    half_width: distance [m] from the window's centre, along each axis, within which these points lie.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. If the
+        samples are evenly spaced in sines, the kernel is e^{-ik s·u} with the sines s, and `scale` is 1.
     """
 
     pupil: PupilSamples
@@ -58,7 +60,7 @@ class LowRankSampling:
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square that contains the power of the rounding errors, see `Sampling.plane`."""
         return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
 
     @property
@@ -129,8 +131,9 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
         G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + s·(u, v))},   D = |(x - ξ, z)|, ρ = |(x, z)|.
 
     (u, v) is the position in the window relative to its centre. P is the light behind the pupil times the areas of the
-    samples. s is ξ/c or the sines of the samples. G varies slowly with x, so the Lagrange polynomials L_a and L_b
-    interpolate it between the points (x_a, y_b) of the window.
+    samples. s is the direction of a sample: its sines, if the samples are evenly spaced in sines, and otherwise ξ/c
+    with the distance c = `how.scale`. G varies slowly with x, so the Lagrange polynomials L_a and L_b interpolate it
+    between the points (x_a, y_b) of the window.
 
     For each axis, the sums over the interpolation points and over ξ are combined. The field is then the product of
     three matrices, A_y W A_xᵀ. W contains P G, and A_x and A_y contain the remaining factors along their axis. A_x does
@@ -177,9 +180,13 @@ def _unfolded(parts: list[tuple[Array, Array]], window: Grid, types: Precision) 
 
 
 def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> list[tuple[Array, Array]]:
-    """Return W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)], each as two tensors, for its real and its imaginary part.
+    """Return the sum and the difference of the matrix W and its mirror image, W[row, col] ± W[row, -col].
 
-    W is P(ξ, η) G(ξ, η; x_a, y_b), see `_low_rank`. Columns (a, ξ) are counted from the middle.
+    W contains the light P(ξ, η) of the pupil's samples times the slow factor G(ξ, η; x_a, y_b), see `_low_rank`. Each
+    row stands for a pair (b, η): an interpolation point y_b of the window, and the y coordinate η of a sample. Each
+    column stands for a pair (a, ξ) along x. Columns are counted from the middle.
+
+    Sum and difference are two tensors (row, column) each, the real and the imaginary part.
     """
     import drjit as dr
 

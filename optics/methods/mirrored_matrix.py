@@ -19,9 +19,12 @@ LEAST_PRODUCTS, SHARE = 4e6, 0.65
 
 
 def mirroring_share(window: Grid, inner: np.ndarray) -> np.ndarray:
-    """Return the time of a sum over the pupil relative to that without mirrored matrices; 1 if they save no time.
+    """Return the time of sums over the pupil with `MirroredMatrix`, relative to the time without it, (sum,).
 
-    inner: numbers of rows of square matrices between the Fourier kernels of both axes, one for each sum.
+    A sum is the product of the Fourier kernel along y, a square matrix, and the Fourier kernel along x. The result is 1
+    if mirroring saves no time: for small matrices, or for a window off the axis.
+
+    inner: number of rows of the square matrix, for each sum, (sum,).
     """
     height, width = window.shape
     large = inner * inner * width + height * inner * width >= LEAST_PRODUCTS
@@ -45,7 +48,10 @@ class MirroredMatrix:
 
     @classmethod
     def from_matrix(cls, matrix: np.ndarray) -> MirroredMatrix:
-        """Return the parts of a matrix (..., n, s)."""
+        """Return a matrix A as its even and odd parts.
+
+        matrix: the matrix A, which does not change if rows and columns are both mirrored, (..., x, s).
+        """
         rows, half = matrix.shape[-2], matrix.shape[-1] // 2
         middle, ahead, behind = _split(matrix[..., rows // 2 :: -1, :].swapaxes(-1, -2), half)
         even, odd = np.concatenate([middle, (ahead + behind) / 2], axis=-2), (ahead - behind) / 2

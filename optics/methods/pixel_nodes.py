@@ -1,8 +1,9 @@
-"""Nodes within the pixels of a stepped relief, for `low_rank` at coarse tolerances.
+"""Quadrature nodes within the pixels of a stepped relief, for `low_rank` at coarse tolerances.
 
-The Fourier kernel has positions instead of sines as its variable, because pixels have straight borders. The factors
-along both axes of the window correct most of the difference. A pixel has as few nodes along an axis as the phase of
-lens, wavefront and path requires for an average point of the window, because light behind a relief may arrive anywhere.
+Because pixels have straight borders, the Fourier kernel has the positions of the nodes as its variable, instead of
+their sines as seen from the window. The kernel then differs more from the diffraction kernel. Factors along x and along
+y (`axis_kernel`) correct most of this difference. A pixel has as few nodes along an axis as the phase of lens,
+wavefront and path requires for an average point of the window, because light behind a relief may arrive anywhere.
 """
 
 from __future__ import annotations
@@ -46,12 +47,14 @@ POINTS = 40  # choice: number of points of the pupil that determine the rank
 
 @dataclass(frozen=True)
 class PixelNodes:
-    """Nodes of a pupil of pixels, with the attributes of `SineSamples` that sums over a window use.
+    """Quadrature nodes of a pupil of pixels, as a replacement for `SineSamples` in sums over the pupil.
 
-    nodes: the nodes.
+    The direction of a node, its position divided by the distance of the window's plane, takes the place of the sine.
+
+    nodes: positions and weights of the nodes.
     centre: centre (x, y) [m] of the window.
-    distance: distance [m] of the window's plane. Directions are positions divided by this distance.
-    elsewhere: direction at which factors along the other axis are evaluated, see `axis_kernel.AxisFactor`.
+    distance: distance [m] of the window's plane.
+    elsewhere: direction along y at which `axis_kernel.AxisFactor` evaluates the factor along x, and the reverse.
     """
 
     nodes: PixelSamples
@@ -75,13 +78,13 @@ class PixelNodes:
 
     @property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes (x, y) [m], (y, x)."""
+        """Coordinates x and y [m] of the nodes, two arrays (row, column)."""
         x, y, _ = self.layout
         return x, y
 
     @property
     def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Nodes x and y [m], and their weights [m²], (y, x)."""
+        """Coordinates x and y [m] of the nodes, and their weights [m²], three arrays (row, column)."""
         return _layout(self.nodes)
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -111,7 +114,12 @@ class PixelNodes:
 
 @dataclass(frozen=True, eq=False)
 class PixelStack(SineStack):
-    """The nodes of one pupil as a `SineStack`, with directions instead of sines."""
+    """A stack of one pupil of pixels, for code that expects a `SineStack`.
+
+    The directions of the nodes (position divided by the window's distance) take the place of the samples' sines.
+
+    nodes: positions and weights of the nodes.
+    """
 
     nodes: PixelSamples
 
@@ -155,10 +163,14 @@ WindowSamples = SineSamples | PixelNodes
 
 
 class PixelPlan(NamedTuple):
-    """Nodes for a pupil of pixels, and what follows from them.
+    """Quadrature nodes for a pupil of pixels, and what follows from them.
 
-    finer: finer nodes for `window_check`.
-    rank, half: rank of the slow factor, and half width [m] of the square of its interpolation points.
+    The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is interpolated over the window.
+
+    pupil: the nodes.
+    finer: finer nodes, with which `window_check` estimates the error.
+    rank: number of interpolation points along each axis of the window.
+    half: distance [m] from the window's centre, along each axis, within which these points lie.
     seconds, bytes: predicted time and memory.
     """
 
@@ -171,9 +183,10 @@ class PixelPlan(NamedTuple):
 
 
 def pixel_plan(problem: Problem) -> PixelPlan | None:
-    """Return the nodes for a pupil of pixels and a coarse tolerance; None if there would be too many.
+    """Return the nodes with which a pupil of pixels meets a coarse tolerance; None if there would be too many.
 
-    The result is also None if the pupil has no pixels, or for derivatives with respect to maps or the pupil's radius.
+    The result is also None if the pupil has no pixels, or if derivatives with respect to maps or the pupil's radius are
+    requested.
     """
     aperture = problem.pixelated
     if aperture is None or problem.knots is not None or problem.resized or (across := _across(problem)) is None:
@@ -215,10 +228,11 @@ def _across(problem: Problem) -> int | None:
 
 @lru_cache(maxsize=MOST_NODES)
 def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return squared errors of the integrals of e^{2iφt} over t in [0, 1], and in open parts of it, for φ in PHASES.
+    """Return squared errors of integrals of the wave e^{2iφt} over a whole pixel and over part of it, (phase,) each.
 
-    The second errors are averaged over the parts [0, p] with p in PARTS. The weights of `count` Gauss-Legendre nodes in
-    [0, 1] integrate the interpolating polynomial over each part.
+    t in [0, 1] is the position across the pixel, and the table PHASES contains the values of φ. If the edge of the
+    aperture cuts a pixel, only a part [0, p] is open. The second errors are averaged over the values of p in PARTS. The
+    weights of `count` Gauss-Legendre nodes in [0, 1] integrate the interpolating polynomial over each part.
     """
     (at, _), (t, size), found = gauss_legendre(count), gauss_legendre(MOST_NODES), []
     for part in (1.0, *PARTS):
@@ -230,7 +244,11 @@ def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=64)
 def _rank(pupil: PixelNodes, path: Path, tolerance: float, least: int) -> int | None:
-    """Return the rank that is sufficient on average over pupil and window; None if it is too large.
+    """Return the number of points per axis of the window (rank) that interpolate the slow factor accurately enough.
+
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel, here divided by its values along both
+    axes of the window. Its root mean square error over pupil and window must be a small part of the tolerance. The
+    result is None if this takes too many points.
 
     least: smallest rank.
     """

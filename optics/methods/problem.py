@@ -47,12 +47,10 @@ class Problem:
     """One monochromatic propagation from a pupil to a window, described by numbers.
 
     light: the beam. Its source and its distance are plain numbers, without derivatives.
-    aperture: shape of the pupil.
+    aperture, wavelength: shape of the pupil, and wavelength [m] in the medium behind it.
     radius, distance: radius of the pupil and distance of the window's plane [m].
-    wavelength: wavelength [m] in the medium.
     window, tolerance: grid of the output, and relative L2 error of the intensity that is allowed there.
-    symmetric: True if the light behind the pupil is rotationally symmetric.
-    even: True if this light is even in x and in y.
+    symmetric, even: True if the light behind the pupil is rotationally symmetric, or even in x and in y.
     widest_band: frequency [1/m] beyond which light may be omitted; infinite if no light may be omitted.
     reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
         beyond it may be wrong, and edge-diffracted light less accurate. None: the whole window must be accurate.
@@ -61,7 +59,8 @@ class Problem:
     spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
     differentiated: True if the PSF carries derivatives.
     moves, resized: True if derivatives with respect to the distance or the radius, respectively, are requested.
-    knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
+    knots: borders of rectangles (cells) into which the knots of cubic splines divide the pupil. Derivatives with
+        respect to samples of a relief, wavefront or mask require them. None: no such derivatives are requested.
     detail_part: largest phase [rad] of neglected detail, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even if the window needs fewer samples.
     steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Methods then remove light
@@ -133,17 +132,17 @@ class Problem:
 
     @cached_property
     def slopes(self) -> Slopes:
-        """Slopes of the wavefront, on a grid that resolves all maps."""
+        """Slopes of the wavefront behind the pupil, on a grid fine enough for the samples of relief and wavefront."""
         return self.light.pupil.slopes(self.light.wavelength, self.light.source)
 
     @cached_property
     def detail(self) -> float:
-        """Bandwidth [1/m] of the fine phase that the slopes of the wavefront do not include."""
+        """Frequency [1/m] above which phase [rad] and mask vary by less than `detail_part` times the tolerance."""
         return self.light.pupil.bandwidth(self.light.wavelength, self.detail_part * self.tolerance)
 
     @cached_property
     def other_detail(self) -> float:
-        """Bandwidth [1/m] as in `detail`, without the maps whose derivatives are requested."""
+        """The same as `detail` for a pupil without the relief, wavefront or mask whose samples carry derivatives."""
         assert self.knots is not None
         others = self.knots.without_maps(self.light.pupil)
         return others.bandwidth(self.light.wavelength, DETAIL_PART * self.tolerance)
@@ -160,12 +159,12 @@ class Problem:
 
     @cached_property
     def turning(self) -> float:
-        """Highest frequency [1/m] of the combined phase of pupil and path; in focus, both phases nearly cancel."""
+        """Highest frequency [1/m] of the pupil's phase plus that of the path to the window. In focus, it is low."""
         return self._turning[0]
 
     @cached_property
     def turning_inside(self) -> float:
-        """The same as `turning`, over the disk without its soft edge."""
+        """Highest frequency [1/m] of the pupil's phase plus that of the path to the window, without the soft edge."""
         return self._turning[1]
 
     @cached_property
@@ -182,10 +181,10 @@ class Problem:
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
-        """Return the aperture, divided at the knots of splines into cells of nodes; None if there would be too many.
+        """Return the aperture, divided into rectangles (cells) that contain quadrature nodes; None for too many cells.
 
         band: highest frequency [1/m] in the pupil's plane of the light that the nodes must resolve. None: they
-            resolve the combined phase of pupil and path for all points of the window, as in `turning`.
+            resolve the sum of the phases of the pupil and of the path, for all points of the window.
         """
         assert self.knots is not None
         slopes = self._turning_slopes if band is None else self._slopes
@@ -195,17 +194,17 @@ class Problem:
 
     @cached_property
     def _slopes(self) -> np.ndarray:
-        """Slopes of the wavefront over all cells, see `Slopes.spread`."""
+        """Slopes of the wavefront in the pupil and up to `_beyond_rim` outside its rim, see `Slopes.spread`."""
         return self.slopes.spread(self._beyond_rim)
 
     @cached_property
     def _turning_slopes(self) -> np.ndarray:
-        """Slopes of the combined phase of pupil and path over all cells."""
+        """Slopes of the wavefront plus the path to any point of the window, at the same points as `_slopes`."""
         return self.slopes.spread(self._beyond_rim, (self.window, self.distance, self.medium_n))
 
     @property
     def _beyond_rim(self) -> float:
-        """Distance [radii] beyond the rim up to which nodes may lie: the diagonal of the largest cell."""
+        """Distance [radii] outside the rim up to which nodes may lie: the diagonal of the largest of `cells`."""
         assert self.knots is not None
         return math.sqrt(2) * max(after - before for before, after in pairwise(self.knots.borders))
 
@@ -266,7 +265,7 @@ class Problem:
         return PupilEdge(self.aperture.soften(stepped_up(band * self.radius), self.ripple, EDGE_REACH), self.radius)
 
     def band(self, margin: float = 0.0) -> float:
-        """Return the highest frequency [1/m] of light from the disk that can land within `margin` [m] of the window."""
+        """Return the highest frequency [1/m] of the pupil's light that can land within `margin` [m] of the window."""
         edge = 0.0 if self.steep else EDGE_REACH
         reach = (1 + edge) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)

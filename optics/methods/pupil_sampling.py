@@ -45,7 +45,8 @@ class PupilSamples(Protocol):
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
         """Return the points (x, y) [m] of samples. i and j are their float64 indices along x and along y.
 
-        Nodes within pixels carry the derivatives of the beam's radius. Points of grids are fixed.
+        If the samples are quadrature nodes within pixels, their positions scale with the radius of the beam's pupil and
+        carry derivatives with respect to it. The points of a grid are fixed.
         """
 
     def field(self, beam: Beam, types: Precision) -> Field:
@@ -98,10 +99,10 @@ class PixelSamples:
 
     @property
     def outermost(self) -> float:
-        """Distance from the axis [m] beyond which the pupil is dark.
+        """Distance from the axis [m] beyond which there are no nodes with light.
 
-        Pixels that the edge cuts also have nodes outside the aperture, but the weights integrate over the open part
-        alone. The edge itself lies within the radius.
+        It is the pupil's radius plus the diagonal of the widest pixel, because pixels that the aperture's edge cuts
+        also have nodes outside the aperture. Their weights integrate over the open part of each pixel alone.
         """
         return self.radius * (1 + math.sqrt(2) * self.aperture.widest)
 
@@ -139,20 +140,24 @@ def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, rad
 
 
 def cell_samples(problem: Problem, band: float | None = None) -> PixelSamples | None:
-    """Return the nodes that derivatives with respect to samples of maps require; None if there would be too many cells.
+    """Return quadrature nodes for derivatives with respect to the samples of a relief, wavefront or mask.
+
+    These samples are interpolated by cubic splines, whose knots divide the pupil into rectangles (cells). Each cell has
+    the same number of nodes. The result is None if there would be too many cells.
 
     band: highest frequency [1/m] in the pupil's plane of the light that the nodes must resolve. None: they resolve the
-        combined phase of pupil and path for all points of the window.
+        sum of the phases of the pupil and of the path, for all points of the window.
     """
     cells = problem.cells(band)
     return None if cells is None or cells.fixed is None else PixelSamples(cells, cells.fixed, problem.radius)
 
 
 def samples_of(problem: Problem) -> PupilSamples | None:
-    """Return the fewest samples that resolve the combined phase of pupil and path.
+    """Return the fewest samples that resolve the sum of the phases of the pupil and of the path to the window.
 
-    The result is None if pixels are too coarse for this phase, if a grid would be too large, or if derivatives with
-    respect to samples of maps need too many cells.
+    The result is None if pixels are too coarse for this phase, or if a grid would be too large. It is also None if
+    derivatives with respect to samples of a relief, wavefront or mask are requested, and the pupil would have to be
+    divided into too many rectangles (see `cell_samples`).
     """
     if problem.knots is not None:
         return cell_samples(problem)

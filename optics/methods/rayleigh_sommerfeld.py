@@ -84,10 +84,11 @@ class NodeSampling:
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`.
+        """Return the width [m] of a square in the window's plane, from which the size of rounding errors follows.
 
-        It is the width of the focus times the square root of the number of nodes, because the rounding errors of the
-        summands are independent.
+        Rounding errors have a fraction of the power of all light, which is spread evenly over this square (see
+        `Sampling.plane`). Its width is that of the focus times the square root of the number of nodes, because the
+        rounding errors of the summands are independent.
         """
         return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
 
@@ -101,9 +102,10 @@ class NodeSampling:
 
 
 def nodes(problem: Problem) -> list[NodeSampling]:
-    """Return a list with one sampling, whose nodes resolve the combined phase of pupil and path.
+    """Return a list with one sampling, whose nodes resolve the sum of the phases of the pupil and of the path.
 
-    The list is empty if derivatives with respect to samples of maps need too many nodes.
+    The list is empty if derivatives with respect to samples of a relief, wavefront or mask are requested, and the pupil
+    would have to be divided into too many rectangles (see `Problem.cells`).
     """
     (cycles, digits), aperture = node_rule(problem), problem.aperture
     if problem.knots is not None:
@@ -171,7 +173,7 @@ def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool 
 
 
 def _made(aperture: Aperture, cycles: float, digits: float, halved: bool) -> Nodes:
-    """Return the nodes of an aperture without a cache, see `cached_nodes`."""
+    """Return newly computed nodes of an aperture. `cached_nodes` explains the arguments and keeps the results."""
     found = aperture.nodes(cycles, digits)
     if not halved:
         return found
@@ -201,7 +203,8 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ik(D - z)} dξ (Goodman, §3.5), where d = |x - ξ| and D = √(d² + z²). The path
     D - z is computed as d²/(D + z). Whole waves of the phase are subtracted in float64.
 
-    rule: aperture, cycles, digits and `halved` of the nodes, see `cached_nodes`.
+    rule: the arguments of `cached_nodes`: the aperture, the cycles per radius that its nodes must resolve, the decimal
+        digits to which their sum must be accurate, and True if only the nodes on one side of the x axis are summed.
     """
     import drjit as dr
 

@@ -1,6 +1,10 @@
-"""The slow factor of `low_rank`, relative to the middle of the window, divided by its values along both axes.
+"""The remaining factor of the diffraction kernel, after the parts that depend on x alone or on y alone are removed.
 
-This quotient varies even more slowly over the window than the slow factor.
+The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `slow_factor`). The
+axis factors are its values on the x axis and on the y axis of the window, for light from points of the pupil that also
+differ along this axis only (see `AxisFactor`). The remaining factor is the slow factor divided by both axis factors.
+All are relative to their values at the middle of the window. The remaining factor varies even more slowly over the
+window than the slow factor.
 """
 
 from __future__ import annotations
@@ -21,9 +25,13 @@ __all__ = ["RemainingFactor"]
 
 @dataclass(frozen=True, eq=False)
 class RemainingFactor:
-    """The remaining factor for some points of pupils. Parts that do not depend on the window are computed once.
+    """Slow factor divided by its values along x and along y, for light from some points of pupils to a window.
 
-    directions: sines (s, t) of the points, minus those of the pupil's centre.
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. Parts that do not
+    depend on the position in the window are computed once.
+
+    directions: x and y components (s, t) of the unit vectors from the middle of the window to the points, minus those
+        of the unit vector to the pupil's centre.
     dtype: "float32" or "float64". With "float32", paths are computed in float32, too, if they are short enough.
     """
 
@@ -33,9 +41,10 @@ class RemainingFactor:
     dtype: str = "float64"
 
     def at(self, window: Pair) -> np.ndarray:
-        """Return the factor at positions (u, v) [m] relative to the middle of the window, complex.
+        """Return the remaining factor for light that arrives at positions of the window, complex.
 
-        Directions and positions are arrays with the same number of dimensions, and broadcast.
+        window: positions (u, v) [m] relative to the middle of the window. They have as many dimensions as the
+            attribute `directions`, with which they broadcast.
         """
         window = self.rounded(window[0]), self.rounded(window[1])
         if len({part.shape for part in (*self.directions, *window)}) == 1:
@@ -43,11 +52,15 @@ class RemainingFactor:
         return self.divided(window, [factor.at(place) for factor, place in zip(self.along, window, strict=True)])
 
     def rounded(self, values: np.ndarray) -> np.ndarray:
-        """Return numbers in the type of the paths."""
+        """Return numbers, rounded to the type in which path lengths from pupil to window are computed."""
         return values.astype(self._kind, copy=False)
 
     def divided(self, window: Pair, along: Sequence[Pair | np.ndarray]) -> np.ndarray:
-        """Return the factor at `rounded` positions, from amplitudes and phases of both axis factors there."""
+        """Return the remaining factor: the slow factor (kernel over Fourier kernel), divided by given axis factors.
+
+        window: positions (u, v) [m] relative to the middle of the window, as `rounded` returns them.
+        along: amplitude and phase [waves] of the axis factors at u and at v, as `AxisFactor.at` returns them.
+        """
         path, points, directions = self._pupil
         size, waves = slow_parts(path, points, directions, window)
         middle = self._middle
@@ -58,7 +71,11 @@ class RemainingFactor:
         return np.asarray(turned(size, waves, self.dtype))
 
     def _paired(self, window: Pair) -> np.ndarray:
-        """Return the factor for one position per point. The slow factor and its axis factors are evaluated together."""
+        """Return the remaining factor if each point of the pupil has its own position in the window.
+
+        The slow factor (the kernel divided by a Fourier kernel) is evaluated at positions (u, v), (u, 0) and (0, v)
+        together. The last two give the axis factors, by which the first is divided.
+        """
         (u, v), none, (points, directions, middle) = window, np.zeros_like(window[0]), self._three
         at = np.stack([u, u, none], axis=1), np.stack([v, none, v], axis=1)
         size, waves = slow_parts(self._pupil[0], points, directions, at)
@@ -68,9 +85,11 @@ class RemainingFactor:
 
     @cached_property
     def _three(self) -> tuple[Pair, Pair, Pair]:
-        """Points, directions, and slow factors at the window's middle, for the factor itself and both axis factors.
+        """Points of the pupil, their directions, and amplitude and phase of the slow factor at the window's middle.
 
-        The shapes are (pupil, 3, ...).
+        The slow factor is the kernel divided by a Fourier kernel. Axis 1 of the arrays counts the values for this
+        factor itself, for its axis factor along x, and for its axis factor along y. The points for an axis factor have
+        the same sine along the other axis. The shapes are (pupil, 3, ...).
         """
         _, points, directions = self._pupil
         own, shape = (points, directions, self._middle), directions[0].shape
@@ -83,18 +102,18 @@ class RemainingFactor:
 
     @cached_property
     def along(self) -> tuple[AxisFactor, AxisFactor]:
-        """Factors along x and y."""
+        """Axis factors: the slow factor along x and along y, relative to the middle of the window."""
         path, _, (s, t) = self._pupil
         return AxisFactor(path, self.samples, 0, s), AxisFactor(path, self.samples, 1, t)
 
     @cached_property
     def _kind(self) -> str:
-        """Type of the paths."""
+        """Type in which path lengths from pupil to window are computed."""
         return "float32" if self.dtype == "float32" and self.path.short(self.samples.steepest) else "float64"
 
     @cached_property
     def _pupil(self) -> tuple[Path, Pair, Pair]:
-        """Path, points of the pupil and their directions, rounded."""
+        """Geometry (`path`), points (x, y) [m] of the pupil, and `directions` (s, t) of these points, all `rounded`."""
         points = self.samples.points_at(*self.directions)
         if self._kind == "float64":
             return self.path, points, self.directions
@@ -103,7 +122,10 @@ class RemainingFactor:
 
     @cached_property
     def _middle(self) -> Pair:
-        """Amplitude and phase [waves] of the slow factor at the middle of the window."""
+        """Amplitude and phase [waves] of the slow factor at the middle of the window.
+
+        It is the factor by which the diffraction kernel differs from a Fourier kernel.
+        """
         path, points, directions = self._pupil
         none = np.zeros((1,) * directions[0].ndim, self._kind)
         return slow_parts(path, points, directions, (none, none))

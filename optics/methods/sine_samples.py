@@ -1,12 +1,13 @@
 """Samples of a pupil that are evenly spaced in their sines, as seen from the window's centre.
 
-The distance from a point ξ of the pupil to points x = c + u of a window about c is
+The sines of a point are the x and y components of the unit vector from the window's centre to the point. The distance
+from a point ξ of the pupil to points x = c + u of a window about c is
 
     |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
 
 With s as the variable, the term that is linear in u is exactly the Fourier kernel, however wide the aperture is. The
-remaining terms decrease with the distance. Because the rays are oblique, they vary over the pupil by about u²NA²/2λD
-cycles.
+remaining terms decrease with the distance. Over the pupil, these terms vary by about u²NA²/2λD cycles, because the rays
+are oblique.
 """
 
 from __future__ import annotations
@@ -40,13 +41,15 @@ RIM = 64  # number of points on the rim from which the range of the sines is det
 class SineSamples:
     """A soft aperture on a grid of sines. The grid lies around the sines of the pupil's centre.
 
-    grid: grid of s - s₀, where s = (ξ - c)/D are the sines of a point ξ of the pupil as seen from the window's centre
-        c, and s₀ those of the pupil's centre.
+    The sines s = (ξ - c)/D of a point ξ of the pupil are the x and y components of the unit vector from the window's
+    centre c to ξ, at the distance D. The sines of the pupil's centre are s₀.
+
+    grid: grid of s - s₀.
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: sine along y, relative to s₀, at which `axis_kernel.AxisFactor` evaluates the factor along x, and the
-        reverse.
+    elsewhere: a value of s - s₀. `axis_kernel.AxisFactor` computes how the diffraction kernel differs from a Fourier
+        kernel along x, for points of the pupil with this sine along y. Along y, the points have this sine along x.
     """
 
     edge: PupilEdge
@@ -58,7 +61,7 @@ class SineSamples:
 
     @property
     def at(self) -> np.ndarray:
-        """Sines s - s₀ of the samples along either axis."""
+        """Sines of the samples along either axis as seen from the window's centre, minus that of the pupil's centre."""
         return self.grid.x
 
     @property
@@ -76,7 +79,10 @@ class SineSamples:
         return _middle(self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sines s - s₀ of points (x, y) [m] of the pupil."""
+        """Return the sines of points (x, y) [m] of the pupil, minus the sines of the pupil's centre.
+
+        Sines are the x and y components of the unit vector from the window's centre to a point.
+        """
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
 
@@ -104,7 +110,11 @@ class SineSamples:
         return found
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupil for sines (s, t), from which s₀ is subtracted as in `grid`."""
+        """Return the points (x, y) [m] of the pupil whose `directions` are (s, t).
+
+        s and t are the x and y components of the unit vector from the window's centre to a point, minus those of the
+        unit vector to the pupil's centre.
+        """
         sx, sy = s + self._middle[0], t + self._middle[1]
         slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, max(self.steepest**2, MOST_SQUARE)))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
@@ -160,20 +170,20 @@ def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _sines(x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sines of points (x, y) of the pupil as seen from the centre of the window."""
+    """Return x and y components (sines) of unit vectors from the window's centre to points (x, y) [m] of the pupil."""
     x, y = x - centre[0], y - centre[1]
     slant = np.sqrt(x * x + y * y + distance * distance)
     return x / slant, y / slant
 
 
 def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]:
-    """Return s₀, the sines of the pupil's centre as seen from the window's centre."""
+    """Return s₀, the x and y components (sines) of the unit vector from the window's centre to the pupil's centre."""
     slant = math.hypot(*centre, distance)
     return -centre[0] / slant, -centre[1] / slant
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """Return the fewest samples that resolve the combined phase of pupil and path; None if they would be too uneven.
+    """Return the fewest samples that resolve the phase of pupil plus path; None if their spacing would be too uneven.
 
     The result is also None if the grid would be too large.
     """

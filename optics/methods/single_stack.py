@@ -23,7 +23,7 @@ LARGE = 2**17
 
 
 class Stackable(Protocol):
-    """Samples that return their own stack, such as `PixelNodes`."""
+    """Samples of a pupil, such as `PixelNodes`, with a method that returns them as a `SineStack` of a single pupil."""
 
     @property
     def grid(self) -> Grid: ...
@@ -34,7 +34,7 @@ class Stackable(Protocol):
 
 
 def single_stack(samples: SineSamples | Stackable) -> SineStack:
-    """Return the samples of a single pupil as a stack of one."""
+    """Return the samples of a single pupil as a `SineStack` of one pupil, from a cache if possible."""
     return (_large if math.prod(samples.grid.shape) > LARGE else _small)(samples)
 
 

@@ -79,7 +79,11 @@ class Path:
 def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
     """Return the number of Chebyshev points per axis that interpolate the slow factor; None if `most` are too few.
 
-    Interpolation is tested for points on the rim of the soft aperture.
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. Interpolation is tested
+    along a few lines through the window, for light from points on the rim of the pupil, including its soft edge.
+
+    half: distance [m] from the window's centre within which the Chebyshev points lie.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c}, for samples that are not sines.
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
@@ -90,7 +94,10 @@ def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: floa
     lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
 
     def rest(at: np.ndarray) -> np.ndarray:
-        """Return the slow factor at positions `at` [m] on all lines, (line, point of the rim, position)."""
+        """Return the factor by which the diffraction kernel differs from a Fourier kernel, along lines in the window.
+
+        The lines are parallel to x or y. at: positions [m] along each line. Shape: (line, point of the rim, position).
+        """
         u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
         return slow_factor(path, rim, directions, (u, v))
 
@@ -129,13 +136,13 @@ def slow_factor(
 ) -> np.ndarray:
     """Return the slow factor (z/D)² (1 + i/(kD)) e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
 
-    D is the distance from ξ to u, ρ that from the pupil's centre to u, and z that of the window. k is the wave number.
-    All arrays are broadcast.
+    D is the distance from ξ to u, and ρ the distance from the pupil's centre to u. z is the distance between the planes
+    of pupil and window, and k the wave number. All arrays are broadcast.
 
     pupil: points ξ (x, y) [m].
     directions: directions s of these points in the Fourier kernel e^{-ik s·u}.
     window: points u (x, y) [m], relative to the window's centre.
-    dtype: type in which the phase is rounded, "float32" or "float64".
+    dtype: type to which the phase is rounded after whole waves are subtracted, "float32" or "float64".
     """
     return np.asarray(turned(*slow_parts(path, pupil, directions, window), dtype))
 
@@ -168,14 +175,15 @@ def cross_term(
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return a and b, so that the slow factor, divided by its values along both axes, is about 1 + a b.
+    """Return a and b, so that the part of the slow factor that x and y do not contribute separately is about 1 + a b.
 
-    The product a b is the term -ik us vt/D of the exponent, where k = 2π/λ, and 1/D is the mean inverse distance over
-    the pupil. Because a depends on u and s, and b on v and t, the term costs as much as a second Fourier kernel along
-    each axis.
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel, relative to the middle
+    of the window. This part is its value at (u, v), divided by its values at (u, 0) and (0, v). The product a b is
+    the term -ik us vt/D of the exponent, where k = 2π/λ, and 1/D is the mean inverse distance over the pupil. Because a
+    depends on u and s, and b on v and t, the term costs as much as a second Fourier kernel along each axis.
 
-    directions: s and t, sines of samples along x and y minus those of the pupil's centre. Their last two axes broadcast
-        with those of `window`.
+    directions: s and t, the x and y components of the unit vectors from the window's centre to samples of the pupil,
+        minus those of the unit vector to the pupil's centre. Their last two axes broadcast with those of `window`.
     window: u and v, positions along x and y relative to the middle of the window [m].
     """
     (s, t), (u, v) = directions, window

@@ -66,9 +66,11 @@ class Side:
 
 @lru_cache(maxsize=64)
 def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
-    """Return sides such that the aperture is the intersection of their openings; None if no sides have this property.
+    """Return the lines and circles that bound an aperture; None if they do not describe it completely.
 
-    Circles, single rings, slits and convex polygons have such sides.
+    Each side, a line or a circle, divides the plane into an open and a dark region. The sides describe the aperture if
+    it is the intersection of the open regions of all sides. This is true for circles, single rings, slits and convex
+    polygons.
     """
     outline, sides = aperture.outline, []
     for start, end in outline.segments:
@@ -89,11 +91,14 @@ def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
 
 
 class _Gaussian(NamedTuple):
-    """The Gaussian times the light around each sample. The product is a Gaussian with complex parameters.
+    """The light around each sample times the real Gaussian with which the light is convolved.
+
+    The phase of the light is approximated by a quadratic function, so the product is a Gaussian with complex
+    parameters. Its variable is the displacement (x, y) from the sample.
 
     log: logarithm of its integral.
-    mean: mean (x, y) [m].
-    covariance: covariances xx, xy and yy [m²].
+    mean: mean displacement (x, y) [m].
+    covariance: covariances xx, xy and yy of the displacement [m²].
     """
 
     log: np.ndarray
@@ -101,11 +106,11 @@ class _Gaussian(NamedTuple):
     covariance: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def along(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and variance of the component along unit vectors (x, y)."""
+        """Return the mean [m] and the variance [m²] of the displacement's component along unit vectors (x, y)."""
         return x * self.mean[0] + y * self.mean[1], self.between((x, y), (x, y))
 
     def between(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Return the covariance of the components along two unit vectors (x, y)."""
+        """Return the covariance [m²] of the displacement's components along two unit vectors (x, y)."""
         xx, xy, yy = self.covariance
         return one[0] * other[0] * xx + (one[0] * other[1] + one[1] * other[0]) * xy + one[1] * other[1] * yy
 
@@ -141,8 +146,9 @@ class SmoothPupil:
         return 2 * (math.pi * self.width) ** 2
 
     def light(self, beam: Beam, x: np.ndarray, y: np.ndarray, dtype: Any) -> np.ndarray:
-        """Return the convolved light at evenly spaced positions x and y [m], complex (y, x).
+        """Return the light behind the pupil, convolved with the Gaussian of this `width`, complex (y, x).
 
+        x, y: evenly spaced positions [m] along each axis.
         dtype: type of the real and imaginary parts.
         """
         waves, pitch = beam.waves(x[None, :], y[:, None]), float(x[1] - x[0])
@@ -188,12 +194,13 @@ class SmoothPupil:
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the integral of each Gaussian over the aperture, complex (point,).
 
-        Each side that is near contributes one factor. Where the relief is steep, only light that one side diffracts
-        remains. This light comes from points on this side, so the factors of all other sides are computed for the
-        conditional Gaussian along this side.
+        The integral is the product of a factor for each side of the aperture that lies near the point. The factor is
+        the fraction of the Gaussian on the open region of the side. Where the relief is steep, only light that one side
+        diffracts remains. This light comes from points on this side. The factors of the other sides are therefore
+        computed for the conditional distribution of the Gaussian on this side.
 
         inner: Gaussians of the points.
-        x, y: positions of the points, in radii.
+        x, y: positions of the points, in radii of the pupil.
         """
         depth, across, down = np.stack([np.broadcast_arrays(*side.depth(x, y)) for side in self.sides], axis=1)
         mean, variance = inner.along(across, down)

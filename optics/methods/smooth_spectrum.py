@@ -71,7 +71,10 @@ class SmoothSpectrum(SpectrumSampling):
 
     @cached_property
     def closed_form(self) -> Grid:
-        """Grid of the samples at which the convolved light is computed in closed form."""
+        """Grid at which `smooth` computes the light in closed form, convolved with its Gaussian.
+
+        If there is a second Gaussian (`blur`), the samples of `pupil` are computed from these samples.
+        """
         if self.blur == 0:
             return self.pupil
         return _samples(self.smooth.outermost, _pitch(self.taper.end, self.smooth.width, self.tolerance))
@@ -93,7 +96,10 @@ class SmoothSpectrum(SpectrumSampling):
         return types.Float(padded_for_packets(found / float(self.pupil_period) ** 4))
 
     def _light(self, beam: Beam, dtype: Any) -> np.ndarray:
-        """Return the convolved light at the samples from which the spectrum is computed, complex (y, x)."""
+        """Return the light behind the pupil, convolved with both Gaussians, at the samples of `pupil`, complex (y, x).
+
+        The Gaussians are that of `smooth` and, unless `blur` is 0, the one with the width `blur`.
+        """
         grid = self.closed_form
         light = self.smooth.light(beam, grid.x, grid.y, dtype)
         if self.blur == 0:
@@ -104,9 +110,11 @@ class SmoothSpectrum(SpectrumSampling):
         return found
 
     def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
-        """Return the transfer function to the window, divided by the spectrum of both Gaussians, complex (fy, fx).
+        """Return the transfer function to the window, divided by the spectra of two Gaussians, complex (fy, fx).
 
-        The function is even along both axes, so only its values at non-negative frequencies are returned.
+        The light is convolved with these Gaussians: that of `smooth` and, unless `blur` is 0, the one with the width
+        `blur`. The division reverses the convolution. The function is even along both axes, so only its values at
+        non-negative frequencies are returned.
         """
         found = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
         exponent = 2 * math.pi**2 * (self.smooth.width**2 + self.blur**2)

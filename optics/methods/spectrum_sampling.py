@@ -1,4 +1,7 @@
-"""The planes between which the methods of the angular spectrum transform a field, and the sums between them."""
+"""Grids for propagation by the angular spectrum, and the Fourier sums that transform a field from one grid to another.
+
+There are grids of the spectrum, of the relay plane of the split method, and of the window (see `angular_spectrum`).
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,10 @@ class SpectrumSampling:
 
     @property
     def is_whole(self) -> bool:
-        """True if no paraxial part is split off."""
+        """True if the spectrum is propagated to the window in one step.
+
+        False for the split method, which leaves the paraxial part of the propagation to Fresnel's integral.
+        """
         return self.method == "angular_spectrum"
 
     @cached_property
@@ -49,17 +55,24 @@ class SpectrumSampling:
 
     @cached_property
     def relay(self) -> Grid:
-        """Grid [m] of the relay plane, from which the split method continues with Fresnel's integral."""
+        """Grid [m] of the relay plane of the split method.
+
+        The split method first propagates the spectrum to this plane, without the paraxial part of the phase. Fresnel's
+        integral from this plane to the window adds this part.
+        """
         return Grid.square(self.output_period, self.period / self.output_period)
 
     def part(self, grid: Grid) -> Grid:
-        """Return the samples that represent a plane: a quarter if the field is even, else all."""
+        """Return the samples of a grid that represent a field: a quarter of them if the field is even, else all."""
         return quarter(grid) if self.even else grid
 
     def sum(self, field: Field, start: Grid, period: Scalar, end: Grid, sign: int, first: int = 0) -> Field:
-        """Return the Fourier sum from the samples of one plane to the samples of another, see `fourier.dft2`.
+        """Return the Fourier sum over a field's samples on one grid, at the samples of another; see `fourier.dft2`.
 
-        first: first row of the field, if it contains only some rows of the plane.
+        start, end: grids before and after the sum.
+        period: number of samples after which the sum repeats the field.
+        sign: sign of the exponent.
+        first: first row of the field, if it contains only some rows of the grid.
         """
         if self.even:
             return even_sum(field, start.shape, period, end, first)
@@ -70,7 +83,10 @@ class SpectrumSampling:
         return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
 
     def sum_bytes(self, start: Grid, end: Grid, dtype: str) -> float:
-        """Return the predicted memory [bytes] of a sum from samples of one plane to samples of another."""
+        """Return the predicted memory [bytes] of the Fourier sum that transforms a field from one grid to another.
+
+        start, end: grids before and after the sum.
+        """
         return predicted_bytes(start.shape, end.shape, ITEM_BYTES[dtype])
 
     def bytes_from_spectrum(self, window: Grid, dtype: str) -> float:
@@ -88,7 +104,14 @@ class SpectrumSampling:
         return to_relay + self.sum_seconds(self.relay, 0.5, window)
 
     def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
-        """Return the field; for a split spectrum, times the phase factor e^{iπr²/λz}/i, which `arrived` omits."""
+        """Return a field over the window with its complete phase.
+
+        If the split method computed the field, it is multiplied by e^{iπr²/λz}/i. The function `arrived` omits this
+        factor, because the intensity does not depend on it. r is the distance from the axis in the window, and z that
+        of the window from the pupil.
+
+        field: result of `arrived`.
+        """
         if self.is_whole:
             return field
         types = precision(problem.dtype)
@@ -97,5 +120,8 @@ class SpectrumSampling:
         return field * Field.from_waves(1.0, waves, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`.
+
+        The square lies in the plane of the window. Its width is the period with which the sums repeat the field there.
+        """
         return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx

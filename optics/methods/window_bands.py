@@ -1,4 +1,8 @@
-"""Frequencies of the light and of the soft edges of several pupils, for `window_edges`."""
+"""Bands of spatial frequencies in several pupils, from which `window_edges` chooses soft edges and numbers of samples.
+
+The light of a ray has a frequency in the pupil's plane: the number of cycles of its phase per radius of the pupil. An
+edge diffracts the light of a ray to a band of frequencies around that of the ray.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +17,14 @@ EDGES = 4  # choice: number of sharpnesses of the edge per octave; equal ones sh
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Frequencies in cycles per radius, (beam,).
+    """Spatial frequencies for the samples and the soft edge of each pupil, in cycles per radius of the pupil.
 
-    density: frequencies that the samples must resolve.
-    passband: passband of the soft edge.
-    around: distance between the frequencies of the edge and those of the light that it sends into the window.
+    The shape of all arrays is (beam,).
+
+    density: highest frequencies that the samples must resolve, which are also the numbers of samples per radius.
+    passband: frequencies up to which softening the edge does not change the spectrum of the aperture.
+    around: largest differences between the frequency of a ray at the edge and the frequencies at which diffraction at
+        the edge sends the ray's light into the window.
     """
 
     density: np.ndarray
@@ -39,12 +46,15 @@ class Bands:
 
 
 def in_steps(values: np.ndarray, count: int = EDGES) -> np.ndarray:
-    """Return values rounded up to a few per octave; count: their number."""
+    """Return values rounded up to the next of the numbers 2^(k/count), where k is an integer.
+
+    count: number of possible values per octave, which is a factor of 2.
+    """
     return np.asarray(2.0 ** (np.ceil(count * np.log2(values) - 1e-9) / count))
 
 
 def medians(values: np.ndarray) -> np.ndarray:
-    """Return the medians of rows; `np.median` takes several times as long."""
+    """Return the median of each row of a matrix. The function `np.median` takes several times as long."""
     last = values.shape[1] // 2
     first = (values.shape[1] - 1) // 2
     ordered = np.partition(values, sorted({first, last}), axis=1)

@@ -63,14 +63,18 @@ class WindowCrossings:
         return cls(*found, drawn, down[:, :, None] * across[:, None, :], total)
 
     def part(self, some: slice) -> WindowCrossings:
-        """Return the crossings of some PSFs."""
+        """Return the same data for some of the PSFs only.
+
+        some: their places along the first axis.
+        """
         return WindowCrossings(*(getattr(self, one.name)[some] for one in fields(self)))
 
 
 def _along_axis(root: Array, bright: Array) -> tuple[Array, Array]:
-    """Return the indices of a few rows, or columns, and the probability with which each is drawn, (stack, row).
+    """Return the indices of a few drawn rows, or columns, and the probability with which each is drawn, (stack, drawn).
 
-    root, bright: sums over each row of the square root of the intensity, and of its square, (stack, row).
+    root: sum of the square root of the intensity over each row, or column, (stack, row).
+    bright: sum of the squared intensity over each row, or column, (stack, row).
     """
     own, root, bright = library(root), to_double(root), to_double(bright)
     size = root.shape[1]
@@ -91,5 +95,5 @@ def _along_axis(root: Array, bright: Array) -> tuple[Array, Array]:
 
 
 def _beams(places: Array) -> Array:
-    """Return the index of each entry along the first axis, (stack, 1)."""
+    """Return the numbers 0, 1, 2, ... that count the PSFs along the first axis of an array, (stack, 1)."""
     return library(places).ones_like(places[:, :1]).cumsum(0) - 1

@@ -1,13 +1,14 @@
-"""Soft edges for samples of several pupils at coarse tolerances, and the numbers of samples that they need.
+"""Soft edges of several pupils at coarse tolerances, and the numbers of samples that pupils with these edges need.
 
-Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be at least half
-the width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
-diffracted at the edge of the pupil spreads further. A soft edge keeps this light out of the window. Softening the edge
-changes light only far from the geometrical rays of the edge, where there is little light.
+Samples of a pupil are evenly spaced in the sines of their directions as seen from the window. A spacing Δs of the sines
+repeats the light of the window with the period λ/Δs. The period must be at least half the width of the window, plus the
+distance from the middle within which nearly all light arrives. The light that is diffracted at the edge of the pupil
+spreads further. A soft edge keeps this light out of the window. Softening the edge changes light only far from the
+geometrical rays of the edge, where there is little light.
 
-If most light of a strongly curved wave misses the window, and the aperture is a disk or a ring, the wave itself can be
-smoothed with the edge (`curved_disk`). This removes light in directions far from the window. The number of samples is
-then almost independent of the directions of the rays at the edge.
+If most light of a strongly curved wave misses the window, and the aperture is a disk or a ring, the wave can be
+convolved with the same kernel that softens the edge (`curved_disk`). This smoothing removes light in directions far
+from the window. The number of samples is then almost independent of the directions of the rays at the edge.
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ class WindowEdges:
     """Soft edges of several pupils for one window.
 
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: additional needs of the PSFs if derivatives are requested, else None.
-    smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
+    derivatives: requested derivatives, which need narrower edges and more samples; None if none are requested.
+    smoothed: True if strongly curved waves may be convolved with the edge's kernel. Derivatives exclude this.
     """
 
     stack: LightStack
@@ -75,7 +76,10 @@ class WindowEdges:
 
     @cached_property
     def curvature(self) -> np.ndarray:
-        """Curvatures of waves that are smoothed with the edge, in cycles per radius at the rim; else 0, (beam,)."""
+        """Curvatures of the waves that are convolved with the kernel of the soft edge, 0 for all other waves, (beam,).
+
+        The curvature is the local frequency of the wave at the rim in cycles per radius.
+        """
         return self._choice[0]
 
     @property
@@ -85,7 +89,7 @@ class WindowEdges:
 
     @property
     def stepped(self) -> np.ndarray:
-        """True for beams whose densities have steps, (beam,): those whose densities vary most between pupils."""
+        """True for beams whose numbers of samples per radius are rounded up to a few values per octave, (beam,)."""
         return self.stack.mapped | (self.stack.rim_slopes is not None)
 
     @cached_property
@@ -107,9 +111,9 @@ class WindowEdges:
     def _unless_mapped(
         self, wide: Callable[[], list[SoftAperture]], narrow: Callable[[], list[SoftAperture]]
     ) -> list[SoftAperture]:
-        """Return wide soft edges, and narrow ones for derivatives and for maps.
+        """Return one soft aperture per beam: narrow with derivatives or a map in the pupil, else wide.
 
-        The fine detail of maps sends light from the edge in all directions.
+        The fine detail of maps sends light from the edge in all directions. `wide` and `narrow` return all apertures.
         """
         mapped = self.stack.mapped
         if self.derivatives is not None or mapped.all():
@@ -120,7 +124,7 @@ class WindowEdges:
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, Bands]:
-        """Curvatures of the smoothed waves, and the bands of the light."""
+        """Curvatures of waves that are convolved with the edge's kernel, 0 for others, (beam,), and frequency bands."""
         none = np.zeros(len(self.tolerance))
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
@@ -135,7 +139,11 @@ class WindowEdges:
 
     @cached_property
     def _rim_curvature(self) -> np.ndarray:
-        """Mean cycles per radius of the rays at the rim, away from the axis, rounded to CURVATURE_STEP, (beam,)."""
+        """Curvatures of the waves: mean local frequencies [cycles per radius] near the rim, (beam,).
+
+        They are relative to a wave that converges to the middle of the window, positive for light that leaves the axis,
+        and rounded to multiples of CURVATURE_STEP.
+        """
         slopes, (along_x, along_y) = self.stack.slopes, self._to_middle
         r2 = np.square(slopes.x) + np.square(slopes.y)
         rim = self.geometry.to_middle(slopes.across).rim
@@ -143,7 +151,7 @@ class WindowEdges:
         return np.asarray(np.rint(outward / CURVATURE_STEP) * CURVATURE_STEP)
 
     def _bands(self, curvature: np.ndarray) -> Bands:
-        """Return the bands of waves that are smoothed with these curvatures, (beam,)."""
+        """Return the light's frequency bands if waves with these curvatures are convolved with the edge's kernel."""
         slopes, bend, cycles, mapped = self.stack.slopes, curvature[:, None], self.geometry.cycles, self.stack.mapped
         along, curved = self._along, bool(curvature.any())
         rest = _unbent(self._to_middle, slopes, curvature) if curved else along
@@ -169,10 +177,10 @@ class WindowEdges:
         return Bands(density, passband, near).stepped(self.stepped)
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> Bands:
-        """Return the bands of light that carries derivatives.
+        """Return the frequency bands of light that carries derivatives. Frequencies are in cycles per radius.
 
-        rim: median cycles per radius of the rays at the edge, (beam,).
-        direct: cycles per radius that other light needs, (beam,).
+        rim: median frequencies of the rays at the edge, (beam,).
+        direct: frequencies that the samples must resolve for light that the edge does not diffract, (beam,).
         """
         # High modes grow outside the circle, so that their derivatives need a sharper edge.
         fronts = [beam.pupil.wavefront for beam in self.stack.beams]
@@ -186,19 +194,19 @@ class WindowEdges:
 
     @property
     def _widest(self) -> np.ndarray:
-        """Least densities of samples at which the narrow edges of the check end within EDGE_REACH, (beam,)."""
+        """Least numbers of samples per radius at which narrow soft edges are not wider than EDGE_REACH, (beam,)."""
         widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
         return np.asarray(widest + self.geometry.cycles / 2)
 
     @cached_property
     def _masks(self) -> np.ndarray:
-        """Cycles per radius of the masks, (beam,)."""
+        """Highest frequencies of the masks' amplitudes that matter, in cycles per radius, (beam,)."""
         return self.stack.mask_cycles(np.minimum(self.tolerance, 0.1))
 
     def _reach(self, along: np.ndarray) -> np.ndarray:
-        """Return the cycles per radius up to which nearly all light reaches, (beam,).
+        """Return the frequencies [cycles per radius] that only a negligible part of all rays exceeds, (beam,).
 
-        along: cycles per radius of rays, (beam, ray).
+        along: frequencies of the rays [cycles per radius], (beam, ray).
         """
         share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
         last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
@@ -207,11 +215,18 @@ class WindowEdges:
 
     @cached_property
     def _along(self) -> np.ndarray:
-        """Cycles per radius of the paths to the middle of the window, the larger of both axes, (beam, ray)."""
+        """Larger of the local frequencies along x and along y of each ray [cycles per radius], (beam, ray).
+
+        A ray to the middle of the window has the frequency 0.
+        """
         return np.asarray(np.maximum(*map(np.abs, self._to_middle)))
 
     def _steepest(self, curvature: np.ndarray) -> np.ndarray | float:
-        """Return the cycles per radius of nearly all rays at the rim behind polynomials of high order, (beam,)."""
+        """Return the frequencies [cycles per radius] that nearly no ray at the rim exceeds, (beam,).
+
+        They are determined for polynomials of high order, which are steepest at the rim, and are otherwise 0.
+        `curvature` is the part of the frequencies at the rim that is subtracted first, see `_unbent`.
+        """
         slopes = self.stack.rim_slopes
         if slopes is None:
             return 0.0
@@ -225,12 +240,15 @@ class WindowEdges:
         return self._paths(self.stack.slopes)
 
     def _paths(self, slopes: StackSlopes) -> tuple[np.ndarray, np.ndarray]:
-        """Return cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
+        """Return the local frequencies [cycles per radius] of rays along x and along y, (beam, ray).
+
+        A ray to the middle of the window has the frequency 0.
+        """
         path = self.geometry.to_middle(slopes.across)
         return (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
 
     def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return ripples of the soft edges of samples and of finer samples, (beam,), rounded down to steps."""
+        """Return the largest errors of the soft edges' spectra, for the samples and for finer samples, (beam,) each."""
         share = self._ripple_share
         if curvature.any():
             share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
@@ -248,7 +266,7 @@ class WindowEdges:
         return self._soft(passband, passband + _transitions(ripples), ripples)
 
     def _narrow(self, density: np.ndarray, ripple: float) -> list[SoftAperture]:
-        """Return soft apertures that are as narrow as a density of samples allows."""
+        """Return soft apertures with the narrowest edges that samples of this density [1/radius] can represent."""
         stopband = np.maximum(density - self.geometry.cycles / 2, density / 2)
         stopband = 2.0 ** (np.floor(EDGES * np.log2(stopband)) / EDGES)
         return self._soft(CARRIED_PASSBAND * stopband, stopband, np.full(len(stopband), ripple))
@@ -260,7 +278,11 @@ class WindowEdges:
 
 
 def _unbent(paths: tuple[np.ndarray, np.ndarray], slopes: StackSlopes, curvature: np.ndarray) -> np.ndarray:
-    """Return cycles per radius of paths without the curvature of smoothed waves, the larger of both axes."""
+    """Return the larger frequency, along x or y, of each ray without curvature [cycles per radius], (beam, ray).
+
+    paths: frequencies of the rays along x and along y, with curvature.
+    curvature: curvatures to be subtracted, frequencies at the rim [cycles per radius], (beam,).
+    """
     parts = zip(paths, (slopes.x, slopes.y), strict=True)
     return np.asarray(np.maximum(*(np.abs(part - curvature[:, None] * at) for part, at in parts)))
 

@@ -28,10 +28,10 @@ KEPT = 64  # choice, limited by memory: number of values that are kept for one w
 
 
 class PathSlopes(NamedTuple):
-    """Paths from points of the pupils to the middle of a window.
+    """Gradients of the optical paths from points of the pupils to the middle of a window.
 
-    along_x, along_y: gradients of the paths, (beam, point).
-    cycles: cycles per radius for a gradient of 1, (beam, 1).
+    along_x, along_y: gradients along x and y of the pupil, (beam, point).
+    cycles: phase that a gradient of 1 causes, in cycles per radius of the pupil, (beam, 1).
     rim: indices of the points near the rim.
     """
 
@@ -42,15 +42,18 @@ class PathSlopes(NamedTuple):
 
 
 class PlannedRays(NamedTuple):
-    """Points of the pupils whose rays determine how many Chebyshev points interpolate the slow factor (its rank).
+    """Some points of the pupils, with one ray each, from which a plan determines the rank of the slow factor.
 
-    some: their indices in `disk_points`.
-    at: points (x, y) [m] relative to the middle of the window, (beam, ray).
-    scale: displacement [m] of a ray at the window that a slope of 1 of the optical path causes, (beam, ray).
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. Its rank is the number
+    of Chebyshev points per axis of the window that are enough to interpolate it.
+
+    some: indices of the points in `disk_points`.
+    at: positions (x, y) [m] of the points relative to the middle of the window, (beam, ray).
+    scale: distance [m] in the window by which a ray moves if the slope of its optical path grows by 1, (beam, ray).
     blur: distance [m] by which diffraction spreads the light, (beam, 1).
-    directions: sines of the lines from the middle of the window to the points, minus those of the line to the pupil's
-        centre, (beam, ray).
-    sine2: sum of the squares of both sines, (beam, ray).
+    directions: sines along x and y of the lines from the middle of the window to the points, minus those of the line to
+        the pupil's centre, (beam, ray).
+    sine2: sum of the squares of these differences along x and y, (beam, ray).
     """
 
     some: slice
@@ -63,7 +66,13 @@ class PlannedRays(NamedTuple):
 
 @dataclass(frozen=True)
 class WindowGeometry:
-    """A window, and the light without reliefs, wavefronts and masks."""
+    """Geometry of several beams and their window, which is the same for all reliefs, wavefronts and masks.
+
+    Results that depend on nothing else are computed once.
+
+    light: radii of the pupils, distances, wavelengths, media, ideal lenses and sources.
+    window: samples of the window.
+    """
 
     light: LightGeometry
     window: Grid
@@ -79,12 +88,19 @@ class WindowGeometry:
 
     @cached_property
     def cycles(self) -> np.ndarray:
-        """Cycles per radius of the Fourier kernel at the sides of the window, (beam,)."""
+        """Frequencies in the pupils of light that arrives at the sides of the window, (beam,).
+
+        The frequency is the number of cycles of the phase per radius of the pupil, and 0 for light that arrives at the
+        middle of the window.
+        """
         radius, distance, *_ = self.light.arrays
         return np.asarray(self.half * radius / (self.light.wavelength * distance))
 
     def to_middle(self, across: int) -> PathSlopes:
-        """Return the paths from `disk_points` to the middle of the window."""
+        """Return the gradients of the paths from points of the pupils to the middle of the window.
+
+        across: number of points across the pupil, see `disk_points`.
+        """
 
         def computed() -> PathSlopes:
             (x, y), length = self._apart(across, slice(None))
@@ -96,7 +112,10 @@ class WindowGeometry:
         return found
 
     def rays(self, across: int) -> PlannedRays:
-        """Return some of the `disk_points`, which are spread evenly over the disks."""
+        """Return some of the points that are spread evenly over the pupils, with the data of their rays.
+
+        across: number of points across the pupil, see `disk_points`.
+        """
 
         def computed() -> PlannedRays:
             some = slice(None, None, max(1, len(disk_points(across)[1]) // RAYS))
@@ -127,7 +146,13 @@ class WindowGeometry:
         return found
 
     def ray_factor(self, across: int, steepest: np.ndarray, elsewhere: np.ndarray) -> RemainingFactor:
-        """Return the remaining factor for `rays`. Further arguments: see `SineGeometry`."""
+        """Return the slow factor, divided by its values along both axes of the window, for the points of `rays`.
+
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel.
+
+        across: number of points across the pupil, see `disk_points`.
+        steepest, elsewhere: see `SineGeometry`.
+        """
 
         def computed() -> RemainingFactor:
             geometry = SineGeometry(self.light.arrays[1], self.window.centre, steepest, elsewhere)
@@ -149,7 +174,12 @@ def half_window(window: Grid) -> float:
 
 
 def window_geometry(stack: LightStack, window: Grid) -> WindowGeometry:
-    """Return the geometry of light and a window. The geometry of a single beam is cached."""
+    """Return the quantities that depend on sources, ideal lenses, media, distances and the window only.
+
+    Reliefs, wavefronts and masks do not change them. The result for a single beam is cached.
+
+    stack: light of the beams.
+    """
     light = stack.geometry
     return _kept(light, window) if len(stack.beams) == 1 else WindowGeometry(light, window)
 

@@ -24,11 +24,15 @@ __all__ = ["window_image_errors", "window_images"]
 def window_images(
     stack: LightStack, samples: SineStack, rank: int, crossed: bool, window: Grid, dtype: str
 ) -> np.ndarray:
-    """Return |U|² over the window for unit amplitude at the pupils, (beam, y, x).
+    """Return the intensities |U|² over the window for unit amplitude at the pupils, as an array (beam, y, x).
 
-    samples: samples of the pupils, one for each beam or one for all.
-    rank: rank of the slow factor over the window.
-    crossed: True to include `cross_term`, which replaces interpolation of the slow factor.
+    U is a sum over the samples of a pupil. The diffraction kernel of the sum is a Fourier kernel times a factor that
+    varies slowly over the window, the slow factor.
+
+    samples: grids of samples, one for each beam's pupil, or one for all pupils.
+    rank: number of points along an axis of the window between which the slow factor is interpolated.
+    crossed: True to approximate the slow factor without interpolation, by its values along both axes of the window and
+        `cross_term`. This requires rank 1.
     dtype: "float32" or "float64".
     """
     path = Path(stack.wavelength, stack.distance, window)
@@ -53,7 +57,9 @@ def window_image_errors(
 ) -> np.ndarray:
     """Return the relative L2 errors of the results of `window_images`, (beam,), see `window_errors`.
 
-    finer: samples of the check, see `WindowPlan.samples`.
+    The images are compared with sums over finer samples of the pupils, in a few rows and columns of the window.
+
+    finer: these finer samples, the second result of `WindowPlan.samples`.
     images: result of `window_images`, (beam, y, x).
     """
     path = Path(stack.wavelength, stack.distance, window)
@@ -62,10 +68,12 @@ def window_image_errors(
 
 
 def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dtype: str) -> list[tuple[Any, Any]]:
-    """Return pairs of matrices (`_along`) for rows and columns, which PSFs with the same samples share.
+    """Return pairs of matrices, each with the kernels (see `_along`) for the rows and for the columns of the window.
 
-    With `cross_term`, there is a second pair. Mirrored matrices remain two pairs. Plain matrices are joined to one
-    pair, (pupil, y, 2 · sample) and (pupil, 2 · x, sample), because a large product takes less time.
+    PSFs with the same samples share the matrices. With `cross_term`, there are two pairs, whose sums are added. If the
+    matrices are mirrored (`MirroredMatrix`), the list holds both pairs. Else they are joined to one larger pair,
+    because one large product takes less time than two. The shapes of this pair are (pupil, y, 2 · sample) and
+    (pupil, 2 · x, sample).
     """
     window = path.window
 
@@ -90,7 +98,12 @@ def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dty
 
 
 def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: str) -> np.ndarray:
-    """Return the kernel along x (0) or y (1) times interpolation weights of the nodes, (pupil, place, a · sample)."""
+    """Return the diffraction kernel along x (`axis` 0) or y (1), multiplied by interpolation weights, complex.
+
+    The kernel depends on the position in the window (place) and on the sample of the pupil. It is multiplied by the
+    Lagrange weight of each node a at this position. The last axis counts all pairs of a node and a sample, so the shape
+    is (pupil, place, node · sample).
+    """
     kernel = window_kernel(path, samples, axis, dtype)
     if len(nodes) == 1:
         return kernel
@@ -101,9 +114,11 @@ def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: 
 
 
 def _node_factors(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str) -> np.ndarray:
-    """Return the slow factor at nodes of the window, divided by its values along both axes and in the middle.
+    """Return the part of the slow factor that varies along both axes of the window, at nodes (points) of the window.
 
-    The shape is (pupil, b, a, η, ξ).
+    The slow factor is the quotient of the diffraction kernel and a Fourier kernel. Here it is relative to its value at
+    the middle of the window, and divided by its values along the x axis and along the y axis of the window (see
+    `RemainingFactor`). The shape is (pupil, node along y, node along x, row of samples, column of samples).
     """
     s, t = samples.at[:, None, None, None, :], samples.at[:, None, None, :, None]
     u, v = nodes[None, None, :, None, None], nodes[None, :, None, None, None]

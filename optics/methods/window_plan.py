@@ -32,11 +32,13 @@ MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of th
 
 @dataclass(frozen=True, eq=False)
 class WindowPlan:
-    """Samples of several pupils for one window.
+    """Plan of the samples of several pupils, from which the PSFs over one window are summed.
 
+    stack: light of the beams, each with its pupil.
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: additional needs of the PSFs if derivatives are requested, else None.
-    smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
+    derivatives: kinds of derivatives that are requested, which need more samples; None if none are.
+    smoothed: True if strongly curved waves may be smoothed at the edge of the pupil, which takes fewer samples. This is
+        impossible with derivatives.
     """
 
     stack: LightStack
@@ -47,7 +49,10 @@ class WindowPlan:
 
     @cached_property
     def geometry(self) -> WindowGeometry:
-        """The window, and the light without reliefs, wavefronts and masks."""
+        """The window, and what determines the light apart from reliefs, wavefronts and masks.
+
+        These are radii, distances, wavelengths, refractive indices, ideal lenses and sources.
+        """
         return window_geometry(self.stack, self.window)
 
     @cached_property
@@ -57,9 +62,10 @@ class WindowPlan:
 
     @cached_property
     def counts(self) -> np.ndarray:
-        """Numbers n of samples between the middle and either end, (beam,); 0 if the method is not suitable.
+        """Numbers n of samples between the middle of a pupil and either end of an axis, (beam,).
 
-        A pupil has 2n + 1 samples along either axis.
+        A pupil has 2n + 1 samples along either axis. The number is 0 for pupils that cannot be sampled in this way,
+        because rays are too oblique, or because too many samples or interpolation points would be necessary.
         """
         suitable, across = self._rims[2] & self._finer_rims[2], self._rims[0]
         needed = np.where(suitable, across / self._pitch(self.edges.density), 0)
@@ -75,17 +81,24 @@ class WindowPlan:
 
     @staticmethod
     def finer_count(count: np.ndarray) -> np.ndarray:
-        """Return how many samples the finer set for `window_check` has between the middle and either end."""
+        """Return n for the finer samples of `window_check`, of which a pupil has 2n + 1 along either axis.
+
+        count: the same number for the samples of the PSF, see `counts`.
+        """
         return np.ceil(FINER * count + SHIFT).astype(int)
 
     @property
     def ranks(self) -> np.ndarray:
-        """Ranks of the slow factor over the window, (beam,); 0 if the method is not suitable."""
+        """Numbers of points along an axis of the window between which the slow factor is interpolated, (beam,).
+
+        The slow factor is the quotient of the diffraction kernel and a Fourier kernel. The number is 0 if more than
+        MOST_RANK points would be necessary.
+        """
         return self._ranks[0]
 
     @property
     def crossed(self) -> np.ndarray:
-        """True for sums that include `cross_term`, (beam,)."""
+        """True for beams whose sums over the pupil include `cross_term` instead of an interpolation, (beam,)."""
         return self._ranks[1]
 
     @cached_property
@@ -94,7 +107,11 @@ class WindowPlan:
 
     @cached_property
     def elsewhere(self) -> np.ndarray:
-        """Sines for `SineGeometry`, rounded to 1/ELSEWHERE of the largest, so that PSFs can share arrays, (beam,)."""
+        """Typical sines of the points of the pupils as seen from the middle of the window, (beam,).
+
+        They are the values of `WindowRays.mean_sine`, and serve as `elsewhere` of `SineGeometry`. They are rounded to
+        multiples of the largest sine at the rim, divided by ELSEWHERE, so that similar PSFs can share arrays.
+        """
         step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
         return np.asarray(np.rint(self._rays.mean_sine / step) * step)
 
@@ -105,9 +122,11 @@ class WindowPlan:
         return window_ranks(self.geometry, factor, self._rays, self.tolerance, self.derivatives)
 
     def samples(self, places: np.ndarray) -> tuple[SineStack, SineStack]:
-        """Return the samples of some pupils, which have the same count, and the finer samples of the check.
+        """Return the samples of some beams' pupils, and finer samples of the same pupils.
 
-        places: indices of the beams.
+        `window_check` estimates the errors of the PSFs from sums over the finer samples.
+
+        places: indices of the beams. Their entries of `counts` must be equal.
         """
         count = int(self.counts[places[0]])
         sets = (count, 0.0, self._rims, self.edges.edges), (
@@ -137,10 +156,11 @@ class WindowPlan:
         return plan_costs(self.window, self.ranks, across, finer, self.crossed)
 
     def _pitch(self, density: np.ndarray) -> np.ndarray:
-        """Return the largest spacing of sines at which a pupil has at least `density` samples per radius everywhere.
+        """Return the largest spacing at which a pupil has at least `density` samples per radius everywhere, (beam,).
 
-        The distance of two points in the pupil is at most z/cos³θ times the distance of their sines, where z is the
-        distance of the window, and θ the angle of the steepest ray.
+        Samples are evenly spaced in the sines of the angles at which the middle of the window sees them. The distance
+        of two points in the pupil is at most z/cos³θ times the difference of their sines. z is the distance of the
+        window, and θ the angle of the steepest ray.
         """
         steepest = np.minimum(self._rims[1], 1 - 1e-12)
         found: np.ndarray = self.stack.radius * (1 - np.square(steepest)) ** 1.5 / (self.stack.distance * density)
@@ -161,8 +181,10 @@ class WindowPlan:
 def plan_costs(window: Grid, rank: Any, across: Any, finer: Any, crossed: Any = False) -> tuple[Any, Any]:
     """Return the predicted time [s] and memory [bytes] of a PSF; the arguments are numbers or arrays (beam,).
 
-    across, finer: numbers of samples along an axis of the pupil, and of those for the check.
-    crossed: whether the sum includes `cross_term`.
+    rank: number of points along an axis of the window between which the slow factor is interpolated.
+    across: number of samples along an axis of the pupil.
+    finer: number of the finer samples along an axis from which `window_check` estimates the error of the PSF.
+    crossed: whether the sum over the pupil includes `cross_term`.
     """
     (height, width), inner = window.shape, rank * across
     products = (inner * inner * width + height * inner * width) * np.where(crossed, 2, 1)

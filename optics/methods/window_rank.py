@@ -1,6 +1,7 @@
 """The rank of the slow factor at coarse tolerances, if samples are chosen for the light that arrives in a window.
 
-The rank is the number of points per axis of the window between which the slow factor is interpolated.
+The slow factor is the quotient of the diffraction kernel and a Fourier kernel. It varies slowly over the window, so it
+is interpolated there. The rank is the number of interpolation points along an axis of the window.
 """
 
 from __future__ import annotations
@@ -40,11 +41,11 @@ RANK_OF_DISTANCE = 3  # least rank for derivatives by the distance, which are qu
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Additional needs of a PSF whose derivatives are requested.
+    """Kinds of derivatives of a PSF that are requested, and for which it needs more samples.
 
-    moves: whether derivatives with respect to the distance are requested.
-    cells: cells between the knots of maps, across the pupil; 0 if no derivatives with respect to samples of maps are
-        requested.
+    moves: whether derivatives with respect to the distance of the window are requested.
+    cells: number of intervals between the knots of an interpolated map (relief or wavefront), along a diameter of the
+        pupil; 0 if no derivatives with respect to the samples of a map are requested.
     """
 
     moves: bool = False
@@ -55,10 +56,12 @@ class Derivatives:
 class WindowRays:
     """Some rays from each pupil, and where they hit a window.
 
-    window: positions (u, v) [m] relative to the middle of the window, (beam, ray). They are the hit points of the rays,
-        moved outwards by the width of diffraction and, if they then lie outside the window, to its nearest side.
-    weight: weights of the rays, with a mean of 1, (beam, ray).
-    mean_sine: root mean square of the sines along an axis, (beam,).
+    window: positions (u, v) [m] of the light of the rays, relative to the middle of the window, (beam, ray). Each is
+        the point that the ray hits, moved outwards along both axes by the distance over which diffraction spreads the
+        light. Positions outside the window are then moved to the nearest side of the window.
+    weight: weights of the rays, with a mean of 1, (beam, ray). Rays that miss the window have a small weight.
+    mean_sine: weighted root mean square of the sines along an axis of the directions from the rays' points of the pupil
+        to the middle of the window, minus the sine of the pupil's centre, (beam,).
     """
 
     window: tuple[np.ndarray, np.ndarray]
@@ -67,10 +70,13 @@ class WindowRays:
 
     @classmethod
     def from_slopes(cls, slopes: StackSlopes, geometry: WindowGeometry) -> WindowRays:
-        """Return rays from points that are spread evenly over the disks.
+        """Return rays from points that are spread evenly over the disks of the pupils.
 
-        To first order, a ray hits the window at D/n times the slope of its path to the middle of the window, where D is
-        the distance from the ray's point of the pupil to this middle.
+        To first order, a ray hits the window at the position D/n · g relative to the middle of the window. g is the
+        gradient, over the pupil, of the optical path through a point of the pupil to this middle. D is the distance
+        between the two points, and n the refractive index behind the pupil.
+
+        slopes: gradients of the optical paths behind the pupils.
         """
         half, planned = geometry.half, geometry.rays(slopes.across)
         blur, pairs = planned.blur, zip((slopes.along_x, slopes.along_y), planned.at, strict=True)
@@ -88,13 +94,15 @@ def window_ranks(
     tolerance: np.ndarray,
     derivatives: Derivatives | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the necessary ranks, (beam,), and whether `cross_term` is necessary. Ranks above MOST_RANK become 0.
+    """Return the ranks with which the slow factor is accurate enough, and whether `cross_term` is needed, each (beam,).
 
-    The rank is sufficient at the end points of rays, around which the light arrives. If derivatives are requested,
-    light may move anywhere. The rank is then also sufficient on average over the whole window.
+    The rank is the number of points along an axis of the window between which the slow factor is interpolated, or 0 if
+    it would exceed MOST_RANK. With `cross_term`, it is 1. The interpolation is tested near the points where the rays
+    hit the window, because the light arrives there. If derivatives are requested, a change of the pupil may send light
+    to any point of the window. The error is then also tested on average over the whole window.
 
-    factor: the factor for the points of the pupils from which the rays come.
-    tolerance: tolerances, (beam,).
+    factor: slow factor, divided by its values along both axes, for the points of the pupils where the rays start.
+    tolerance: tolerances of the PSFs, (beam,).
     """
     half, path, directions = geometry.half, factor.path, factor.directions
     # The relative error of the intensity is twice that of the amplitude. A gradient contains the error of the amplitude
@@ -142,10 +150,14 @@ def interpolation_errors(
     nodes: np.ndarray,
     exact: np.ndarray,
 ) -> np.ndarray:
-    """Return the root mean square errors of the slow factor that is interpolated from nodes of the window, (beam,).
+    """Return the weighted root mean square errors of interpolating a factor between nodes of the window, (beam,).
 
-    place: positions (u, v) [m] relative to the middle of the window.
-    exact: the slow factor at these positions.
+    factor: the slow factor, by which the diffraction kernel differs from a Fourier kernel, divided by its values along
+        both axes.
+    place: positions (u, v) [m] relative to the middle of the window, at which the errors are computed.
+    weight: weights of the positions, with a mean of 1.
+    nodes: interpolation points along an axis [m], relative to the middle of the window.
+    exact: values of `factor` at the positions.
     """
     (u, v), total = place, np.zeros(1)
     if len(nodes) == 1:

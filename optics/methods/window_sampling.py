@@ -1,7 +1,9 @@
-"""The method "low_rank" at coarse tolerances, for a single PSF: as few samples of the pupil as its light needs.
+"""The method "low_rank" for a single PSF at coarse tolerances.
 
-The samples and the rank are those of a stack of one (`window_plan`). All of these values are estimates. Every PSF is
-therefore compared with a sum over finer samples in a few rows and columns (`window_check`).
+The pupil has only as many samples as the light that reaches the window requires. Their number, and the number of
+interpolation points in the window (the rank), are planned as for several PSFs at once (`window_plan`). Both numbers
+are estimates. Every PSF is therefore compared with a sum over finer samples in a few rows and columns of the window
+(`window_check`).
 """
 
 from __future__ import annotations
@@ -39,9 +41,14 @@ CROSSED_RANK = 3  # Rank 2 is less accurate than `cross_term`.
 
 @dataclass(frozen=True)
 class WindowSampling:
-    """Samples of the pupil, finer samples for the check, and the rank of the slow factor over the window.
+    """Samples of the pupil, from which a PSF over a window is summed, and finer samples that check the result.
 
-    crossed: whether `plain_intensity` includes `cross_term`. Other sums have at least the rank CROSSED_RANK instead.
+    The diffraction kernel of the sum is a Fourier kernel times a factor that varies slowly over the window, the slow
+    factor.
+
+    rank: number of points along an axis of the window between which the slow factor is interpolated.
+    crossed: True if `plain_intensity` approximates the slow factor with `cross_term`, without interpolation. The field
+        and intensities with derivatives are then interpolated, with a rank of at least CROSSED_RANK.
     half_width: distance [m] from the middle of the window within which the interpolation points lie.
     """
 
@@ -84,7 +91,11 @@ class WindowSampling:
         return recorded_field(light, beam.distance, sums, problem.window)
 
     def sums(self, path: Path, dtype: str) -> WindowSums:
-        """Return the arrays of the sums. The wavelength may be longer than the one that determined the samples."""
+        """Return the matrices with which `WindowSums` computes the field over the window from the light of the pupil.
+
+        path: wavelength, distance and window. The wavelength may be longer than the one that determined the samples.
+        dtype: "float32" or "float64".
+        """
         return _window_sums(
             self.pupil, max(self.rank, CROSSED_RANK) if self.crossed else self.rank, self.half_width, path, dtype
         )
@@ -108,7 +119,10 @@ class WindowSampling:
 
 
 def window_sampling(problem: Problem) -> WindowSampling | None:
-    """Return the samples for a coarse tolerance. The result is None if the method is not suitable."""
+    """Return the samples with which the method "low_rank" computes a PSF at a coarse tolerance.
+
+    The result is None if the tolerance is below TIGHTEST, or if the problem does not permit this way of sampling.
+    """
     fine = problem.tolerance < TIGHTEST or problem.reach is not None or math.isfinite(problem.widest_band)
     if fine or problem.all_light:
         return None

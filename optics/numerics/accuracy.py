@@ -113,7 +113,10 @@ class Plan:
 
 
 def above(error: float, tolerance: float) -> str:
-    """Return an error as text, with enough digits to show that it exceeds a tolerance: "0.0011" if that is 0.001."""
+    """Return an error as text, with enough digits to show that it exceeds a tolerance.
+
+    An error of 0.00108 becomes "0.0011" if the tolerance is 0.001.
+    """
     shown = (f"{error:.{digits}g}" for digits in range(1, 17))
     return next((text for text in shown if float(text) > tolerance), f"{error!r}")
 

@@ -97,7 +97,8 @@ def positive(
 def without_derivative(name: str, value: Any) -> Any:
     """Return `value`; ValueError about `name` if it, or an entry of it, carries a derivative, which would be lost.
 
-    The other checks of numbers include this check, except `pair`, `plain_reals` and those with carried=True.
+    The other functions of this module that check numbers call this one. Exceptions are `pair`, `plain_reals`, and calls
+    with carried=True, which accept derivatives.
     """
     if type(value) is float:
         return value  # fast path: planning calls this thousands of times
@@ -112,10 +113,7 @@ def without_derivative(name: str, value: Any) -> Any:
 
 
 def vacuum_wavelength(value: Any) -> float:
-    """Return `value` [m] as a float; ValueError unless it lies in [1e-15, 1].
-
-    The upper limit catches wavelengths in nanometres.
-    """
+    """Return `value` [m] as a float; ValueError unless it lies in [1e-15, 1]. Wavelengths in nanometres exceed 1."""
     wavelength = _number("wavelength", value)
     if not SMALLEST <= wavelength <= LONGEST_WAVE:
         raise ValueError(
@@ -165,7 +163,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
 
 
 def one_of(name: str, value: Any, options: Iterable[str]) -> str:
-    """Return `value`; ValueError about `name`, with a similar option if any, unless it is one of the options."""
+    """Return `value`; ValueError about `name` unless it is one of the options. The error may suggest a similar one."""
     known = tuple(options)
     if not isinstance(value, str) or value not in known:
         raise ValueError(
@@ -181,10 +179,7 @@ def did_you_mean(word: Any, known: Iterable[str], cutoff: float = 0.5) -> str:
 
 
 def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | None:
-    """Return the most similar known word, ignoring case.
-
-    None if difflib's ratio is below `cutoff` for all of them.
-    """
+    """Return the most similar known word, ignoring case; None if difflib's ratio is below `cutoff` for all words."""
     import difflib  # imported here, because only error messages need it
 
     plain = {option.lower(): option for option in known}
@@ -199,7 +194,10 @@ def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[f
 
 
 def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
-    """Return both entries of `value`, with derivatives; ValueError unless it has two (`what`, for the message)."""
+    """Return both entries of `value`, with their derivatives; ValueError about `name` unless it has two entries.
+
+    what: description of the two entries for the message, such as "lengths (x, y) [m]".
+    """
     try:
         x, y = value
     except (TypeError, ValueError):
@@ -233,7 +231,7 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
     """Return `value` as a float32 array (band, Y, X).
 
     Raises:
-        ValueError: the array has not `bands` bands, is smaller than `least`, or holds more than finite real numbers.
+        ValueError: the shape is not (`bands`, Y, X), Y or X is below `least`, or a value is not a finite real number.
     """
     radiance = reals("radiance", value).astype(np.float32)
     fits = radiance.ndim == 3 and radiance.shape[0] == bands

@@ -33,7 +33,14 @@ def fft_seconds(shape_in: Shape, period: int, shape_out: Shape, real: str) -> fl
 
 
 def fft_wins(shape_in: Shape, period: float, shape_out: Shape, real: str) -> bool:
-    """Return whether Fourier transforms compute the sum faster than products with matrices that are already known."""
+    """Return whether fast Fourier transforms compute a two-dimensional Fourier sum faster than products with matrices.
+
+    The time for computing these matrices is not counted.
+
+    shape_in, shape_out: numbers of rows and columns of samples, and of results.
+    period: period of the sum in samples. Transforms are possible only if it is a whole number.
+    real: type of real and imaginary parts, "float32" or "float64".
+    """
     if not float(period).is_integer():
         return False
     return fft_seconds(shape_in, int(period), shape_out, real) < products_seconds(shape_in, shape_out, real)

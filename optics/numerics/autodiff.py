@@ -82,7 +82,11 @@ def carries_derivative(value: Any) -> bool:
 
 
 def entries(row: Any) -> Any:
-    """Return a row of numbers whose entries carry its derivatives. A tensor of PyTorch is copied to the host once."""
+    """Return a row of numbers; a tensor of PyTorch that requires a gradient becomes a tuple of its entries.
+
+    Each entry is then a tensor of its own, through which gradients flow back to the row. The numbers of all entries are
+    copied to the host at once.
+    """
     if not of_torch(row) or row.ndim == 0:
         return row
     found = tuple(row)
@@ -97,9 +101,11 @@ def is_known(tensor: Array) -> bool:
 
 
 def keep_copy(tensor: Array, numbers: np.ndarray) -> None:
-    """Keep the numbers of a tensor of PyTorch, which never change, so that `plain` need not copy them from its device.
+    """Attach a copy of its numbers to a tensor of PyTorch, so that `plain` need not copy them from its device.
 
-    tensor: a tensor that no user has, since users may change theirs.
+    tensor: a tensor that only this package can reach. Users may change the numbers of their tensors, which
+        would make the copy wrong.
+    numbers: the numbers of the tensor, in the memory of the processor.
     """
     setattr(tensor, COPY, numbers)
 

@@ -132,7 +132,10 @@ def _cache_file() -> Path:
 
 
 def _cache_key(path: str) -> str:
-    """Return a cache key for this file and the versions of Dr.Jit and Python, since verdicts depend on them."""
+    """Return the key under which the test result of the LLVM library at `path` is cached.
+
+    The result depends on the file and on the versions of Dr.Jit and Python, so the key contains them.
+    """
     stat = os.stat(path) if os.path.exists(path) else None
     size, modified = (stat.st_size, stat.st_mtime_ns) if stat else (0, 0)
     return f"{path}|{size}|{modified}|drjit {_drjit_version()}|python {sys.version_info[:2]}"

@@ -1,4 +1,6 @@
-"""Bessel functions: J₀ of Dr.Jit arrays, and J_m of NumPy arrays, for which SciPy is imported only if they are large.
+"""Bessel functions: J₀ of Dr.Jit arrays, and J_m of NumPy arrays.
+
+J_m of a small array is computed without SciPy, whose import takes longer. SciPy computes J_m of a large array.
 
 Dr.Jit has no Bessel functions, so J₀ is computed from Chebyshev series, which are fitted once to SciPy's values.
 

@@ -23,7 +23,11 @@ Shape = tuple[int, int]
 
 
 def quarter(grid: Grid) -> Grid:
-    """Return the quarter of a centred grid, from its centre to the end of the longer sides."""
+    """Return the grid of one quarter of a centred grid, with n//2 + 1 of the n samples along each axis.
+
+    The quarter starts at the centre sample n//2. If n is even, one side of the centre has one more sample than the
+    other, and the quarter covers this longer side. Its coordinates are distances from the centre.
+    """
     height, width = (n // 2 + 1 for n in grid.shape)
     return Grid((height, width), grid.dx, (width // 2 * grid.dx, height // 2 * grid.dx))
 
@@ -35,9 +39,12 @@ def even_seconds(shape_in: Shape, shape_out: Shape) -> float:
 
 
 def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int = 0) -> Field:
-    """Return Σ_j u[j] exp(± 2πi j·k / period), as in `fourier.dft2`, for samples k of the quarter of `grid`.
+    """Return the Fourier sum of an even field u, Σ_j u[j] exp(± 2πi j·k / period), on one quarter of `grid`.
 
-    field: values u on the quarter of a plane of `shape` samples, or on some of its rows, which start at row `first`.
+    j and k are counted from the centre, as in `fourier.dft2`. The field and the result are stored only from the centre
+    sample to the end of the longer sides, see `quarter`.
+
+    field: u on the quarter of a plane of `shape` samples, or on some rows of this quarter, which start at row `first`.
     """
     types, (ny, nx), (my, mx) = field.types, shape, grid.shape
     quarters = field.evaluated().grid.shape

@@ -6,8 +6,8 @@
 
 The period may have any value, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT
 can be used instead. `dft2` selects the faster of the two by their predicted times (optics.numerics.cost). Dr.Jit's
-matrix product executes more operations per second, but SciPy's FFT needs fewer operations. Matrices are therefore
-faster for small windows, and the FFT is faster for large windows. In `dft2`, both are differentiable.
+matrix product executes more operations per second, but SciPy's FFT needs fewer, so matrices are faster for small
+windows, and the FFT for large ones. In `dft2`, both are differentiable.
 """
 
 from __future__ import annotations
@@ -109,9 +109,8 @@ def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> n
 
 
 def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
-    """Return u[j] exp(±2πi j·c / period), whose sum at samples k equals the sum of u at samples k + c.
+    """Return u[j] exp(±2πi j·c / period) for a field u. Its sum at samples k equals the sum of u at samples k + c.
 
-    field: u.
     by: ±c, (x, y), in samples of the output. Fractions are allowed.
     """
     types = field.types
@@ -123,8 +122,8 @@ def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
 def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
     """Return Σ_j u[j] exp(-2πi j·k / period) for a complex NumPy array u (y, x) that is at most one period wide.
 
-    The result is (fx, fy) in FFT order: `across` frequencies fx, which are `kept_indices(across)`, and `period`
-    frequencies fy. fy is the last axis, because transforms of contiguous lines are twice as fast.
+    The result is (fx, fy) in FFT order: all frequencies fy, but only the `across` frequencies fx nearest 0, which are
+    `kept_indices(across)`. fy is the last axis, because transforms of contiguous lines are twice as fast.
     """
     from scipy import fft
 
@@ -213,7 +212,10 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
 def _fft_of_parts(
     parts: tuple[np.ndarray, np.ndarray], period: int, to: tuple[int, int], sign: int, types: Precision
 ) -> tuple[Array, Array]:
-    """Return the sum over both axes, computed in blocks of lines because a padded plane exceeds the cache."""
+    """Return the Fourier sum of `dft2` by FFTs, as flat real and imaginary parts. `parts` are those of the field.
+
+    The FFTs are computed for blocks of lines, because a whole plane, padded to one period, exceeds the cache.
+    """
     from scipy import fft
 
     turned, norm = (fft.fft, None) if sign < 0 else (fft.ifft, "forward")
@@ -240,7 +242,7 @@ def _fft_of_parts(
 
 
 def _lines(n: int, period: int) -> list[slice]:
-    """Return slices that divide n lines, each one period long, into blocks."""
+    """Return slices that divide n lines of `period` samples into blocks, whose FFTs are computed together."""
     step = max(FEWEST_LINES, AT_A_TIME // period)
     return [slice(start, min(start + step, n)) for start in range(0, n, step)]
 

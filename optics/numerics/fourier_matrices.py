@@ -76,7 +76,11 @@ def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) 
 
 
 def by_halves(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """Return the sum of `by_whole_matrices`, computed from u[j] ± u[-j], first along x and then along y."""
+    """Return the same Fourier sum as `by_whole_matrices`, by real matrices with a quarter of the entries.
+
+    These are matrices of cosines, multiplied by u[j] + u[-j], and of sines, multiplied by u[j] - u[-j], for j >= 0. The
+    sum along x is computed first, then the sum along y.
+    """
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     cosine, sine = along_y = _quarter(types, mx, nx, period, sign)
     even, odd = _folded_columns(field)
@@ -110,10 +114,14 @@ def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
 
 
 def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
-    """Return the sums and the differences of rows j and -j, after the sum along x.
+    """Return the sums and the differences of rows j and -j of a field that is already summed along x.
 
-    across: sums along x in the form that `_both_sides` combines.
-    size: number of rows j and number of results along x.
+    Each is a list of the real and the imaginary part, (j, k), for j from 0 and frequencies k along x of both signs. At
+    j = 0, one of the two equal rows counts as 0.
+
+    across: four tensors (row, |k|): sums along x of the even part times cosines, real and imaginary, followed by sums
+        of the odd part times sines. `_both_sides` combines them for k of either sign.
+    size: number of rows of the field, and number of frequencies k.
     """
     ny, mx = size
     shape = ny // 2 + 1, mx

@@ -30,7 +30,7 @@ class KeptValues:
         return len(self._values)
 
     def get(self, key: Hashable, compute: Callable[[], Any]) -> Any:
-        """Return the value of a key. `compute` returns it if it is not kept."""
+        """Return the value that is kept for a key. If there is none, call `compute`, and keep the result if it fits."""
         with self._lock:
             if key in self._values:
                 self._values.move_to_end(key)

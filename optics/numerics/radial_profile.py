@@ -64,19 +64,23 @@ class RadialProfile:
 
     @property
     def is_table(self) -> bool:
-        """True if the image is computed at the positions of the table."""
+        """True if the image is computed at the radii of the evenly spaced table, not at Chebyshev points."""
         return self.points == self.table + TAPS - 1
 
     def pays(self, outputs: int) -> bool:
-        """Return whether computation along the radius needs fewer points than the window has samples (`outputs`).
+        """Return whether the image is computed at fewer radii here than the window has samples (`outputs`).
 
-        It may need more for a window far off the axis, which contains only a small part of the radii up to the rim.
+        The radii always extend from the axis to `rim`. A window far off the axis contains only a small part of this
+        range, so it may have fewer samples than there are radii.
         """
         return self.points < outputs
 
     @property
     def entries(self) -> int:
-        """Number of entries of the matrix that maps points to the table; 0 if `is_table`."""
+        """Number of entries of the matrix that interpolates the image from Chebyshev points to the evenly spaced table.
+
+        It is 0 if `is_table`, because no matrix is then needed.
+        """
         return 0 if self.is_table else self.points * self.table
 
     @property
@@ -164,7 +168,11 @@ _small_distinct, _large_distinct = (lru_cache(maxsize=count)(_distinct) for coun
 
 
 def _places(table: int) -> np.ndarray:
-    """Return the positions of the table in units of the rim."""
+    """Return the radii of an evenly spaced table, as fractions of the radius of the image's rim.
+
+    `table` values extend from 0, the axis, to 1, the rim. Another 3 lie beyond the axis (negative radii), and 4 beyond
+    the rim.
+    """
     found: np.ndarray = np.arange(-BESIDE, table + BESIDE + 1) / (table - 1)
     return found
 

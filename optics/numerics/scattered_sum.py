@@ -70,7 +70,12 @@ class ScatteredSum:
         return found
 
     def _factor(self) -> np.ndarray:
-        """Return the phase factor of the cells' position, divided by the transform of the spreading kernel, (y, x)."""
+        """Return the factors (y, x) that convert the Fourier transform of the stored cells to the sums.
+
+        The points are spread over cells, the squares of a grid finer than that of the sums. Each factor is a phase
+        factor for the position of the stored cells on this finer grid, divided by the Fourier transform of the
+        spreading kernel.
+        """
         axes = []
         for first, n in zip(self.first, self.shape, strict=True):
             turns = (np.arange(n) - n // 2) * first / self.period
@@ -88,7 +93,10 @@ def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
     types = precision("float64")
 
     class SumsAt(dr.CustomOp):
-        """Sums at the points as a differentiable operation. The adjoint is the real part of the sum at the samples."""
+        """`ScatteredSum.at`, which maps grid samples to sums at scattered points, as a differentiable operation.
+
+        The samples are real, so the adjoint is the real part of `ScatteredSum.evaluate`, which maps points to samples.
+        """
 
         def eval(self, samples: Array) -> tuple[Array, Array]:
             found = sums.at(samples.numpy().reshape(-1, *sums.shape))
@@ -115,7 +123,12 @@ def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.
 
 @lru_cache(maxsize=64)
 def _transform(width: int, period: int, n: int) -> np.ndarray:
-    """Return the transform of the spreading kernel at the n samples of the sum."""
+    """Return the Fourier transform of the kernel that spreads a point over cells, for one axis.
+
+    width: width of the kernel in cells.
+    period: number of cells in the finer, periodic grid.
+    n: number of samples k of the Fourier sums along this axis, which are the frequencies of the result.
+    """
     node, weight = gauss_legendre(TRANSFORM_NODES)
     z, weight = 2 * node - 1, width * weight
     shape = weight * np.exp(SLOPE * width * (np.sqrt(1 - z * z) - 1))

@@ -27,10 +27,12 @@ DIGITS = 4.0  # choice: digits of amplitudes
 
 @dataclass(frozen=True)
 class AcceptanceFunction(ReadOnlyArrays):
-    """Fraction that a rhabdom absorbs of a distant point source's light on its facet, for a grid of directions.
+    """Sensitivity of an ommatidium to the direction of a distant point source, on a grid of directions.
 
-    sines: sines of the source's direction along x and y, ascending, (n,). Both axes have the same sines.
-    values: fraction for each wavelength, (band, y, x); 0 outside the unit circle.
+    The sensitivity is the fraction of the light incident on the facet that the rhabdom absorbs.
+
+    sines: sines of the source's direction along x and along y, which are the same for both axes, ascending, (n,).
+    values: sensitivity for each wavelength, 0 outside the unit circle, (band, y, x).
     """
 
     sines: np.ndarray
@@ -53,18 +55,19 @@ class AcceptanceFunction(ReadOnlyArrays):
 
 
 def acceptance_function(ommatidium: Ommatidium, wavelengths: np.ndarray, loss: float = 5e-3) -> AcceptanceFunction:
-    """Return the acceptance function of an ommatidium.
+    """Return the acceptance function of an ommatidium: its sensitivity on a grid of directions.
 
-    Calls with the same ommatidium and equal other arguments return the same object. The grid is widened until it
-    contains all but the fraction `loss` of the light that the modes accept from all directions, at each wavelength. Its
-    half width is at most a sine of 0.5, so wider fields lose more.
+    Calls with the same ommatidium and equal other arguments return the same object. The grid is widened until, at each
+    wavelength, it contains all but the fraction `loss` of the light that the modes accept from all directions. It
+    extends at most to sines of ±0.5 along each axis. If the ommatidium accepts light from a wider field, the grid
+    misses more light than `loss`.
 
     wavelengths: vacuum wavelengths [m], (band,).
     loss: fraction in [1e-5, 0.1].
 
     Raises:
         ValueError: an argument is outside its valid range, the rhabdom guides no mode, or see `Waveguide.modes`. The
-            pupil has a relief of pixels, or a number of it carries a derivative.
+            pupil has a relief of pixels, or one of the pupil's parameters carries a derivative.
     """
     of_kind("ommatidium", ommatidium, Ommatidium, "Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6))")
     at = tuple(float(one) for one in wavelength_row(wavelengths))

@@ -55,7 +55,9 @@ class Ommatidium:
         return self.lens.pupil() if isinstance(self.lens, FacetLens) else self.lens
 
     def _beam(self, wavelength: float) -> Beam:
-        """Return axial light of a vacuum wavelength [m], from the lens to the end of the rhabdom that faces it.
+        """Return light that travels along the axis, from the lens to the near end of the rhabdom.
+
+        wavelength: vacuum wavelength [m].
 
         Raises:
             ValueError: the principal plane of the lens lies behind the end of the rhabdom.
@@ -71,17 +73,19 @@ class Ommatidium:
         return self.rhabdom.modes(wavelength)
 
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Return the fraction of a distant point source's light on the facet that enters each mode, (mode, ...).
+        """Return the fraction of the light on the facet that enters each mode, for a distant point source, (mode, ...).
 
-        angle_x, angle_y: angles [rad] between the axis of the lens and the direction of the source, projected onto the
-            planes (x, z) and (y, z). The light travels in the opposite direction, so its `PointSource` has the negative
-            angles. The arrays are broadcast together, to the shape (...).
+        Here ... is the shape to which the angles are broadcast.
+
+        angle_x, angle_y: angles [rad] from the axis of the lens to the direction in which the source lies, projected
+            onto the planes (x, z) and (y, z). A `PointSource` instead has the angles of the direction in which its
+            light travels, so the source at these angles is a `PointSource` with the negative angles.
         wavelength: vacuum wavelength [m].
 
         Raises:
             ValueError: an angle has a sine above 0.5 or below -0.5, the shapes of the angles cannot be broadcast, or
-                the rhabdom has no modes. The pupil has a relief of pixels, or a number of it carries a derivative. See
-                also `Waveguide.modes`.
+                the rhabdom has no modes. The pupil has a relief of pixels, or one of the pupil's parameters carries a
+                derivative. See also `Waveguide.modes`.
         """
         x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)
         try:
@@ -99,9 +103,10 @@ class Ommatidium:
         return found.reshape(len(found), *x.shape)
 
     def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Return the fraction that the rhabdom absorbs of a distant point source's light on the facet.
+        """Return the fraction of the light on the facet that the rhabdom absorbs, for a distant point source.
 
-        angle_x, angle_y: see `mode_power`. The result has the shape to which both broadcast.
+        angle_x, angle_y: see `mode_power`. The result has the shape to which both are broadcast.
+        wavelength: vacuum wavelength [m].
 
         Raises:
             ValueError: see `mode_power`.
@@ -185,8 +190,9 @@ def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wave
     waveguide.
 
     diameter, rhabdom: diameters D of the facet and d of the rhabdom [m].
-    focal_length: focal length f [m] in front of the lens, the index there divided by the power of the lens.
-    wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
+    focal_length: focal length f [m] in front of the lens. It is the refractive index of the medium in front of the
+        lens, divided by the power of the lens.
+    wavelength: vacuum wavelength λ [m], for an eye in air. For an eye under water, divide it by the index of water.
 
     Raises:
         ValueError: a length is not positive, or the wavelength is above 1 m.

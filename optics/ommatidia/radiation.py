@@ -69,9 +69,15 @@ def radiated(
 
 
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return a function that maps a mode's index to its G D² at points with the distances D = z/cos θ.
+    """Return a function that maps a mode's index to values of G D², for a waveguide on the pupil's axis.
 
-    The values are interpolated linearly between closely spaced points. G is defined at the top of the module.
+    Each value belongs to a point of the pupil. D is its distance from the waveguide's end, and G(sin θ, D) is the
+    integral over that end, defined at the top of the module, which determines the radiated field. Here, D is z/cos θ
+    with the distance z of the end from the pupil, so G depends on θ alone. The values are interpolated linearly between
+    closely spaced points.
+
+    sine, distance: sin θ and D of the points, (point,).
+    k: wavenumber [1/m].
     """
     z = float((distance * np.sqrt(1 - sine**2)).mean())
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
@@ -88,9 +94,14 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return a function that maps a mode's index to its G D² at points with arbitrary sines and distances D.
+    """Return a function that maps a mode's index to values of G D², for a waveguide off the pupil's axis.
 
-    G is defined at the top of the module.
+    Each value belongs to a point of the pupil. D is its distance from the waveguide's end, and G(sin θ, D) is the
+    integral over that end, defined at the top of the module, which determines the radiated field. G is interpolated in
+    sin θ and in 1/D, which are independent of each other.
+
+    sine, distance: sin θ and D of the points, (point,).
+    k: wavenumber [1/m].
     """
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
     nearness = (1 - CLEAR) / float(distance.max()), (1 + CLEAR) / float(distance.min())
@@ -105,9 +116,14 @@ def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: f
 
 
 def _in_guide_frame(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
-    """Return sin θ, φ and D of points of a pupil, in the frame of the waveguide's end.
+    """Return sin θ, φ and D, the spherical coordinates of points of a pupil about the waveguide's end, each (point,).
 
-    This frame is the pupil's frame, rotated along the shortest arc from the pupil's axis to the waveguide's axis.
+    θ is the angle from the waveguide's axis, φ the azimuth about this axis, and D the distance [m] from the centre of
+    the waveguide's end. The azimuth is counted in the pupil's frame after a rotation along the shortest arc from the
+    pupil's axis to the waveguide's axis.
+
+    x, y: positions [m] of the points on the pupil.
+    end: position (x, y, z) [m] of the waveguide's end.
     """
     there = np.stack([x - end[0], y - end[1], np.full(len(x), -end[2])])
     axis, normal = -np.array(end) / math.hypot(*end), np.array([0.0, 0.0, -1.0])
@@ -130,7 +146,14 @@ def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
 
 
 def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> np.ndarray:
-    """Return G D² at places (sin θ, D), (mode, place), by quadrature. G is defined at the top of the module."""
+    """Return values of G D² by quadrature over the modes' fields, for pairs of sin θ and D, (mode, pair).
+
+    G(sin θ, D) is the integral, defined at the top of the module, that determines the field which a mode radiates to
+    the distance D at the angle θ from the waveguide's axis.
+
+    sine, distance: sin θ and D [m] of each pair, (pair,).
+    k: wavenumber [1/m].
+    """
     u, v, weight = _mode_nodes(modes, k * float(sine.max()))
     # G is the same for the modes with sin lφ and with cos lφ. Only the cosine is nonzero at φ = 0, so it is used.
     amplitude = np.stack([weight * replace(mode, sine=False).field(u, v) for mode in modes], axis=1)

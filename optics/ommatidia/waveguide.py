@@ -95,18 +95,20 @@ class Waveguide:
 
     In a taper, light enters the modes of the tip, and each mode keeps its light while it becomes the local mode of the
     thinner guide (Snyder & Love, ch. 19). A mode that reaches its cut-off loses its remaining light. This model holds
-    for slow tapers, whose radius shrinks by less than itself over a beat length 2π/(β₁ - β₂). β₁ belongs to the mode
-    LP01, and β₂ to LP02 or, without it, to the surroundings (Love et al., IEE Proc. J 138, 343, 1991). Tapers that are
-    too fast at the tip are refused.
+    for slow tapers: the slope of the radius b along the guide is at most b divided by the beat length 2π/(β₁ - β₂). β₁
+    is the propagation constant of the mode LP01, and β₂ that of LP02 or, if LP02 is not guided, of light in the
+    surroundings (Love et al., IEE Proc. J 138, 343, 1991). Tapers that are too fast at the tip are refused.
 
     diameter: diameter [m] of the core at the tip, where light enters.
     n_core, n_clad: refractive indices of core and surroundings, constant or dispersive. The index of the core should be
         only slightly larger, because modes are computed for weak guiding.
     length: length [m] over which light is absorbed (None: all guided light is absorbed).
     absorption: absorption coefficient of the core [1/m] at the pigment's peak. A mode loses the fraction 1 -
-        exp(-absorption · core_share · length) of its light.
-    proximal_diameter: diameter [m] of the core at its far, proximal end, at most `diameter` (None: equal to it). In
-        between, the diameter is linear, and core_share is averaged over the length on which the mode is guided.
+        exp(-absorption · core_share · length) of its light, where `Mode.core_share` is the fraction that travels in the
+        core.
+    proximal_diameter: diameter [m] of the core at its far, proximal end, at most `diameter` (None: equal to it). The
+        diameter falls linearly between the ends, and core_share is averaged over the length on which the mode is
+        guided.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -191,11 +193,12 @@ class Waveguide:
         return self.length if end > mode.cut_off or end == v else self.length * (v - mode.cut_off) / (v - end)
 
     def absorbed(self, mode: Mode) -> float:
-        """Return the fraction of a mode's light that is absorbed along the length, or up to its cut-off.
+        """Return the fraction of a mode's light that the waveguide absorbs; 1 if `length` is None.
 
-        It is 1 if `length` is None.
-
-        For a taper, the mean of core_share comes from a quadrature over the length, with an error below 2e-6.
+        The light of a mode is absorbed along the whole length or, in a taper that becomes too narrow for the mode, only
+        up to this place, the mode's cut-off. The absorption per length is proportional to `Mode.core_share`, the
+        fraction of the light that travels in the core. In a taper, this fraction changes along the guide. Its mean is
+        computed by quadrature, with an error below 2e-6.
         """
         if self.length is None:
             return 1.0

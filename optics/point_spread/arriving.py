@@ -106,12 +106,13 @@ def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
 
 
 def _at_edge(request: Request) -> Array:
-    """Return the evanescent light that the aperture's edge diffracts, relative to that for rays parallel to the axis.
+    """Return the factor by which oblique rays increase the evanescent light that the aperture's edge diffracts.
 
-    A point of the edge spreads its light along the line s + t n of frequencies, in units of 1/λ. Here s is the
-    frequency of the ray, and n is the normal of the edge. The power of this light is proportional to 1/t². The line
-    leaves the unit circle at t = -s·n ± √((s·n)² + 1 - s²). The power outside the circle is √((s·n)² + 1 - s²) / (1 -
-    s²) times the power for s = 0. The result is the mean over the edge.
+    The factor is 1 for rays parallel to the axis. A point of the edge spreads its light along a line of spatial
+    frequencies, s + t n, in units of 1/λ. Here s is the frequency of the ray at this point, and n is the normal of the
+    edge. The power of this light is proportional to 1/t². The line leaves the unit circle, beyond which light is
+    evanescent, at t = -s·n ± √((s·n)² + 1 - s²). The power outside the circle is √((s·n)² + 1 - s²) / (1 - s²) times
+    the power for s = 0. The result is the mean of this factor over the edge.
     """
     import drjit as dr
 
@@ -190,10 +191,10 @@ class _Sum:
         """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ and the pupil's radius R.
 
         W is the optical path in waves. The outer sum is over the frequencies (sx, sy) of weight w, the inner sum over
-        the pupil's nodes with amplitudes u.
+        the pupil's nodes (x, y) with amplitudes u.
 
-        Derivatives come from the adjoint of the sum, which consists of three sums of the same size. It is computed only
-        if a number of the beam carries a derivative.
+        Derivatives come from the adjoint of the sum, which consists of three sums of the same size. The adjoint is
+        computed only if h, W or u carries a derivative.
         """
         import drjit as dr
 
@@ -217,11 +218,15 @@ class _Sum:
 
     @staticmethod
     def _slopes(at: Sequence[Array], places: Sequence[Array], back: Sequence[Array], total: Array) -> tuple[Array, ...]:
-        """Return the derivatives of `fraction` with respect to h, and to the waves and the amplitudes of the nodes.
+        """Return the derivatives of `fraction`, the power inside a circle, with respect to h, to each W and to each u.
 
-        at: h, waves and amplitudes
-        places: x, y of the nodes, and sx, sy of the frequencies
-        back: w times the conjugate of the spectrum at each frequency, real and imaginary part
+        h is the radius of the pupil divided by the wavelength. W is the optical path [waves] and u the amplitude at a
+        node of the pupil. The spectrum at a frequency is the inner sum of `fraction`, over the nodes.
+
+        at: h, and W and u of all nodes.
+        places: coordinates x, y of the nodes, followed by the coordinates sx, sy of the frequencies.
+        back: conjugate of the spectrum times the weight w of the frequency, as real and imaginary part.
+        total: the value of `fraction`.
         """
         import drjit as dr
 

@@ -38,14 +38,16 @@ __all__ = ["PSFBatch", "psf_batch"]
 
 @dataclass(frozen=True, eq=False)
 class PSFBatch(OnWindow):
-    """PSFs of many eyes.
+    """PSFs of many eyes, at several source distances (depths) and wavelengths.
 
-    tensor: PSFs [1/m²] as a Dr.Jit tensor (eye, depth, wavelength, y, x) with derivatives.
+    tensor: PSFs [1/m²] as a Dr.Jit tensor with derivatives, (eye, depth, wavelength, y, x).
     psf: the same as a NumPy array.
     dx: pitch [m] of the samples.
     plans: one plan per PSF, in the same order, as a flat tuple.
-    members: light of each PSF, in the order of `plans`.
-    setup: parameters that all PSFs share, with the source and the sensor's distance of the first PSF.
+    members: the light from which each PSF was computed (pupil, source, wavelength and sensor's distance), in the order
+        of `plans`.
+    setup: window, tolerance, method and dtype, which all PSFs share. Its source and its sensor's distance are those of
+        the first PSF only.
 
     See PSFResult for conventions.
     """
@@ -178,9 +180,10 @@ def _members(
 def _joined(
     known: dict[int, tuple[np.ndarray, Plan]], rest: dict[int, tuple[Array, Plan]], types: Precision
 ) -> tuple[Array, list[Plan]]:
-    """Return all PSFs in one array, and their plans.
+    """Return all PSFs as one flat array in the order of their indices, and their plans in the same order.
 
-    known, rest: PSFs of stacks, and all other PSFs, by index.
+    known: PSF and plan, by index, of the PSFs that were computed together as stacks of matrix products.
+    rest: PSF and plan, by index, of all other PSFs, which were computed one by one.
     """
     import drjit as dr
 

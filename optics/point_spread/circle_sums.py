@@ -54,9 +54,14 @@ class SoftCircles:
 
     @classmethod
     def around(cls, distance: np.ndarray, radii: np.ndarray, kernel: SoftEdge) -> SoftCircles:
-        """Return the sums over samples at these distances (sample,) for circles of these radii (radius,).
+        """Return the matrices for weighted sums over samples within circles about one centre.
 
-        Distances and radii are in units of 1/cutoff, where the cutoff is the intensity's highest frequency.
+        Distances and radii are in units of 1/cutoff, where the cutoff is the highest frequency of the intensity that is
+        summed.
+
+        distance: distance of each sample from the centre, (sample,).
+        radii: radius of each circle, (radius,).
+        kernel: kernel that softens the edges of the circles.
         """
         from scipy.special import j0, j1
 
@@ -78,7 +83,12 @@ class SoftCircles:
         return np.asarray((self.radii @ (spectrum @ self.from_spectrum).T).T)
 
     def transposed(self, sums: np.ndarray) -> np.ndarray:
-        """Return Σ_R u_R w(ρ_j, R) at every sample (row, sample), for u (row, radius)."""
+        """Return Σ_R u_R w(ρ_j, R) for every sample j, the transpose of `evaluate`, (row, sample).
+
+        w(ρ_j, R) is the weight of sample j, at the distance ρ_j from the centre, in the sum for the circle of radius R.
+
+        sums: values u_R, one for each circle, (row, radius).
+        """
         spectrum = (self.radii.T @ sums.T).T @ self.from_spectrum.T
         found = np.zeros((len(sums), self.size))
         found[:, self.near] = (self.samples @ (spectrum @ self.to_spectrum.T).T).T

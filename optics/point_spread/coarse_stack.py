@@ -32,8 +32,9 @@ def coarse_stack(
 
     The result is None if other methods are faster, or must be used.
 
-    stack: the light, whose numbers may carry derivatives of PyTorch. If they are on another device than the processor,
-        it computes PSFs and errors. Only the inputs of `without`, the places of the check and the errors are copied.
+    stack: the light, whose numbers may carry derivatives of PyTorch. If these numbers are on a GPU, the GPU computes
+        the PSFs and their errors. The processor then receives only the inputs of `without`, the errors, and the
+        positions in the window at which PSFs are compared with a finer sum to find the errors.
     without: the same light without derivatives, for NumPy.
     tolerance, method: see `optics.psf`.
     """

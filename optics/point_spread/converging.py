@@ -178,11 +178,12 @@ class Converging(ReadOnlyArrays):
         return replace(self.beam, pupil=RayField(self.beam, 0, weights).pupil)
 
     def _errors(self, problem: Problem, fields: dict[Weights, np.ndarray]) -> float | None:
-        """Return the largest relative error of fields (y, x), by comparison with the direct sum.
-
-        fields: each field, with the weights of the mask behind which it propagates, see `RayField`.
+        """Return the largest relative error of several fields, by comparison with the direct sum.
 
         The result is None if the comparison would take too long.
+
+        fields: the fields to be checked, (y, x). Each key states the light to which the field belongs: the weights of
+            the `RayField` that is the mask of its pupil.
         """
         errors = [
             spot_check(self._behind(weights), problem, np.abs(field.ravel()) ** 2, CHECK_SECONDS)
@@ -195,17 +196,18 @@ class Converging(ReadOnlyArrays):
 class VectorFocus(ReadOnlyArrays):
     """The electric field about an image.
 
-    intensity: |Ex|², |Ey|², |Ez|² divided by the pupil's area, (3, y, x) [1/m²]. These are the excitations of molecules
+    intensity: |Ex|², |Ey|², |Ez|² divided by the pupil's area [1/m²], (3, y, x). These are the excitations of molecules
         with a dipole along x, y or z.
-    scalar: the PSF of scalar theory, (y, x) [1/m²].
+    scalar: the PSF of scalar theory [1/m²], (y, x).
     dx: pitch [m] of the samples.
-    field: Ex, Ey, Ez [1/m], (3, y, x), without the carrier e^{ikz}. Their squared moduli are `intensity`. None unless
+    field: Ex, Ey, Ez [1/m] without the carrier e^{ikz}, (3, y, x). Their squared moduli are `intensity`. None unless
         the light is fully polarised.
     parts: one or two such fields that do not interfere and add up to the light, (part, 3, y, x).
     centre: (x, y) [m] of sample n//2.
     polarization: Stokes parameters of the light in front of the pupil, divided by the first.
     plan: method and predicted error, the relative L2 error of the intensity over the window.
-    towards: the light from which the field can be recomputed. None if `vector_focus` did not compute the field.
+    towards: the light that converges towards the image, from which the field can be computed again over other windows.
+        None if `vector_focus` did not compute the field.
     """
 
     intensity: np.ndarray

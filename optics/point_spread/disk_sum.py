@@ -1,4 +1,7 @@
-"""Light on a round receptor: sums over samples that equal integrals over a sharp disk, and the errors of the sums."""
+"""Integrals of light over a round receptor, computed as weighted sums over samples, and their errors.
+
+The weights are chosen so that a sum over samples equals the integral over a disk with a sharp edge.
+"""
 
 from __future__ import annotations
 
@@ -100,7 +103,15 @@ def _kernel(dx: float, cutoff: float) -> SoftEdge:
 
 
 def _around(light: VectorFocus, towards: Converging, middle: tuple[float, float], radius: float) -> VectorFocus:
-    """Return light whose samples are fine enough and extend beyond the disk by the reach of the kernel.
+    """Return light on samples from which the integral over a disk can be computed as a weighted sum.
+
+    Their pitch is at most FINE/cutoff, where the cutoff is the highest frequency of the intensity. They extend beyond
+    the disk by the radius of the kernel that softens the disk's edge, because the weights are nonzero up to there. If
+    the given light has other samples, it is computed again.
+
+    light: the light on its samples.
+    towards: the light that converges towards them.
+    middle: centre (x, y) [m] of the disk.
 
     Raises:
         AccuracyError: too many samples are needed, or they cannot be computed.

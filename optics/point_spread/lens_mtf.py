@@ -1,4 +1,4 @@
-"""Contrast of a lens from another program in light of several wavelengths, through focus."""
+"""Contrast of a lens through focus, in light of several wavelengths, from exit pupils that another program computed."""
 
 from __future__ import annotations
 

@@ -63,7 +63,10 @@ class LightBatch:
 
     @property
     def members(self) -> list[tuple[Pupil, Scalar | None, Scalar]]:
-        """Pupil, sensor's and source's distance [m] of all PSFs, by pupil and then by distance."""
+        """The light of each PSF: its pupil, and the distances [m] of the sensor and of the source.
+
+        The list contains all pairs of distances for the first pupil, then all pairs for the next.
+        """
         return [(pupil, sensor, source) for pupil in self.pupils for sensor, source in self.distances]
 
     def images(self, places: Sequence[int], wavelengths: np.ndarray, view: Mapping[str, Any]) -> Array:
@@ -87,9 +90,15 @@ class LightBatch:
         view: Mapping[str, Any],
         convert: Callable[[np.ndarray], Array],
     ) -> dict[int, Array]:
-        """Return {index of a member: its PSFs (wavelength, y, x)} for members that stacks compute accurately enough.
+        """Return the PSFs of those members that can be computed together, in stacks, with an error below the tolerance.
+
+        The result maps the index in `members` to the PSFs of a pupil at its distances, (wavelength, y, x). A stack is
+        light through one pupil from several sources, whose PSFs follow from one plan. Members that miss the tolerance
+        at any wavelength are left out.
 
         fixed: the same light without derivatives.
+        wavelengths: vacuum wavelengths [m], (wavelength,).
+        view: arguments of `optics.psf` for the window, the tolerance and the method.
         convert: see `stacks`.
         """
         found: dict[int, Array] = {}

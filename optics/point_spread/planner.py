@@ -94,7 +94,8 @@ class Weighing:
 
     least: shortest possible time of a PSF [s].
     per_sample: time per sample of the window [s].
-    asking: time [s] that planning the method's samples takes (choice).
+    asking: assumed time [s] to plan the method's samples. Where these are usually planned in vain, the value is larger
+        than the actual time, so that the method is tried less often.
     """
 
     least: float
@@ -128,8 +129,9 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     """Return the plan and the fastest sampling that meets the problem's tolerance. Plans are cached.
 
     method: "auto" compares all methods that may save time (for derivatives, only exact ones), "exact" only exact
-        methods, and "field" only exact methods with a complex field. A method's name selects that method. Its sampling
-        must then meet the tolerance, but the error of an approximation may exceed it.
+        methods, and "field" only exact methods with a complex field. A method's name selects that method alone. If it
+        is an approximation, only the error due to its samples must be within the tolerance. The error of the
+        approximation itself may be larger.
 
     Raises:
         ValueError: the method is unknown.
@@ -186,7 +188,7 @@ def _sampling_error(problem: Problem) -> float:
 
 
 def _seconds(option: Sampling, problem: Problem) -> float:
-    """Return the time of the whole PSF: the plan, the sum for the method, the window and the spot check."""
+    """Return the time [s] of a whole PSF: to plan it, compute it by a method, copy it and check some of its points."""
     call = PSF_CALL["window" if isinstance(option, WindowSampling) else "other"]
     return call + option.seconds + window_seconds(problem) + check_seconds(problem, option)
 
@@ -228,7 +230,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
 
 
 def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
-    """Return the part of a plan's reason that concerns derivatives; empty if none are requested."""
+    """Return how derivatives affected the choice of the method, in words; empty if none are requested."""
     if not problem.differentiated:
         return ""
     if best.model_error:

@@ -37,8 +37,9 @@ def psf(
 ) -> PSFResult:
     """Return the PSF |U|² / (pupil area) of a pupil. U is the field on the sensor for incident light of amplitude 1.
 
-    wavelengths: one or several wavelengths [m] in vacuum. With eight or more, each wavelength uses the method of the
-        preceding one, unless this method is an approximation, too inaccurate or much slower.
+    wavelengths: one or several wavelengths [m] in vacuum. With eight or more, each wavelength uses the same method as
+        the preceding one, to save the comparison of methods. Methods are compared again if the preceding one was an
+        approximation, if it does not meet the tolerance, or if it would take much longer than before.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         images the source, or 240 µm without such a lens.
     source_distance, source_angle: distance [m] of the source, and direction (x, y) [rad] of its light, see PointSource.

@@ -1,4 +1,4 @@
-"""A PSF over a window. It can be recomputed over other windows if a measure needs finer or wider samples.
+"""A PSF over a window. It can be recomputed over other windows if a result needs finer or wider samples.
 
 A pupil of radius R illuminates a point of the sensor, at the distance z, with rays whose sines differ by at most
 2R/√(R² + z²). The highest frequency of the intensity is therefore f_c = 2R/(λ√(R² + z²)), with the wavelength λ behind
@@ -49,13 +49,14 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
         that arrives there; evanescent light, for example, does not. The PSF is never renormalised.
     plans: one plan per wavelength; `plan` is the least accurate one.
-    requests: one per wavelength, or per component of a mean. Measures recompute the PSF from them. Empty: unknown.
-    shares: weight of each request in a mean over wavelengths (see `mean`), (request,). None: it is not a mean.
+    requests: parameters with which functions such as `optics.strehl_ratio` recompute the PSF on other samples, one for
+        each wavelength, or for each that a mean combines (see `mean`). Empty if the parameters are unknown.
+    shares: weight of each request in a mean over wavelengths, (request,). None if the PSF is no such mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
         derivatives; None for means, and unless `psf` was called with field=True. The amplitude [1/m] has the carrier
         exp(ikz), and its squared modulus is the PSF. `field` is the same as one complex NumPy array.
     for_window: True if the samples of the pupil suffice only for the light in the window. Errors of sums over dark
-        parts may then exceed their bound, so measures recompute the PSF from finer samples if possible.
+        parts may then exceed their bound, so functions that sum the PSF recompute it from finer samples if possible.
     """
 
     tensor: Array
@@ -99,12 +100,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def power(self) -> np.ndarray | Array:
         """Fraction of the pupil's power inside the window, (wavelength,).
 
-        The window extends half a cell beyond the outermost samples. If the samples are too coarse for a sum, finer
-        samples are computed.
+        The window extends dx/2 beyond the outermost samples. If samples are too coarse for a sum, finer ones are found.
 
         Raises:
-            AccuracyError: the samples are too coarse, and finer ones cannot be computed. The message states which
-                samples are sufficient.
+            AccuracyError: samples are too coarse, and finer ones cannot be computed. The message states which suffice.
         """
         return self._resolved.window_sums
 
@@ -112,8 +111,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def power_error(self) -> np.ndarray:
         """Predicted error of `power`, (wavelength,). It raises the same exceptions as `power`.
 
-        It includes the error of the PSF and half of the power of the outermost samples, because samples at points
-        define the position of the window's rim only to within a cell. Means over cells need only the first part.
+        It includes the error of the PSF. If samples are values at points, it also includes half of the power of the
+        outermost samples, because the sum of such samples does not define exactly where the window ends.
         """
         seen = self._resolved
         image = seen.psf.astype(np.float64)
@@ -131,7 +130,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def holds_cells(self) -> bool:
-        """True if samples are means over cells, whose sums are exact; False if they are values at points."""
+        """True if each sample is the mean over a square (cell) of side dx; False if it is the value at a point."""
         return all(plan.method in OF_CELLS for plan in self.plans)
 
     @property
@@ -159,7 +158,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def can_recompute(self) -> bool:
-        """True if the requests of the PSF are known; False for a PSF that `psf` did not compute."""
+        """True if the PSF can be recomputed on other samples; False if `optics.psf` did not compute it."""
         asked = [request.beam.wavelength for request in self.requests]
         if self.shares is None:
             return asked == list(self.wavelengths)
@@ -167,7 +166,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def highest_cutoff(self) -> float:
-        """Highest frequency [1/m] of the intensity of all PSFs, including the known components of a mean."""
+        """Highest frequency [1/m] of the intensity at any wavelength, including those that a mean combines if known."""
         if self.shares is None or not self.can_recompute:
             return float(self.cutoff.max())
         shortest = min(request.beam.wavelength for request in self.requests)
@@ -176,7 +175,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def mean(self, shares: np.ndarray) -> PSFResult:
         """Return the PSF of light of all wavelengths at once, (1, y, x), with derivatives; its wavelength is the mean.
 
-        shares: fraction of each wavelength in the light, (wavelength,). They sum to 1. A mean is returned unchanged.
+        shares: fraction of each wavelength, with the sum 1, (wavelength,). A PSF that is already a mean is unchanged.
 
         Raises:
             ValueError: shares are not real numbers, or have the wrong shape or sum.
@@ -199,7 +198,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         )
 
     def of_wavelength(self, index: int) -> PSFResult:
-        """Return the PSF of one of the wavelengths, (1, y, x), with derivatives. A mean has one wavelength.
+        """Return the PSF of one of the wavelengths, (1, y, x), with derivatives. A result of `mean` has only one.
 
         Raises:
             ValueError: there is no such wavelength.
@@ -220,10 +219,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def recompute_on(self, window: Grid, what: str) -> PSFResult:
         """Return the PSF of the same light over another window, to the same tolerance and without the amplitude.
 
-        what: name of the measure, for the error message.
+        what: name of the quantity that needs the other window, such as "power", for the error message.
 
         Raises:
-            AccuracyError: the requests of the PSF are not known, or this window cannot be computed within the limits.
+            AccuracyError: `can_recompute` is False, or this window cannot be computed within the limits.
         """
         height, width = window.shape
         here = f"{self.tensor.shape[1]} x {self.tensor.shape[2]} samples {self.dx:.3g} m apart"
@@ -238,7 +237,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def of_all_light(self) -> PSFResult:
-        """The PSF over the same window, recomputed if possible and if `for_window` is True.
+        """This PSF, recomputed from finer samples of the pupil if `for_window` and `can_recompute` are True.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -248,7 +247,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
         """Return a PSF whose samples can be summed: they are at most `coarsest` [m] apart, or are means over cells.
 
-        It is `of_all_light` if this holds already. Otherwise, the cells are divided, and the PSF is recomputed.
+        If the samples of this PSF meet the condition, the result is `of_all_light`, on the same samples. Otherwise the
+        square (cell) around each sample is divided into smaller ones, and the PSF is recomputed on them.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -264,7 +264,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def _resolved(self) -> PSFResult:
-        """Return the PSF over samples that are fine enough for sums."""
+        """Return the PSF on samples that are fine enough for their sum to be the power in the window."""
         return self.with_pitch(0.5 / self.highest_cutoff, "power")
 
 

@@ -96,7 +96,11 @@ class Request:
 
 
 def _wrapped(pupil: Pupil) -> str:
-    """Return advice on a height map that jumps. For fields of rays, which need slopes, it does not suggest pixels."""
+    """Return advice on a height map that jumps from sample to sample.
+
+    The advice is to use a PixelRelief, which represents steps. If the mask is a RayField, which requires one ray at
+    each point, the advice is to use a smooth height map, because a step has no ray.
+    """
     rows, columns = pupil.height.samples.shape
     remedy = "optics.PixelRelief(height) represents the steps"
     if isinstance(pupil.mask, RayField):

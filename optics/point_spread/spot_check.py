@@ -33,16 +33,18 @@ DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this,
 
 @dataclass(frozen=True)
 class Effort:
-    """Limits on the effort of a spot check. All values are choices.
+    """Limits on the effort of a spot check, which compares a PSF with the direct sum at a few points.
+
+    All values are choices made by judgement.
 
     points: largest number of points at which a PSF is checked.
     points_along_radius: the same for a rotationally symmetric PSF in a window around the axis.
     fewest: number of points below which the estimate is useless.
-    spare_digits: digits by which the direct sum is more accurate than requested. The first affordable number is used,
-        or the last one.
+    spare_digits: digits by which the direct sum may be more accurate than the tolerance, in the order in which they
+        are tried. The first number with which all points can be checked in time is used, or else the last number.
     share: time limit of the check, relative to the time of the PSF.
-    share_of_few: the same for windows with fewer than `few` samples. In windows of so few samples, a direct sum at
-        `fewest` points takes longer than `share` permits. Without a check, the error may be as large as its bound.
+    share_of_few: the same for windows with fewer than `few` samples, where `share` is too short for `fewest` points.
+        Without a check, the error of the PSF may be as large as its predicted upper bound.
     seconds: time [s] that a check may take even if the shares permit less.
     """
 
@@ -74,12 +76,12 @@ class _DirectSum:
 def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) -> float | None:
     """Return the relative L2 error of the intensity over the window, estimated from the direct sum.
 
-    The points are selected according to the probabilities from `_chances`. The result is None if the problem has a
-    `reach`, if the window is dark, or if the check would take too long.
+    The points are selected according to the probabilities from `_chances`. The result is None if the PSF may be wrong
+    beyond some distance from the axis (`Problem.reach`), if the window is dark, or if the check would take too long.
 
     With n points of probability p_k, the sum of squared errors Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
 
-    image: the PSF |U|² / (pupil area), flat.
+    image: the PSF |U|² / (pupil area), a flat array.
     seconds: time of its computation.
     """
     if problem.reach is not None:
@@ -105,11 +107,10 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
 
 
 def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> float:
-    """Return the relative error of the intensity that the direct sum itself has.
+    """Return the relative error of an intensity computed by the direct sum.
 
-    It has two causes. The first is the quadrature, whose error is 10^-digits times the amplitude that all light would
-    have in phase; the relative error of the intensity is twice that of the amplitude. The second is the rounding of
-    paths.
+    It has two causes: the rounding of paths, and the quadrature. The quadrature's error of the amplitude is 10^-digits
+    times the amplitude that all light would have in phase. The intensity has twice the amplitude's relative error.
     """
     return 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
 
@@ -117,8 +118,8 @@ def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> floa
 def path_rounding(problem: Problem, darkness: float) -> float:
     """Return the relative error of the intensity that the rounding of paths in float64 causes.
 
-    A phase error of δ [rad] changes the amplitude by δ times the amplitude of all light in phase. A comparison with the
-    direct sum does not show this error, because the direct sum has similar paths.
+    A phase error of δ [rad] changes the amplitude by δ times the amplitude that all light would have in phase. The
+    comparison with the direct sum does not show this error, because the direct sum has similar paths.
     """
     return WAVE_ROUNDING * problem.waves * 10.0**darkness
 
@@ -137,7 +138,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
-    """Return the direct sum with the largest numbers of points and digits in EFFORT that the time limit allows."""
+    """Return the most accurate direct sum at all points that the time limit allows, or a coarse one at fewer points."""
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
     share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
@@ -155,10 +156,10 @@ def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -
 
 
 def _finer_detail(beam: Beam, problem: Problem) -> float:
-    """Return the cycles per radius that the check needs in addition to those of the PSF.
+    """Return how many more cycles per pupil radius the direct sum of a spot check resolves than the PSF does.
 
-    A PSF neglects detail of reliefs, wavefronts and masks below a tenth of its tolerance. The check resolves finer
-    detail, because it would otherwise not show the resulting error.
+    A PSF neglects detail of reliefs, wavefronts and masks below a tenth of its tolerance. The direct sum resolves finer
+    detail, because the comparison would otherwise not show the resulting error.
     """
     fine = beam.pupil.bandwidth(beam.wavelength, FINER_DETAIL * problem.tolerance / 10)
     return problem.radius * max(fine - problem.detail, 0.0)
@@ -167,7 +168,7 @@ def _finer_detail(beam: Beam, problem: Problem) -> float:
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the flat indices of the points to compare, and the probability with which each was drawn.
 
-    The points are drawn at even steps of the cumulative probability, so that no likely point is omitted.
+    The points are drawn at equal steps of the cumulative probability, so that no likely point is omitted.
     """
     # If there are few points, each is compared once.
     even = np.full(points, 1 / points)
@@ -183,8 +184,8 @@ def exact_psf(
 ) -> tuple[np.ndarray, float] | None:
     """Return the PSF at points (x, y) [m] by the direct sum, and its relative error at the value `bright` [1/m²].
 
-    The result is None if the problem has a `reach`, or if the sum needs more time than `spot_check` may spend on a PSF
-    whose computation takes `seconds`.
+    The result is None if PSFs of this problem may be wrong beyond some distance from the axis (`Problem.reach`), or if
+    the sum needs more time than `spot_check` may spend on a PSF whose computation takes `seconds`.
     """
     darkness = _darkness(beam, problem, bright)
     reference = _affordable(beam, problem, darkness, seconds)
@@ -218,13 +219,13 @@ KINDS = 6  # kinds of points in `_chances`
 
 
 def _chances(bright: np.ndarray, window: Grid) -> np.ndarray:
-    """Return the probability with which each point is drawn, as a flat array.
+    """Return the probability with which each sample of a window is drawn for the spot check, as a flat array.
 
     It is the mean of six distributions. The first is uniform. The others are proportional to the following quantities:
 
     - Intensity: if the amplitude has the same error everywhere, the squared error of the intensity is proportional to
         the intensity. Next to a bright focus, only this distribution detects such an error.
-    - Squared intensity, spread over neighbouring samples: the errors of a focus of one sample lie next to it.
+    - Squared intensity, spread over neighbouring samples: if a focus lights one sample, errors lie in its neighbours.
     - Nearness to a side, and nearness to a corner: phases change fastest there, so quadratures fail first at the few
         outermost samples. In a window off the axis, phases change fastest at the sides that are farthest from the axis.
     - Intensity times the sum of both kinds of nearness: the light of a slit reaches the sides only in few places, and
@@ -252,9 +253,9 @@ def _in_order(window: Grid) -> np.ndarray:
 
 
 def _by_radius(window: Grid) -> np.ndarray:
-    """Return flat indices in order of the distance from the axis.
+    """Return the flat indices of a window's samples in order of their distance from the axis.
 
-    Points at even steps of the cumulative probability in this order lie in all bright rings.
+    If `_drawn` adds up the samples' probabilities in this order, its equal steps of the sum lie in all bright rings.
     """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
     # Squared radii are rounded, so that rounding errors do not change the order of equal radii.
@@ -271,10 +272,10 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sum of both kinds of nearness in `_chances`, and the sum of the distributions without the PSF.
+    """Return two flat sums of those distributions in `_chances` that do not depend on the PSF.
 
-    Both are flat arrays. The second one is the sum of three distributions: the uniform one, and those of nearness to a
-    side and to a corner.
+    The first one adds the distributions of nearness to a side of the window and to a corner. The second one adds the
+    uniform distribution to both.
 
     centre: position (x, y) of the window's centre, in samples.
     """

@@ -55,8 +55,8 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
 
     Raises:
         ValueError: `result` is not a PSF, or with_error is not a bool.
-        AccuracyError: the maximum lies outside the window, or the PSF is brighter at a point outside the window that
-            rays reach. The same error results if the samples are too coarse and finer ones cannot be computed (the
+        AccuracyError: the maximum lies outside the window, or rays reach a point outside the window where the PSF is
+            brighter. The same error results if the samples are too coarse and finer ones cannot be computed (the
             message states which samples are sufficient), or if no peak is found.
     """
     import drjit as dr
@@ -114,7 +114,9 @@ class Peak(NamedTuple):
 
 
 def _peak(result: PSFResult) -> Peak:
-    """Return the maximum of a PSF of one wavelength, or of a mean, near its brightest samples.
+    """Return the maximum of a PSF near its brightest samples.
+
+    The PSF has one wavelength, or is a mean over wavelengths (`PSFResult.mean`).
 
     Raises:
         AccuracyError: the maximum lies outside the window or is not found, or the necessary samples cannot be computed.
@@ -143,7 +145,8 @@ def _brightest(result: PSFResult) -> tuple[float, float]:
     The brightest sample need not belong to the highest lobe. A non-negative function with the maximum p and no
     frequency beyond the cutoff f is at least p cos²(πfd) at a distance d < 1/(2f) from the maximum (M. Riesz 1914). The
     sample nearest the maximum therefore has at least this value, with d the largest possible distance of that sample.
-    The surroundings of all samples above this value are searched, or of the MOST_SPLINED brightest ones.
+    The surroundings of all samples above this value are searched. If there are more than MOST_SPLINED such samples,
+    only the brightest MOST_SPLINED ones are used.
     """
     from scipy.ndimage import map_coordinates, spline_filter
 
@@ -237,10 +240,14 @@ def _vertex(result: PSFResult, middle: tuple[int, int] | None = None) -> Peak:
 
 
 def _measured_error(result: PSFResult, peak: Peak) -> float:
-    """Return the relative error of a peak: the difference from the direct sum if this is affordable, at most its bound.
+    """Return the relative error of a peak, found by comparison with the direct sum, but at most the bound `peak.error`.
 
-    The direct sum is evaluated on 3 x 3 points around the peak. Their pitch is CLOSER times finer than AT_A_PEAK, so
-    the error of a paraboloid through them is PARABOLOID_ERROR / CLOSER^4.
+    The result is this bound if the PSF cannot be recomputed, if its samples are means over cells, or if the direct sum
+    would take too long.
+
+    The direct sum is evaluated on 3 x 3 points around the peak. The maximum of a paraboloid through points at the pitch
+    AT_A_PEAK / cutoff has the error PARABOLOID_ERROR. These points are CLOSER times as close, so their paraboloid has
+    the error PARABOLOID_ERROR / CLOSER^4.
     """
     if result.holds_cells or not result.can_recompute:
         return peak.error

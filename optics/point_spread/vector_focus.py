@@ -52,8 +52,8 @@ def vector_focus(
         the x and y of these definitions are rotated with the light's direction.
     source_angle: direction (x, y) [rad] of the light, as in `optics.psf`. The window lies around the image.
     apodization: "flat" for uniform light over a flat pupil, or "aplanatic" for light along the axis of a corrected
-        objective. With the latter, the ray from the point ξ of the pupil arrives at the focus, at the distance z, with
-        the sine ξ/z, and the light is a sum of plane waves (Richards and Wolf 1959).
+        objective. In the aplanatic case, the ray from the point ξ of the pupil arrives at the focus, at the distance z,
+        at an angle to the axis with the sine ξ/z, and the light is a sum of plane waves (Richards and Wolf 1959).
     dx, shape: pitch [m] and number of samples (y, x) of the window.
     tolerance: relative L2 error of the intensity over the window.
 
@@ -61,9 +61,9 @@ def vector_focus(
         ValueError: an argument is invalid, the relief is pixelated, a parameter carries derivatives, or an aplanatic
             lens has a relief, wavefront or mask, is not lit along its axis, has no focal length, or has a radius that
             is not below the distance.
-        AccuracyError: no method meets the tolerance within the limits on memory and time, a ray behind a pupil with
-            "flat" apodization has a sine above 0.98, or an aplanatic lens has a Fresnel number below 20. The rays of
-            such a lens do not meet in a point.
+        AccuracyError: no method meets the tolerance within the limits on memory and time, or with "flat" apodization,
+            the sine of a ray's angle to the axis exceeds 0.98 behind the pupil. The same error results if an aplanatic
+            lens has a Fresnel number below 20, because its rays then do not meet in a point.
         BackendError: see `optics.psf`.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
@@ -92,7 +92,10 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
 
 
 def _check_rays(beam: Beam) -> None:
-    """Raise an AccuracyError if a ray behind the pupil is evanescent or its sine exceeds STEEPEST."""
+    """Raise an AccuracyError if the sine of a ray's angle to the axis exceeds STEEPEST behind the pupil.
+
+    This includes evanescent light, with a sine above 1.
+    """
     steepest = beam.pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.index
     if steepest > STEEPEST:
         raise AccuracyError(

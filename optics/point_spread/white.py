@@ -85,9 +85,10 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         return found
 
     def mtf(self, tolerance: float = 0.02) -> MTF:
-        """Return the contrast |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx). Shifts between colours add to the blur.
+        """Return the contrast |Σ_λ w(λ) OTF_λ| that each type of receptor sees, (type, fy, fx).
 
-        w are the `weights` of the optical transfer functions of all wavelengths λ. See `optics.mtf`.
+        The sum is over the optical transfer functions of all wavelengths λ, with w from `weights`. Shifts between the
+        images of different colours therefore add to the blur. See `optics.mtf`.
 
         tolerance: largest error of any contrast.
 
@@ -204,9 +205,12 @@ def white_psf(
 
 
 def _remedy(count: int, worst: float, allowed: float, tolerance: float) -> str:
-    """Return advice if `count` wavelengths are too few: more wavelengths or, if these exceed MOST_WAVES, a tolerance.
+    """Return advice if `count` wavelengths are too few: a sufficient number of wavelengths.
 
-    worst, allowed: error of the sum over wavelengths, and the largest error that is allowed
+    If that number would exceed MOST_WAVES, the advice is a larger tolerance that `count` wavelengths meet. If that
+    tolerance would exceed 0.5, the advice is a light or receptors with a smoother spectrum.
+
+    worst, allowed: error of the sum over wavelengths, and the largest error that is allowed.
     """
     more = 2 * math.ceil(count * (1.2 * worst / allowed) ** 0.25 / 2) + 1
     if more <= MOST_WAVES:

@@ -32,10 +32,11 @@ def window_seconds(problem: Problem) -> float:
 
 
 def check_seconds(problem: Problem, sampling: Sampling) -> float:
-    """Return the time [s] of the spot check of a PSF that is itself a direct sum; 0 for other PSFs or without a check.
+    """Return the time [s] of the spot check if the PSF is computed by the direct sum; otherwise 0.
 
-    The check has about twice as many nodes as the PSF. For other methods, the check's time is neglected, because it is
-    a small part of the PSF's time.
+    A spot check compares some points of the PSF with a direct sum of its own, which has about twice as many nodes. For
+    methods other than the direct sum, the time of the check is neglected, because it is a small part of the PSF's time.
+    The result is also 0 if there is no check.
     """
     if problem.reach is not None or sampling.method != "rayleigh_sommerfeld":
         return 0.0

@@ -27,10 +27,10 @@ NEAR_ZERO = 2.0
 
 @dataclass(frozen=True, eq=False)
 class ErrorCauses(ReadOnlyArrays):
-    """Parts of the error of contrasts, relative to all light that arrives, (wavelength,).
+    """Parts of the error of contrasts, as fractions of all light that arrives, (wavelength,).
 
-    lost: upper bound on the light outside the window.
-    light: uncertainty of the light that arrives, which `lost` includes.
+    lost: upper bound on the light outside the window. It includes the uncertainty `light`.
+    light: uncertainty of the amount of light that arrives.
     rest: error of the PSF inside the window.
     """
 
@@ -68,9 +68,9 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
 
 
 def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return an estimate of the lost light's part of each contrast, (fy, fx).
+    """Return an estimate of what the light outside the window contributes to each contrast, (fy, fx).
 
-    The estimate assumes that this light is distributed like the light in the outer parts of the window.
+    The estimate assumes that this light has the same contrasts as the light in the outer parts of the window.
     """
     squares, parts = np.zeros((max(image.shape),) * 2), 0
     for part in INNER:
@@ -93,6 +93,9 @@ def _spectrum(image: np.ndarray) -> np.ndarray:
 
 
 def _fade(n: int, start: float) -> np.ndarray:
-    """Return a fade from 1 to 0 between the position `start`, in half widths of a row of samples, and its ends."""
+    """Return weights of a row of n samples that are 1 in its middle and fall to 0 towards its ends.
+
+    start: distance from the middle at which the weights begin to fall, in half widths of the row.
+    """
     away = np.abs(np.arange(n) - n // 2) / max(n / 2, 1.0)
     return np.asarray(np.square(np.cos(np.pi / 2 * np.clip((away - start) / (1 - start), 0, 1))))

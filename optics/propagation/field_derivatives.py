@@ -48,7 +48,7 @@ def mapped(field: Field, values: Complexes, grid: Grid, linear: LinearMap, z: Sc
         rate = linear.rate(field.numpy())
 
     class LinearStep(dr.CustomOp):
-        """The map as a differentiable operation."""
+        """The linear map A as an operation of Dr.Jit that carries derivatives forward and backward."""
 
         def eval(self, re: Array, im: Array, z: Array) -> tuple[Array, Array]:
             return _parts(values, types)

@@ -1,11 +1,11 @@
 """Pupils of a system that are decentred and tilted.
 
-Each plane has its own lateral coordinates about the centre of its pupil, so a decentred pupil only moves the window of
-the propagation to its plane. The plane of a tilted pupil has the depth ζ(x) = x·tan α. The field that arrives at a
-point of this plane is the field at the depth ζ of the point, and light leaves from this depth. If the light's angles to
-the axis are at most θ, the field is the product of a carrier exp(ikcζ) with c = (1 + cos θ)/2 and a function that
-varies slowly with the depth. This function is interpolated between a few planes at Chebyshev nodes z_j, with Lagrange
-polynomials L_j. The light that arrives at the tilted plane is
+Each plane has its own lateral coordinates about the centre of its pupil. The field that arrives at a decentred pupil is
+therefore computed on samples around a shifted centre, and nothing else changes. The plane of a tilted pupil has the
+depth ζ(x) = x·tan α. The field that arrives at a point of this plane is the field at the depth ζ of the point, and
+light leaves from this depth. If the light's angles to the axis are at most θ, the field is the product of a carrier
+exp(ikcζ) with c = (1 + cos θ)/2 and a function that varies slowly with the depth. This function is interpolated between
+a few planes at Chebyshev nodes z_j, with Lagrange polynomials L_j. The light that arrives at the tilted plane is
 
     U(x, ζ) = exp(ikcζ) Σ_j L_j(ζ) exp(-ikcz_j) U(x, z_j).
 
@@ -167,7 +167,12 @@ ALIGNED = Alignment()
 
 @dataclass(frozen=True)
 class DepthFactors:
-    """Pairs of weights (y, x) and factors of the spectrum (fy, fx), one pair for each depth of a tilted plane."""
+    """Arrays that multiply fields and their spectra in a step between tilted planes.
+
+    leaving: for the field that leaves a plane, one pair for each depth between which fields are interpolated:
+        interpolation weights (y, x), and factors (fy, fx) that propagate the spectrum from this depth.
+    arriving: the same for the field that arrives at the next plane, with factors that propagate to this depth.
+    """
 
     leaving: list[tuple[Any, Any]]
     arriving: list[tuple[Any, Any]]
@@ -175,10 +180,13 @@ class DepthFactors:
 
 @dataclass(frozen=True)
 class Depths:
-    """Depths between which a step interpolates the fields that leave a plane and that arrive at the next one.
+    """Depths along the axis between which a step from plane to plane interpolates fields, because planes are tilted.
 
-    leaving, arriving: depths [m], (node,), and one array of weights (y, x) per node, see `Alignment.weights`.
-    turns: waves per depth [1/m], (1 - c)/λ, by which the carrier exp(ikcζ) is slower than exp(ikζ).
+    leaving: for the plane that the light leaves, depths [m], (node,), and one array of interpolation weights (y, x) per
+        depth, see `Alignment.weights`.
+    arriving: the same for the plane at which the light arrives.
+    turns: (1 - c)/λ [1/m], the number of waves per metre of depth ζ by which the phase of the carrier exp(ikcζ) of
+        light (see `slowness`) falls behind that of exp(ikζ).
     slope: tangents of the tilt along x and y of the plane that the light leaves.
     """
 
@@ -188,9 +196,11 @@ class Depths:
     slope: Point
 
     def factors(self, sines: np.ndarray, wavelength: float, types: Precision) -> DepthFactors:
-        """Return the weights, and factors exp(±2πi ζ [turns - sags/λ]) for propagation to and from depths ζ.
+        """Return the interpolation weights, and the factors that propagate each frequency to or from each depth.
 
-        The factors of leaving light include 1 - tan α sin θ, an approximation of the obliquity factor.
+        At the depth ζ, the factor is exp(±2πi ζ [turns - (1 - cos θ)/λ]), where θ is the angle of the frequency's wave
+        to the axis: + for light that arrives, and - for light that leaves. The factor of light that leaves a plane
+        tilted by α also includes 1 - tan α sin θ, an approximation of the obliquity factor.
 
         sines: sin θ of each frequency along an axis of the spectrum.
         wavelength: wavelength [m] in the medium.
@@ -215,7 +225,12 @@ def sags(sines: np.ndarray) -> np.ndarray:
 
 
 def slowness(sine: float) -> float:
-    """Return 1 - c = (1 - cos θ)/2 from sin θ, where exp(ikcζ) is the carrier of light at the depth ζ."""
+    """Return 1 - c = (1 - cos θ)/2 for light whose angles to the axis are at most θ.
+
+    The field of this light is a carrier exp(ikcζ) times a function that varies slowly with the depth ζ along the axis.
+
+    sine: sin θ.
+    """
     return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 

@@ -108,7 +108,7 @@ class Stop:
         return light or carries_derivative(self.along)
 
     def apart(self, other: Alignment) -> float:
-        """Return the distance [m] of the stop's centre from another plane's along x or along y, whichever is larger."""
+        """Return the larger of the distances [m] along x and along y between the stop's centre and another plane's."""
         return max(map(abs, self.alignment.beside(other)))
 
 
@@ -145,10 +145,11 @@ class StepSettings:
         return 8 * self.edge_ripple + 4 * FLOAT_NOISE[self.dtype]
 
     def reaching(self, half_widths: float, distance: float) -> float:
-        """Return the highest frequency [1/m] of light that `propagate` carries to the next plane: the end of its fade.
+        """Return the highest frequency [1/m] of light that `propagate` carries to the next plane.
 
-        The result is infinite if both planes coincide. If they are close, it includes evanescent waves that have not
-        yet decayed.
+        `propagate` fades out frequencies at which light passes beside the plane, and the result is the frequency at
+        which this fade ends. It is infinite if both planes coincide. If they are close, it includes evanescent waves
+        that have not yet decayed.
 
         half_widths: sum of the half widths of the two planes [m].
         """
@@ -220,9 +221,10 @@ class StepSettings:
         return depths, error_out + error_in
 
     def passage(self, field: PlaneField, stop: Stop, window: Grid) -> Passage:
-        """Return the passage to the next stop.
+        """Return the parameters of the propagation to the next stop.
 
-        Between tilted planes, the smallest distance defines the band, and the largest one the displacement of light.
+        Between tilted planes, the distance varies. The smallest distance then determines which frequencies can reach
+        the next plane, unless `field.kept` does. The largest one determines how far light moves sideways.
 
         window: samples of the next stop, relative to the centre of the field's plane.
         """
@@ -240,9 +242,10 @@ class StepSettings:
         return replace(passage, limit=replace(band, walk=farther * band.walk))
 
     def steep(self, field: PlaneField) -> float:
-        """Return the largest sin θ, with θ measured from the axis, of light for which tilts must be accurate.
+        """Return the largest sin θ of the light that must be propagated accurately between tilted planes.
 
-        If diffracted light is removed, the remaining light beyond geometrical rays is too weak to matter here.
+        θ is the angle to the axis. If a fade will remove part of the diffracted light (`field.kept`), only geometrical
+        rays count, because light at larger angles than theirs is then too weak to matter. Otherwise all light counts.
         """
         frequency = field.band if field.kept is None else field.rays
         return min(frequency * self.wavelength / self.medium_n, 1.0)

@@ -40,9 +40,9 @@ SPLINE_PART = 3.0
 class PupilSampling:
     """Samples of a pupil, its soft aperture, and the frequencies [1/m] that they transmit (see PlaneField).
 
-    soft: soft aperture; for a relief of pixels, the opening and the pixels together.
-    source: source relative to the pupil's centre, which illuminates the pupil if no field arrives.
-    path: path [m] of the source's light to the pupil's centre, minus that to the axis.
+    soft: aperture with a softened edge. For a relief of pixels, the jumps between pixels are softened as well.
+    source: the source that illuminates the pupil if no field arrives. Its position is relative to the pupil's centre.
+    path: path [m] of the source's light to the pupil's centre, minus its path to the axis.
     """
 
     pupil: Pupil
@@ -61,12 +61,13 @@ class PupilSampling:
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
-        The band extends to the highest frequency that can reach the next plane and is not removed. Light behind the
-        pupil also has higher frequencies, up to the sum of those of the arriving light, of the pupil's phase and of the
-        pupil's edge. They may be aliased, but not into the band.
+        The band extends to the highest frequency that can reach the next plane. It is narrower if the settings remove
+        diffracted light (`StepSettings.margin`). Light behind the pupil also has higher frequencies, up to the sum of
+        those of the arriving light, of the pupil's phase and of the pupil's edge. These frequencies may be aliased, but
+        not into the band.
 
-        field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. Its
-            frequencies are then part of the pupil's phase.
+        field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. The phase of
+            the source's wave at the pupil is then treated as part of the pupil's phase.
 
         Raises:
             ValueError: the pupil has a relief of pixels, and its radius carries a derivative or the output lies in its

@@ -107,11 +107,11 @@ def propagate(
     distance: distance [m] behind the plane of u; negative for planes in front of it.
     out_dx, out_shape, out_centre: pitch [m], shape (y, x) and centre (x, y) [m] of the output. By default, pitch and
         shape equal those of u, and the centre is on the axis.
-    tolerance: relative L2 error of the intensity over the output, for exact samples u. Light of u at its Nyquist
-        frequency, a sign of samples that are too coarse, causes an additional error, which the plan states if it
-        exceeds the tolerance. The smallest tolerance is 1e-5 for float32 and 3e-12 for float64.
-    method: "auto" and "angular_spectrum" are exact. "auto" replaces the transforms by matrix products if these are
-        faster, in distant or shifted windows. "fresnel" is the paraxial approximation.
+    tolerance: relative L2 error of the intensity over the output, for exact samples u. The smallest tolerance is 1e-5
+        for float32 and 3e-12 for float64. If u contains light at the Nyquist frequency, its samples are too coarse.
+        This light causes an additional error. The result's `plan` states this error if it exceeds the tolerance.
+    method: "angular_spectrum" is exact and uses Fourier transforms. "auto" is exact as well. If the output is far away
+        or far from the axis, "auto" uses matrix products if they are faster. "fresnel" is the paraxial approximation.
     medium_n: refractive index of the space, 1 to 10.
     dtype: "float32" or "float64", the precision of the result.
 

@@ -124,9 +124,11 @@ class SeparableSampling:
 def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> SeparableSampling | None:
     """Return a sampling of the separable kernel whose predicted error of the intensity is at most `allowed`.
 
-    The result is None if transforms are requested, z is 0, a plane has more than MOST_SAMPLES samples along a side, or
-    more than MOST_TERMS terms are necessary. It is also None if the samples of the source represent too few of the
-    frequencies that reach the window, or if light is to be removed that could reach the window.
+    The kernel is the field of a point source, written as a sum of products of functions of x and y. The result is None
+    if the passage requires Fourier transforms (`by_transforms`), its distance z is 0, a plane has more than
+    MOST_SAMPLES samples along a side, or more than MOST_TERMS products are necessary. It is also None if light at the
+    Nyquist frequency of the source reaches the window, or if the passage has a `limit`, beyond which light must be
+    removed.
     """
     largest = max(*source.shape, *window.shape)
     if passage.z == 0 or passage.by_transforms or passage.limit is not None or largest > MOST_SAMPLES:
@@ -173,7 +175,11 @@ def _series(coefficients: np.ndarray, span: Range, at: np.ndarray) -> np.ndarray
 
 @lru_cache(maxsize=2)
 def _matrices(how: SeparableSampling, types: Precision) -> tuple[np.ndarray, np.ndarray]:
-    """Return the factors of the kernel along x and along y: (term, x, ξ) and (y, term, η), with dx² and the carrier."""
+    """Return the factors of the kernel along x, (term, x, ξ), and along y, (y, term, η), for each term of its sum.
+
+    (x, y) are positions in the window, and (ξ, η) are positions in the source. The factors along x include the area dx²
+    of a sample of the source and the carrier exp(ikz).
+    """
     passage, (cx, cy), terms = how.passage, how.passage.centre, how.terms
     x, y = np.subtract.outer(how.window.x, how.source.x), np.subtract.outer(how.window.y, how.source.y)
     carrier = _phasor(passage, math.fmod(abs(passage.z), passage.wavelength) + _sag(passage, cx, cy))
@@ -201,7 +207,12 @@ def _sag(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.n
 
 
 def _longer(passage: Passage, along: np.ndarray, middle: float, other: float) -> np.ndarray:
-    """Return the difference of distances D(along, other) - D(middle, other), see `_sag`."""
+    """Return D(along, other) - D(middle, other), without a difference of nearly equal numbers.
+
+    D is the distance [m] between a point of the source and a point of the window. Its arguments are the offsets [m]
+    between the points along the two lateral axes: `along` or `middle` along one axis, and `other` along the other one.
+    In the paraxial case, D is replaced by Fresnel's approximation.
+    """
     more, z = np.square(along) - middle**2, abs(passage.z)
     if passage.paraxial:
         return more / (2 * z)
@@ -231,7 +242,11 @@ def _amplitude(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -
 
 
 def _slow_part(passage: Passage, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the slow part of the kernel, A(x, y) exp(ik e(x, y)), with the amplitude A and the coupling e."""
+    """Return the part of the kernel that varies slowly, A(x, y) exp(ik e(x, y)), for points that are (x, y) apart [m].
+
+    A is the amplitude of the kernel. e is the part of the distance between the points that is not a sum of a function
+    of x and a function of y.
+    """
     cx, cy = passage.centre
     # e = [D(x, y) - D(x, cy)] - [D(cx, y) - D(c)]; both differences have the numerator y² - cy².
     far = _distance(passage, x, y) + _distance(passage, x, cy)

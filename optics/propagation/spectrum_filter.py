@@ -111,9 +111,10 @@ def filtered(
 def linear_map(
     how: TransformSampling, shape: tuple[int, int], types: Precision, depths: Depths | None = None
 ) -> LinearMap:
-    """Return `filtered` as a linear map of fields (y, x) of this shape.
+    """Return the propagation that `filtered` computes as a linear map of fields (y, x) of this shape.
 
-    Its parameter z is the distance, and its rate omits the carrier exp(ikz).
+    The map depends on the distance z between the planes. Its derivative with respect to z (`LinearMap.rate`) does not
+    include the derivative of the carrier exp(ikz).
     """
     how, crop = replace(how, step=0), _middle(shape, how.source.shape)
     transfer = _free_space(how, types.dtype).transfer
@@ -152,7 +153,11 @@ def _middle(shape: tuple[int, int], part: tuple[int, int]) -> tuple[slice, ...]:
 
 
 def _spectrum(plane: np.ndarray, how: TransformSampling) -> np.ndarray:
-    """Return the spectrum of a plane (y, x): (fx, fy) in FFT order unless `how.step` is 0, else (fy, fx) centred."""
+    """Return the spectrum of a plane (y, x).
+
+    If `how.step` is 0, its axes are (fy, fx), with frequency 0 in the centre. Otherwise they are (fx, fy), in the order
+    of a fast Fourier transform.
+    """
     if how.step:
         return periodic_spectrum(plane, how.period, how.across)
     return fourier_sum(plane, how.period, (how.across, how.across), -1)

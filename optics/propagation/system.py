@@ -120,9 +120,12 @@ class _Light:
     backward: bool
 
     def through(self, elements: Sequence[Element], margin: float = MARGINS[0]) -> tuple[StackResult, float]:
-        """Return the field behind a system, and the margin with which a similar system should begin.
+        """Return the field behind a system, and the smallest margin that is worth trying for a similar system.
 
-        margin: smallest `StepSettings.margin` to try.
+        The margin [cycles per pupil radius] is the amount by which frequencies of diffracted light may exceed those of
+        geometrical rays. Light of higher frequencies is removed.
+
+        margin: smallest margin to try for this system.
 
         Raises:
             ValueError: see `propagate_through`.
@@ -174,9 +177,10 @@ def _with_carrier(tracked: Field, stops: list[Stop], settings: StepSettings) -> 
 class _Passed:
     """The field behind a system.
 
-    error: predicted error of the intensity, without that of removed light until `_converged` adds it.
-    complete: True if all light is included that can reach the next plane.
-    first_margin: smallest `StepSettings.margin` with which a similar system should begin.
+    error: predicted error of the intensity. `_passed` does not include the error due to diffracted light that was
+        removed. `_converged` adds this error.
+    complete: True if no light was removed that can reach the next plane.
+    first_margin: smallest `StepSettings.margin` that is worth trying for a similar system.
     """
 
     field: PlaneField
@@ -191,9 +195,10 @@ def _converged(
 ) -> _Passed:
     """Return the field with as much diffracted light as the tolerance requires.
 
-    Most light follows geometrical rays. The margin of frequencies around them is doubled until the error that is
-    estimated from the change of the intensity meets the tolerance. If it does not, if the tolerance is below
-    LEAST_TOLERANCE, or if derivatives are requested, all light is included that can reach the next plane.
+    Most light follows geometrical rays. Diffracted light is included if its frequency exceeds those of the rays by at
+    most a margin. The margin is doubled until the predicted error meets the tolerance. This error is estimated from the
+    change of the intensity due to the last doubling. All light that can reach the next plane is included if no margin
+    is sufficient, if the tolerance is below LEAST_TOLERANCE, or if derivatives are requested.
     """
     before, differentiated = None, any(stop.carries_derivatives(settings.wavelength) for stop in stops)
     for margin in MARGINS if tolerance >= LEAST_TOLERANCE and not differentiated else ():

@@ -12,9 +12,10 @@ Light at an angle θ to the axis moves z tan θ to the side. If this exceeds the
 to the far edge of the other, the light cannot reach the window. It is faded out, because it would otherwise wrap
 around.
 
-A fade of the spectrum blurs the field, and its width is a compromise. A narrow fade blurs over a large distance, so the
-unfaded band must include light that lands this far outside the window. A wide fade includes light that moves far to the
-side.
+A fade of the spectrum blurs the field over a distance that is inversely proportional to the fade's width in frequency.
+Faded light must not be blurred into the window. It must therefore land outside the window by at least the blur
+distance, which is large for a narrow fade. A wide fade, however, ends at a high frequency, whose light moves far to the
+side. The width is a compromise between the two.
 """
 
 from __future__ import annotations
@@ -60,11 +61,12 @@ FADE_SINES = np.geomspace(0.003, 0.6, 33)
 class Band:
     """A band of frequencies: light is unchanged up to `kept` [1/m] and faded out between `kept` and `kept` + `fade`.
 
-    kept: infinite if no light may be faded.
+    kept: infinite if no light may be faded, so that the band contains all frequencies.
     square: False for a fade of the radial frequency √(fx² + fy²). True for the product of two fades, one along x and
         one along y. In the paraxial case, they depend on fx and on fy. Otherwise the fade along x depends on fx / √(1 -
         λ²fy²), and that along y correspondingly.
-    walk: distance [m] that the outermost light of the fade moves to the side, including the blur.
+    walk: sideways distance [m] within which the light of the band lands in the next plane. It is the displacement of
+        light at the frequency `kept` + `fade`, plus the distance over which the outer end of the fade blurs the field.
     """
 
     kept: float
@@ -79,7 +81,8 @@ class Band:
     def diagonal(self, wavelength: float) -> float:
         """Return the highest radial frequency [1/m] of a square band.
 
-        It lies on the diagonal fx = fy, where fx / √(1 - λ²fy²) equals the end of the fade.
+        It lies on the diagonal fx = fy, where fx / √(1 - λ²fy²) equals `kept` + `fade`, the end of the fade along x.
+        λ is the wavelength [m] in the medium.
         """
         return math.sqrt(2) * self.end / math.hypot(1, self.end * wavelength)
 
@@ -96,9 +99,10 @@ def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) 
 def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
     """Return the band of the light whose sideways displacement over the distance z is at most `corner` [m].
 
-    It is chosen for the shortest period of the transform. The result is `EVERYTHING` if no light may be faded.
+    Light of higher frequencies is faded out. The width of the fade is chosen so that the Fourier transforms of the
+    propagation can have the shortest period. The result is `EVERYTHING` if no light may be faded.
 
-    ripple: fraction of the light that remains beyond the fade.
+    ripple: fraction of the amplitude of faded light that blur may still carry to displacements of at most `corner`.
     """
     return _shortest(corner, wavelength, z, ripple, paraxial, square=False)
 
@@ -106,22 +110,24 @@ def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxia
 def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
     """Return the square band for light that moves up to `half` [m] along each axis over the distance z.
 
-    It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. Unless
-    paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression.
-    The blur is then larger than that of a fade in fx alone, by the factor of the expression's gradient. The result is
-    `EVERYTHING` if no light may be faded.
+    It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. Light that
+    moves farther along x or y is faded out. Unless paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²)
+    instead of fx alone, so the fade along x is a function of this expression. It blurs the field over a larger distance
+    than a fade in fx: the distance is multiplied by the largest gradient of the expression. The result is `EVERYTHING`
+    if no light may be faded.
 
-    ripple: fraction of the light that remains beyond the fade.
+    ripple: fraction of the amplitude of faded light that blur may still carry to displacements of at most `half`.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
 
 def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: float) -> Band:
-    """Return the band with the given limits, even if more or less light could reach the window.
+    """Return the band with the given limits [1/m], even if more or less light could reach the window.
 
-    The result is `EVERYTHING` if its outermost light is too near grazing incidence.
+    The result is `EVERYTHING` if light at the end of the fade, at the frequency kept + fade, is too near grazing
+    incidence.
 
-    ripple: fraction of the light that remains beyond the fade.
+    ripple: fraction of the amplitude of faded light that remains farther away than the blur distance of the fade.
     """
     if (kept + fade) * wavelength >= PERIOD_MAX_SINE:
         return EVERYTHING
@@ -154,7 +160,10 @@ def _walk(band: Band) -> float:
 
 
 def _gradient(sine: float) -> float:
-    """Return the largest |∇(fx / √(1 - λ²fy²))| for values below `sine` along both axes."""
+    """Return the largest gradient |∇F| of F(fx, fy) = fx / √(1 - λ²fy²), on which the fade of a square band depends.
+
+    sine: largest value of λ|F| and of λ|fy|, where λ is the wavelength, and fx and fy are spatial frequencies.
+    """
     cosine2 = 1 - sine * sine
     return math.sqrt((1 + sine**4 / cosine2) / cosine2)
 
@@ -207,16 +216,17 @@ class TransferFunction:
 
 @dataclass(frozen=True)
 class Passage:
-    """Parameters of a transfer function: the passage of light from one plane to another.
+    """The passage of light from one plane to a window in another plane: parameters of its transfer function.
 
     wavelength: wavelength [m] in the medium.
     z: distance [m] between the planes, negative for backward propagation.
     paraxial: True for Fresnel's approximation.
     band: band of the light that can reach the window.
     centre: position (x, y) [m] of the window.
-    ripple: fraction of the light that remains beyond a fade.
+    ripple: fraction of the amplitude of removed light that may still reach the window. Light outside the band is
+        removed by fading out its frequencies, which blurs the field and so spreads this light.
     limit: band beyond which light is removed although it could reach the window; None if there is no limit.
-    by_transforms: True if matrix products must not replace transforms.
+    by_transforms: True if Fourier transforms must not be replaced by matrix products.
 
     Evanescent waves decay in forward propagation and are omitted in backward propagation (z < 0).
     """
@@ -240,9 +250,10 @@ class Passage:
         return TransferFunction(self._transfer(fx, fy, types), weight)
 
     def _transfer(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> np.ndarray:
-        """Return H times the fade, including the displacement to the window's centre.
+        """Return the transfer function of free space H, multiplied by the fade of light outside `band`.
 
-        Whole waves are subtracted in float64.
+        The result also contains the phase that displaces the field to the window's centre. It is an array (fy, fx).
+        Whole waves are subtracted from the phases in float64.
         """
         import drjit as dr
 

@@ -79,7 +79,10 @@ class TransformSampling:
 
     @property
     def back_period(self) -> float:
-        """Period in samples of the window. It is exactly whole if it is whole but for rounding errors."""
+        """Period of the transform, in samples of the window.
+
+        A period that differs from a whole number only by rounding errors is rounded to this number.
+        """
         period = self.period * self.source.dx / self.window.dx
         return float(round(period)) if abs(period - round(period)) <= SAME_PITCH else period
 
@@ -99,7 +102,7 @@ class TransformSampling:
 
     @property
     def why(self) -> str:
-        """Reason for the sampling, for plans."""
+        """Reason for the sampling, in words, for the plan of a result of `propagate`."""
         band = self.passage.band
         kept = f"band {band.kept * self.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
         paraxial = "; paraxial, as requested" if self.passage.paraxial else ""
@@ -122,8 +125,8 @@ class KeptLight:
 def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
     """Return the band of the light that can reach the window, or the passage's limit if there is one.
 
-    The band contains all frequencies if no light can be faded, because light at the Nyquist frequency of the source
-    lands in the window or near it.
+    If light at the Nyquist frequency of the source lands in the window or near it, there is no higher frequency that
+    could be faded out. The band then contains all frequencies.
     """
     wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
     # The source is extended by one sample, because the band-limited function extends beyond the outermost samples.
@@ -145,9 +148,12 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
-    """Return the sampling with the shortest period for a passage, restricted to the band that can reach the window.
+    """Return the sampling with the shortest period of a transform for the propagation from a source to a window.
 
-    spare: padding [m] for the blur of a truncated spectrum.
+    The band of its `passage` contains only light that can reach the window.
+
+    spare: length [m] by which the period is extended if no light can be faded. The spectrum is then truncated at the
+        Nyquist frequency, which blurs the field, and the longer period keeps the blur away from the window.
 
     Raises:
         AccuracyError: the period needs more samples than the limit.
@@ -175,10 +181,11 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 
 
 def most_spare(passage: Passage, source: Grid) -> float:
-    """Return the largest useful padding [m] for the blur of a truncated spectrum.
+    """Return the largest useful value of `spare` [m], the length by which `sampling` extends the period.
 
-    This is an upper bound. It assumes that the light with the largest displacement, at the spectrum's corner (√2 times
-    the Nyquist frequency), moves along an axis instead of along the diagonal.
+    A larger value would not reduce the blur that is due to the truncation of the spectrum. The result is an upper
+    bound. It assumes that the light with the largest displacement, at the spectrum's corner (√2 times the Nyquist
+    frequency), moves along an axis instead of along the diagonal.
     """
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
@@ -200,12 +207,13 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
 
 
 def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
-    """Return the power [units of Σ|u|²] that comes back into the window due to truncation at the Nyquist frequency.
+    """Return the power [units of Σ|u|²] of blur that comes back into the window from the next period.
 
-    The source is assumed to emit light of this frequency evenly.
+    The blur is due to truncation of the spectrum at the Nyquist frequency. It is assumed that light of this frequency
+    comes evenly from the whole width of the source.
 
-    spectrum: spectrum of the field at the source: (fx, fy) in FFT order if the window's pitch is a whole number of
-        samples, else (fy, fx) centred.
+    spectrum: spectrum of the field at the source. If the window's pitch is a whole multiple of the source's pitch, the
+        axes are (fx, fy) in FFT order. Otherwise they are (fy, fx), with frequency 0 in the centre.
     """
     nyquist = 0.5 / how.source.dx
     if how.passage.band.fade or not (how.passage.paraxial or nyquist * how.passage.wavelength < PERIOD_MAX_SINE):
@@ -234,12 +242,15 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 
 @lru_cache(maxsize=8)
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
-    """Return the fraction of the power |U|² at the Nyquist frequency along one axis that comes back into the window.
+    """Return the fraction of the power |U|² at the Nyquist frequency f_N along an axis that comes back into the window.
 
-    There is one weight per frequency along the other axis, (frequency,). It follows from the fraction of eq. (2) of the
-    module. The sum over samples U = Σ u e^{-2πi...} equals S/dx, so this fraction times dx² |U|² is the power ∫|b|² dx.
-    Division by dx gives the sum over samples along the axis. By Parseval's theorem, the factor 1/period gives the sum
-    along the other axis. The two ends ±f_N of the spectrum contribute a factor of 2.
+    U = Σ u e^{-2πi...} is the sum over samples of the source, and the power that comes back is a sum of |b|² over
+    samples of the blur b. Equation (2) of the module gives the power ∫|b|² dx, divided by |S|² = dx² |U|². This is then
+    multiplied by dx², and divided by dx for the sum over samples along the axis. By Parseval's theorem, the factor
+    1/period gives the sum along the other axis. A factor of 2 stands for the two ends ±f_N of the spectrum. The last
+    factor is the fraction of the light that does not miss the window along the other axis.
+
+    axis: axis of the blur, 0 for y, 1 for x. The result has one value per frequency along the other axis, (frequency,).
     """
     source, window = how.source, how.window
     others = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
@@ -255,8 +266,8 @@ def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
 def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of a source's light that lands within the window's range along an axis (0 for y, 1 for x).
 
-    The fraction is the overlap of two intervals, relative to the first one. Their widths are `lit` and `seen`, and
-    their centres are `missed` apart.
+    Displaced light covers an interval as wide as the source, and the window is a second interval. The fraction is the
+    width of their overlap, divided by the width of the source.
 
     walks: displacements [m] of the light along this axis.
     """

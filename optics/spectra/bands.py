@@ -68,9 +68,10 @@ class SpectralBands(ReadOnlyArrays):
         The spectrum may have any shape, including the lines of a fluorescent lamp, which samples at the bands' centres
         could miss. The values are first computed as means over the bands, weighted by the receptors' sensitivity and
         relative to daylight. They are then adjusted by the smallest change that makes Σ_b weights[c, b] values[b] equal
-        to the quantum catch of receptor type c, relative to that from a white surface in daylight (by quadrature to 1
-        nm). If there are fewer bands than types, this is possible only in the least-squares sense. If a spectrum with
-        lines is divided into few bands, a value may be negative.
+        to the quantum catch of receptor type c. The quantum catch is an integral over wavelengths in steps of 1 nm,
+        divided by the catch from a white surface in daylight. If there are fewer bands than types, this equality is
+        possible only in the least-squares sense. If a spectrum with lines is divided into few bands, a value may be
+        negative.
 
         radiance: a Spectrum, or a function of wavelengths [m]. For a surface, it is reflectance times illuminant.
         receptors: the receptors for which these bands were made.
@@ -126,7 +127,11 @@ def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
-    """Return wavelengths [nm] over the receptors' range, and each type's catch of daylight times quadrature weights."""
+    """Return wavelengths [nm] over the receptors' range, and what each receptor type absorbs of daylight at each one.
+
+    These quantum catches are multiplied by the weights of the trapezoid rule, so their sum is an integral over
+    wavelengths, up to a common factor. The arrays are (wavelength,) and (type, wavelength).
+    """
     low, high = kinds.limits_nm
     nm = np.arange(low, high + 0.5)
     catch = kinds.catch(nm)

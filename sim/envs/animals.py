@@ -101,7 +101,9 @@ class Animals:
         return frames
 
     def start_episodes(self, worlds: np.ndarray) -> Pending:
-        """Start new episodes; return their first frames, which are still being rendered, for each agent in `seeing`.
+        """Start new episodes in these worlds, and return their first frames, which are still being rendered.
+
+        There are frames for each agent whose eyes are used, in the order of the attribute `seeing`.
 
         worlds: indices of the worlds
 

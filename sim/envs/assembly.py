@@ -206,7 +206,13 @@ def _require_eyes(eyes: Any) -> None:
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
-    """Refuse arguments that a user task defines itself, and a mode that is neither the default nor the given one."""
+    """Raise a ValueError if an argument of `make_vec_env` is given that a user task defines itself.
+
+    Also raise it if the `mode` of the task (in an encounter, of an animal's task) is neither the default mode nor the
+    mode that was passed to `make_vec_env`.
+
+    given: all arguments of `make_vec_env`
+    """
     parameters = inspect.signature(make_vec_env).parameters
     for name, why in OF_TASKS.items():
         if given[name] != parameters[name].default:

@@ -76,9 +76,10 @@ class EyesOfKind:
     def _launch_in_time(
         self, receptors: ReceptorsInTime, poses: Poses, worlds: np.ndarray | None, fresh: bool
     ) -> PendingFrame:
-        """Launch the last frame of an action, after the receptors have seen its earlier frames.
+        """Launch the rendering of the frame at the end of an action, to which the receptors then respond.
 
-        There are no earlier frames if these worlds begin an episode. If only some worlds are rendered, and they do not
+        The receptors first respond to the frames at earlier moments of the action, which are rendered here. There are
+        no earlier frames if these worlds begin an episode (`fresh`). If only some worlds are rendered, and they do not
         begin an episode, the new frame replaces the frame that was last rendered in these worlds.
         """
         light = self._simulation.light(self._wavelengths)

@@ -47,7 +47,10 @@ def _palette(eye: CompoundEye) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _numbers(eye: CompoundEye) -> np.ndarray:
-    """Return the index of each pixel's ommatidium, (y, x); len(eye) between and around the hexagons."""
+    """Return the index of the ommatidium that each pixel of a map shows, (y, x).
+
+    Pixels between and around the hexagons show no ommatidium. Their value is len(eye), the number of ommatidia.
+    """
     tree = KDTree(eye.directions)
     two = min(2, len(eye))
     apart = tree.query(eye.directions, k=[two])[0][:, 0] if two == 2 else np.array([ALONE * np.sqrt(3)])

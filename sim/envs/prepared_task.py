@@ -1,4 +1,8 @@
-"""A task prepared for several environments: its scenes are built, and its fidelities are chosen, only once."""
+"""A task prepared for several environments, so that expensive steps are done only once.
+
+The scenes are built, and a fidelity is chosen for each kind of eyes. A fidelity is the accuracy with which the world is
+rendered for them. For example, it contains the number of rays per receptor.
+"""
 
 from __future__ import annotations
 

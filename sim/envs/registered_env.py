@@ -1,8 +1,9 @@
 """Environments that Gymnasium creates from an id. Gymnasium's `max_episode_steps` sets the length of their episodes.
 
 `gymnasium.make` passes this length only to its wrapper `TimeLimit`. The wrapper can end an episode earlier than the
-wrapped environment does, but not later. The wrapped environment therefore does not limit the number of actions in an
-episode, unless a course or a family of layouts does.
+wrapped environment does, but not later. The wrapped environment therefore sets no limit to the number of actions in an
+episode. The only exception is a limit `episode_steps` of the world itself: of its course (`sim.Course`, a drawing of
+walls and starting positions) or of its family of random layouts (`sim.LayoutFamily`).
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ class RegisteredEnv(EyesEnv):
 class RegisteredVectorEnv(EyesVectorEnv):
     """An `EyesVectorEnv` that truncates its episodes after `max_episode_steps` actions.
 
-    A course or a family of layouts with a smaller number of actions truncates them earlier. Further errors are those of
+    Episodes are truncated earlier if the world has a smaller limit, the `episode_steps` of a `sim.Course` (a drawing of
+    walls and starting positions) or of a `sim.LayoutFamily` (random layouts). Further errors are those of
     `EyesVectorEnv`.
 
     Raises:
@@ -55,7 +57,10 @@ def _begun(task: str | Task | type[Task]) -> str | Task:
 
 
 def _steps(asked: int, options: dict[str, Any]) -> int:
-    """Return the number of actions in an episode: the requested number, but at most that of the course or family.
+    """Return the number of actions after which an episode is truncated.
+
+    It is the requested number, but at most the `episode_steps` of the course or family of layouts in the options. If
+    `asked` is -1, no number is requested.
 
     Raises:
         ValueError: `options` contains `episode_steps`, the number is out of range, or the course is unknown.

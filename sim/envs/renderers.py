@@ -48,7 +48,8 @@ def renderers_for(
     """Return the renderers of all agents; None for agents whose eyes are not used.
 
     agents: agents of the simulation, possibly with other eyes
-    fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
+    fidelities: for each agent, the accuracy with which the world is rendered for each kind of its eyes, by name of the
+        kind (see `Fidelity`), or None if its eyes are not used
     scenes: scenes of a built-in layout, by kind of eyes; None for other models
     """
     return [

@@ -47,7 +47,10 @@ def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _palette(eye: Eye) -> np.ndarray:
-    """Return the linear sRGB colour that shows the signal of white, for each signal of an eye, (channel, h, w, 3)."""
+    """Return the linear sRGB colour in which each signal of an eye is shown if the receptor sees white.
+
+    The colours are (channel, row, column, 3). Signals of less light are shown in darker shades of them.
+    """
     height, width = eye.resolution
     if eye.mosaic is not None:
         return hues_of(eye.receptors)[eye.mosaic][None]
@@ -69,11 +72,12 @@ def hues_of(receptors: Receptors) -> np.ndarray:
 
 
 def shares_of(hues: np.ndarray) -> np.ndarray:
-    """Return each type's share in red, green and blue, (type, 3), such that equal signals of all types give white.
+    """Return the share of each receptor type in the red, green and blue of a pixel, (type, 3).
 
-    If no type's colour contains a primary, all types contribute equally to this primary.
+    The shares in each primary add up to 1, so equal signals of all types give white. If no type's colour contains a
+    primary, all types contribute equally to this primary.
 
-    hues: linear colour of each type, (type, 3)
+    hues: linear colour in which each receptor type is shown, (type, 3)
     """
     sums = hues.sum(axis=0)
     return np.divide(hues, sums, out=np.full(hues.shape, 1 / len(hues)), where=sums > 0)

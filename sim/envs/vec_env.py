@@ -77,7 +77,7 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def eyes(self) -> Any:
-        """`sim.Eyes` of a built-in task's agent, or several kinds by name; None if a user task places the eyes."""
+        """Eyes of a built-in task's agent: a `sim.Eyes`, or a dictionary of them by name; None for other tasks."""
         return getattr(self.simulation.task, "eyes", None)
 
     @property
@@ -154,7 +154,9 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations), step.reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[Arrays, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Take the actions of `step_async`; return the observations, rewards, ends of episodes and infos of all rows.
+        """Take the actions of `step_async`; return the observations, rewards, ends of episodes and infos.
+
+        Each of these has one row for each learning animal in each world.
 
         Raises:
             ValueError: a `sim.BatchTask` returns an invalid array.
@@ -178,8 +180,7 @@ class EyesVecEnv(OneEnvironment):
     def get_state(self) -> dict[str, np.ndarray]:
         """Return the state of all worlds as plain arrays whose first axis is the world.
 
-        Future steps depend only on this state and on the actions, unless a task stores values in its own attributes.
-        The state does not contain such values.
+        It contains all values on which future steps depend, except those that a task stores in its own attributes.
 
         Raises:
             RuntimeError: there was no reset, `close` was called, an action is pending, or MuJoCo's "sleep" is enabled.
@@ -261,10 +262,7 @@ class EyesVecEnv(OneEnvironment):
         return infos
 
     def _first_infos(self, worlds: np.ndarray) -> list[dict[str, Any]]:
-        """Return the infos before the first action of an episode in these worlds.
-
-        The first learner's infos in all these worlds come first, followed by the second learner's.
-        """
+        """Return the infos before the first action in these worlds: all of the first learner, then of the second."""
         simulation = self.simulation
         more = simulation.task.first_info(simulation.physics, worlds) or [{}] * len(worlds)
         return [

@@ -24,7 +24,7 @@ class View:
         radiance of CIE D65, which is 1 at 560 nm.
     receptors: signals of receptors, (channel, y, x) float32, or None; y and x may differ from those of the radiance
     rgb: linear sRGB preview of the radiance, or of the reflectance in daylight, (y, x, 3) float32; None: `write_exr`
-        computes it. Without radiance and reflectance, it is ignored
+        computes it. This preview is ignored if there is neither radiance nor reflectance.
     attributes: further values by name that JSON can represent, such as seed, time step or position
     peaks_nm: peak wavelength of each receptor channel [nm], (channel,); the preview shows the channel with the longest
         peak as red. None: channels are in descending order of their peaks.

@@ -57,9 +57,10 @@ class Eyes:
     vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170]. None: receptors are square
     dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: no memory
     density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: it is uniform
-    ommatidium: an optics.Ommatidium: the eyes are compound eyes. `resolution` is then the number of rows and of
-        ommatidia in a row of `sim.hexagonal_rows`; fov_deg / width is the mean difference in azimuth between
-        neighbours in a row. Compound eyes have neither optics, waveguide, vertical_fov_deg, dynamics nor density, and
+    ommatidium: an optics.Ommatidium: the eyes are compound eyes. The ommatidia form the lattice of
+        `sim.hexagonal_rows`. `resolution` is then the number of its rows, and the number of ommatidia in each row.
+        `fov_deg` divided by the second number is the mean difference in azimuth between neighbours in a row. Compound
+        eyes have neither optics, waveguide, vertical_fov_deg, dynamics nor density, and
         ignore sensor_width. None: the eyes are camera eyes.
     acute_zone: density of ommatidia in the middle of a compound eye, relative to the mean, 1 to 5; 1 for camera
         eyes; see `sim.hexagonal_rows`

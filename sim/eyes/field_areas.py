@@ -85,15 +85,19 @@ class FieldAreas:
 
 
 def _within(n: int, per_receptor: float) -> int:
-    """Return the number of rectangles that n receptors in a line occupy."""
+    """Return the smallest number of rectangles in a line that covers n receptors in a row or a column.
+
+    per_receptor: number of rectangles per receptor, which may be smaller than 1
+    """
     return math.ceil(n * per_receptor - 1e-9)
 
 
 def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
-    """Return the width of the rim before the first receptor of a line (a row or a column), as a number of rectangles.
+    """Return how many rectangles to add to the visual field before the first receptor of a row or a column.
 
-    It is the smallest number for which at most the fraction `beyond` of the light of the line's receptors comes from
-    beyond the rim.
+    These rectangles form a rim, because receptive fields extend beyond the outermost receptors. The result is the
+    smallest number for which at most the fraction `beyond` of the light that the receptors in the line receive comes
+    from beyond the rim.
 
     profile: fraction of the power of a receptor's field in each of its cells along the line, (cell,)
     line: number of receptors in the line, and rectangles per receptor

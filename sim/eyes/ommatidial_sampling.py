@@ -108,22 +108,26 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
 
 
 def _tests(places: np.ndarray, spread: float) -> np.ndarray:
-    """Return the light of two test scenes in directions with these sines (place, 2), as an array (place, scene).
+    """Return the light of two test scenes in some directions, as an array (direction, scene).
 
-    The light is uniform in the first scene, and a Gaussian of variance `spread` around the axis in the second.
+    The light is uniform in the first scene, and a Gaussian of variance `spread` around the ommatidium's axis in the
+    second.
+
+    places: components of the directions, which are unit vectors, perpendicular to the axis, (direction, 2)
     """
     return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
 
 
 def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray, powers: np.ndarray) -> np.ndarray:
-    """Return weights with which the signals of the test scenes are exact in every band.
+    """Return weights of an ommatidium's rays with which the signals of the test scenes are exact in every band.
 
     All bands share the same rays. Without the correction, the rays would represent a wide acceptance function as too
     narrow.
 
     weights: weights before the correction, (ray, band)
-    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of `powers`, (place, scene)
-    powers: tabulated acceptance function of each band, (band, place)
+    at_rays: light of the test scenes along the rays, (ray, scene)
+    everywhere: light of the test scenes in the directions for which `powers` is tabulated, (direction, scene)
+    powers: fraction of the accepted power that comes from each direction, in each band, (band, direction)
     """
     found = weights.copy()
     for band, power in enumerate(powers):

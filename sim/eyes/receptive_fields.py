@@ -76,7 +76,7 @@ class ReceptiveFields:
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
 
     def drawn_for(self, receptors: np.ndarray) -> ReceptiveFields:
-        """Return a copy whose mixture, from which rays are drawn, contains only the fields of these receptors."""
+        """Return a copy with another `density`, from which rays are drawn: the mean of these receptors' fields."""
         return replace(self, density=_mixture(self.field, self.resolution, self.cells, receptors))
 
     @property
@@ -90,20 +90,22 @@ class ReceptiveFields:
 
     @property
     def widths(self) -> tuple[float, float]:
-        """Smallest height and smallest width of the field among its planes [receptor heights and widths].
+        """Height and width of a receptor's field [receptor heights and widths], the smallest over all planes.
 
-        They are the equivalent widths (sum p)² / sum p² of the field's vertical and horizontal profiles p. A uniform
-        field that covers a receptor's area has the width 1.
+        A plane is the field in one band of one depth layer. Its height and width are the equivalent widths
+        (sum p)² / sum p² of its vertical and horizontal profiles p. A uniform field that covers a receptor's area has
+        the width 1.
         """
         profiles = (self.field.sum(axis=axis) for axis in (2, 1))
         height, width = (((p.sum(axis=1) ** 2) / (p**2).sum(axis=1)).min() / self.cells for p in profiles)
         return float(height), float(width)
 
     def draw(self, n: int) -> Draw:
-        """Return n low-discrepancy draws from the mixture.
+        """Return n low-discrepancy directions, drawn with the probability `density`, the mean of receptive fields.
 
-        The row of a draw is found by inverting the cumulative distribution of rows. Its column is found by inverting
-        the cumulative distribution within this row.
+        `density` is a table with one probability for each cell of the visual field. The row of a direction's cell is
+        found by inverting the cumulative distribution of rows. The column is found by inverting the cumulative
+        distribution within this row.
         """
         density, points = self.density, low_discrepancy(n)
         rows = np.concatenate([[0.0], np.cumsum(density.sum(axis=1))])
@@ -137,7 +139,14 @@ class ReceptiveFields:
         return weights
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the values of these receptors' fields in the cells of the drawn rays, (plane, receptor, ray)."""
+        """Return the power of some receptors' fields in the cell of each ray, as an array (plane, receptor, ray).
+
+        Cells are the parts of the visual field for which fields are tabulated. A plane is a band of a depth layer. The
+        power is 0 if a ray lies outside a receptor's field.
+
+        draw: rays that `draw` has returned
+        receptors: indices of the receptors, counted row by row
+        """
         row, column = np.divmod(receptors, self.resolution[1])
         y = draw.rows[None] - row[:, None] * self.cells
         x = draw.columns[None] - column[:, None] * self.cells
@@ -150,7 +159,12 @@ class ReceptiveFields:
 
 
 def cells_per_receptor(resolution: tuple[int, int]) -> int:
-    """Return the number of cells along a receptor's side for eyes of this resolution, if `cells_for` needs no more."""
+    """Return the usual number of cells along a receptor's side, for eyes of this resolution (height, width).
+
+    Cells are the equal parts of a receptor's area for which receptive fields are tabulated. There are at least 4 along
+    a receptor's side, and at least 32 along the side of the visual field that has more receptors. Some eyes need more
+    cells, see `cells_for`.
+    """
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
@@ -165,9 +179,11 @@ def kernels_of(eye: optics.Eye, cells: int, depth: DepthLayers) -> np.ndarray:
 
 
 def cells_for(eye: optics.Eye) -> int:
-    """Return the number of cells along an average receptor's side.
+    """Return the number of cells along the side of an eye's average receptor.
 
-    A narrow waveguide, or receptors much smaller than the average, require a larger number.
+    Cells are the equal parts of this receptor's area for which receptive fields are tabulated. The number is that of
+    `cells_per_receptor`. A narrow waveguide, or receptors much smaller than the average, require a larger number, which
+    is at most 64.
     """
     fewest = cells_per_receptor(eye.resolution)
     if eye.lattice is not None:
@@ -180,9 +196,10 @@ def cells_for(eye: optics.Eye) -> int:
 def receptive_fields_of(
     eye: optics.Eye, depth: DepthLayers = ONE_PSF, kind: type[ReceptiveFields] = ReceptiveFields
 ) -> ReceptiveFields:
-    """Return the receptive fields of an eye, tabulated on the cells of `cells_for`.
+    """Return the receptive fields of an eye, tabulated for cells, the equal parts of an average receptor's area.
 
-    If the PSF cannot be computed on these cells, coarser cells are used.
+    `cells_for` defines the number of cells along a receptor's side. While the PSF cannot be computed on these cells,
+    because it covers too many of them, this number is halved.
 
     kind: class of the table; `sim.eyes.varied_fields.VariedFields` for receptors of different sizes
 
@@ -252,7 +269,10 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 
 
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
-    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
+    """Return the mean of these receptors' fields, as the probability of each cell of the visual field, (y, x).
+
+    The mean is also taken over planes, which are the field in each band of each depth layer. Every plane has the same
+    share, whatever its power.
 
     field: power in each cell of the field, which is the same for all receptors, (plane, y, x)
     resolution: rows and columns of receptors

@@ -28,8 +28,8 @@ class Stretch:
     """The contiguous range of rays that a row of receptors uses.
 
     first: index of the first ray
-    weights: weights of the rays, (ray, channel * width) float32
-    views: number of views in a product
+    weights: weight of each ray in each channel of each receptor in the row, (ray, channel * width) float32
+    views: number of views for which one matrix product computes the signals; a view is one eye in one world
     """
 
     first: int
@@ -93,10 +93,13 @@ class RowProduct:
 
 
 def _views_at_once(weights: int) -> int:
-    """Return the largest number of views for which one thread computes a product with this number of weights.
+    """Return the number of views (eyes in worlds) whose signals one matrix product with the weights computes.
 
-    The result is one of 32, 16, 8 and 4. It is 32 if one thread cannot compute even 4 views, because such products are
+    The result is the largest of 32, 16, 8 and 4 for which OpenBLAS certainly computes the product on one thread. If
+    even the product for 4 views may use several threads, the result is 32, because products with so many weights are
     large enough for several threads.
+
+    weights: number of weights, for one row of receptors
     """
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights <= ONE_THREAD), BLOCK)
 

@@ -79,7 +79,7 @@ class BoxSampling:
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of some receptors (numbered row by row) in the sensor with this number of areas."""
+        """Return the rectangles of some receptors (numbered row by row), each divided as in the sensor of `areas`."""
         count = max(1, round(per_receptor))
         plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
         return Trial(plane, unused, self._means(len(receptors), count), extent)
@@ -95,7 +95,7 @@ class BoxSampling:
         return plane, _unused(plane), count, self.depth, extent_of(self.eye, (1 / columns, 1 / rows))
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of some receptors (numbered row by row) in the sensor with this number of rays."""
+        """Return the samples of some receptors (numbered row by row), with this number of rays for each of them."""
         rays = max(1, round(rays_per_receptor))
         return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
 
@@ -114,12 +114,12 @@ class BoxSampling:
         return self._through((low_discrepancy(rays) + shifts) % 1.0 + corners)
 
     def _means(self, receptors: int, samples: int) -> np.ndarray:
-        """Return weights that average this number of samples for each receptor, (band, receptor, sample)."""
+        """Return weights (band, receptor, sample) that give each receptor the mean of its own `samples` samples."""
         weights = np.kron(np.eye(receptors), np.full((1, samples), 1 / samples))
         return np.broadcast_to(weights, (self.eye.bands, *weights.shape))
 
     def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the directions (ray, 3) and the bounce samples (ray, 2) of these receptors' rays."""
+        """Return the directions (ray, 3) of some receptors' rays, and points (ray, 2) that determine reflections."""
         height, width = self.eye.resolution
         shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
         corners = self._corners()[receptors]
@@ -142,12 +142,13 @@ class BoxSampling:
 
 @dataclass(frozen=True)
 class FieldSampling:
-    """Samples of an eye behind a pupil: rays drawn from the mixture of all receptive fields, or a lattice of areas.
+    """Samples of an eye behind a pupil: rays, or areas, which form a lattice of rectangles of the visual field.
 
-    If the requested number leaves a receptor without a ray, `sensor` draws more rays until every receptor has one.
+    Rays are drawn from the mean of all receptive fields. If the requested number leaves a receptor without a ray,
+    `sensor` draws more rays until every receptor has one.
 
-    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. White light from beyond each side of the lattice
-        of areas contributes at most this amount to a signal, on average over the receptors.
+    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. The lattice is so large that, in a white scene,
+        the light from beyond each of its four sides contributes at most this error to the receptors' mean signal.
     """
 
     eye: optics.Eye
@@ -165,7 +166,7 @@ class FieldSampling:
                 rays += max(1, rays // 4)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of some receptors (numbered row by row) in the sensor with this number of rays.
+        """Return the samples of some receptors (numbered row by row), as in the sensor with this number of rays.
 
         Raises:
             NoRaysError: one of these receptors has no ray.
@@ -199,7 +200,10 @@ class FieldSampling:
         return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of some receptors (numbered row by row) in the sensor with this number of areas."""
+        """Return the rectangles of the sensor that `areas` builds, with their weights in some receptors' signals.
+
+        receptors: indices of the receptors, counted row by row
+        """
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), extent_of(self.eye, lattice.size))
@@ -243,7 +247,7 @@ def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
-    """Return placeholders for bounce samples, which areas do not use: their reflected light comes from a table."""
+    """Return zeros (area, 2) in place of the points that determine how rays are reflected, which areas do not need."""
     return np.zeros((len(plane), 2), np.float32)
 
 
@@ -257,10 +261,7 @@ WorldSampling = EyeSampling | OmmatidialSampling
 
 
 def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
-    """Return the mask of the squares that are added if a field is extended by one square on every side.
-
-    Its shape is (height + 2, width + 2).
-    """
+    """Return a mask (height + 2, width + 2) that is True for the ring of squares around a field of receptors."""
     return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 

@@ -22,12 +22,15 @@ NEAR = 0.25, 0.5, 0.25
 class VariedFields(ReceptiveFields):
     """Tabulated receptive fields of an eye whose receptors differ in size (`optics.Eye(density=...)`).
 
-    field: power per cell of the PSF, rotated by 180°, (plane, y, x)
-    density: probability per cell of the mixture of all receptors' fields, see `ReceptiveFields`. It is high where
-        receptors are dense
+    Fields are tabulated for cells, the equal parts of an average receptor's area.
+
+    field: power of the PSF, rotated by 180°, in each cell, (plane, y, x), with one plane for each band of each depth
+        layer
+    density: probability of each cell of the visual field, from which rays are drawn, (y, x). It is the mean of the
+        fields of all receptors, so it is high where receptors are dense.
     resolution: receptors (height, width)
-    cells: cells along the side of an average receptor
-    lattice: rectangles of the receptors
+    cells: number of cells along the side of an average receptor
+    lattice: rectangle of each receptor
     """
 
     lattice: ReceptorLattice
@@ -46,11 +49,17 @@ class VariedFields(ReceptiveFields):
         return cls(field, density, eye.resolution, cells, eye.lattice)
 
     def drawn_for(self, receptors: np.ndarray) -> VariedFields:
-        """Return a copy whose mixture, from which rays are drawn, contains only the fields of these receptors."""
+        """Return a copy with another `density`, from which rays are drawn: the mean of these receptors' fields."""
         return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the values of these receptors' fields at the points of the drawn rays, (plane, receptor, ray)."""
+        """Return the power per cell of some receptors' fields at the points of rays, (plane, receptor, ray).
+
+        A plane is a band of a depth layer.
+
+        draw: rays that `draw` has returned
+        receptors: indices of the receptors, counted row by row
+        """
         rows, columns = np.divmod(receptors, self.resolution[1])
         found = np.zeros((len(self.field), len(receptors), len(draw)))
         for row in np.unique(rows):
@@ -92,7 +101,11 @@ def _edges(edges: np.ndarray, receptors: int, cells: int) -> np.ndarray:
 
 
 def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate a table (plane, n + 1, x) linearly along its second axis; return (plane, place, x)."""
+    """Interpolate a table linearly along its second axis, and return the values as an array (plane, position, x).
+
+    table: values in each plane, which is a band of a depth layer, (plane, n + 1, x)
+    places: positions along the second axis, as indices with fractions, (position,)
+    """
     at = np.clip(places, 0, table.shape[1] - 1)
     k = np.minimum(at.astype(int), table.shape[1] - 2)
     share = (at - k)[:, None]
@@ -100,7 +113,11 @@ def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate a table (plane, ray, n + 1) linearly at places (receptor, ray); return (plane, receptor, ray)."""
+    """Interpolate a table linearly along its third axis, and return the values as an array (plane, receptor, ray).
+
+    table: values for each ray in each plane, which is a band of a depth layer, (plane, ray, n + 1)
+    places: position along the third axis for each receptor and ray, as an index with fractions, (receptor, ray)
+    """
     at = np.clip(places, 0, table.shape[2] - 1)
     k = np.minimum(at.astype(int), table.shape[2] - 2)
     share, rays = at - k, np.arange(table.shape[1])
@@ -108,11 +125,16 @@ def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _mixture(field: np.ndarray, lattice: ReceptorLattice, cells: int, receptors: np.ndarray) -> np.ndarray:
-    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
+    """Return the mean of these receptors' fields, as the probability of each cell of the visual field, (y, x).
 
-    A ray may be up to half a cell from the middle of its cell, at which the mixture is computed. The mixture is
-    therefore averaged over neighbouring cells. Otherwise a ray just beyond the rim, where the mixture is almost 0,
-    could get a huge weight.
+    The mean is also taken over planes, which are the PSF in each band of each depth layer. It is computed at the
+    middles of cells, from which a ray may be up to half a cell away. The mean is therefore averaged over neighbouring
+    cells. Otherwise a ray just beyond the rim of the fields, where the mean is almost 0, could get a huge weight.
+
+    field: power of the PSF, rotated by 180°, in each cell, (plane, y, x)
+    lattice: rectangle of each receptor
+    cells: number of cells along the side of an average receptor
+    receptors: indices of the receptors, counted row by row
     """
     from scipy.ndimage import convolve1d
     from scipy.signal import fftconvolve

@@ -68,9 +68,9 @@ class AgentPhysics:
     world: the world, whose model all agents share
     threads: number of threads for MuJoCo's batched step of 128 or more worlds
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
-        obstacles are simulated in models of these obstacles alone (`local_contacts`). The attribute `free_motion` or
-        `local_contacts` is None if the model does not support the method. If False, MuJoCo simulates all agents in the
-        whole world.
+        obstacles are simulated in models of these obstacles alone (`local_contacts`). If `closed_form` is False, MuJoCo
+        simulates all agents in the whole world. The attributes `free_motion` and `local_contacts` are None if the model
+        does not support these methods, or if `closed_form` is False.
 
     Raises:
         ValueError: the model lacks the agent's joints, actuators or touch sensor, or an object could collide or is not

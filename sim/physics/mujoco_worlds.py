@@ -161,7 +161,11 @@ class MujocoWorlds:
         mujoco.mj_forward(data.model, data)
 
     def _pass_frame(self, world: int) -> None:
-        """Advance a world to the next frame. Then only update its poses, so that frames do not change the physics."""
+        """Advance a world to the next frame that is shown during an action.
+
+        After the last step, only the poses that follow from the new state are computed. Frames therefore do not change
+        the physics.
+        """
         data = self.datas[world]
         mujoco.mj_step(data.model, data, self.substeps // self.frames)
         mujoco.mj_kinematics(data.model, data)

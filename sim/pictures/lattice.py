@@ -51,9 +51,10 @@ class Lattice:
     def between(self, differ: np.ndarray) -> np.ndarray:
         """Return the indices of pixels outside the lattice that may lie on an edge.
 
-        The pixel of the lattice nearest to such a pixel differs in colour from a neighbouring pixel of the lattice.
+        The lattice consists of every fifth pixel. A pixel outside the lattice may lie on an edge if the lattice pixel
+        that is nearest to it differs in colour from one of its neighbours in the lattice.
 
-        differ: True for the pairs of neighbours whose colours differ, (m,)
+        differ: True for the pairs of neighbouring lattice pixels (`pairs`) whose colours differ, (pair,)
         """
         rough = np.zeros(len(self.pixels), bool)
         rough[self.pairs[:, differ]] = True

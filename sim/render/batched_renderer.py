@@ -1,4 +1,4 @@
-"""Rendering of all eyes of all agents in a built-in world, as one wavefront."""
+"""Rendering of a built-in world as all eyes of all agents see it; the rays of all eyes are traced together."""
 
 from __future__ import annotations
 

@@ -57,12 +57,15 @@ class Lane:
 
 @dataclass(frozen=True)
 class Directions:
-    """Directions of samples on the device, in rows of four floats.
+    """Directions of an eye's samples, stored on the device in rows of four floats.
+
+    Upright eyes stand on one body that moves and turns on a level plane. Free eyes may be anywhere and may have any
+    orientation.
 
     ways: directions of all samples. For free eyes, they are in the eye's frame. For upright eyes, they are in the
         body's frame, and the fourth float is the cosine of the angle to the eye's axis
-    origins: pupils of upright eyes in the body's frame. For free eyes: starting points of all samples in the eye's
-        frame, or None if they start at the pupil
+    origins: for upright eyes, the positions of the pupils in the body's frame. For free eyes, the starting points of
+        all samples in the eye's frame, or None if all samples start at the pupil
     axes: axes of upright eyes in the body's frame; None for free eyes
     """
 
@@ -83,14 +86,17 @@ class EyeRays(Protocol):
     def directions(self, ways: np.ndarray, origins: np.ndarray | None = None) -> Directions:
         """Return the directions of all samples on the device, in the frame that `Directions` describes.
 
-        ways: directions of the samples in the eye's frame, (ray, 3)
-        origins: starting points in the eye's frame [m], (ray, 3), of free eyes; None: the pupil
+        ways: directions of the samples in the eye's frame, array (ray, 3)
+        origins: starting points of the samples in the eye's frame [m], array (ray, 3); None: all samples start at the
+            pupil. Eyes that stand upright on one body ignore the starting points
         """
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
-        """Return the ray of a lane, inside the kernel.
+        """Return the ray of one lane of the kernel, which is one sample of one eye in one world.
 
-        rows: see `array`
+        The kernel calls this method, so all arguments and the result are Dr.Jit variables on the device.
+
+        rows: buffer of the eyes, see `array`
         along: directions of the samples
         samples: number of samples of an eye
         """

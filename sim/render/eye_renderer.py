@@ -1,4 +1,4 @@
-"""Rendering of all eyes in all worlds as one wavefront, by frozen kernels, with any tracer.
+"""Rendering of all eyes in all worlds together, by frozen (recorded) kernels, with any tracer.
 
 Directions and wavelengths are fixed. A call only uploads poses and launches the kernels that the first call recorded.
 """
@@ -140,8 +140,7 @@ class EyeRenderer:
         """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
         poses: poses of every world: a list of their MjData after mj_forward or mj_step, or `sim.Poses`, arrays stacked
-            over worlds. The MjData of a single world need not be in a list. For built-in worlds, a
-            `WorldState` is also accepted
+            over worlds. A single world's MjData needs no list. For built-in worlds, a `WorldState` is also accepted
         light: factors of all lights of each world, (env, band); None: lights as in the model
 
         Raises:
@@ -162,11 +161,12 @@ class EyeRenderer:
         return self._launched(poses).then(lambda found: self._signals(found, factors))
 
     def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
-        """Start rendering some of the worlds; the signals are (len(worlds), eye, channel, height, width).
+        """Start rendering the worlds with the indices `worlds`; `wait` of the returned frame returns their signals.
 
-        `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to 8 of more
-        than 8 worlds are rendered in separate buffers, so that a frame of all worlds may be pending at the same time.
-        Otherwise, all worlds are rendered. The errors are those of `signals`, and a ValueError for an unknown world.
+        `poses` and `light` are given for all worlds, as in `signals`. If at most 8 indices are given and the renderer
+        has more than 8 worlds, separate buffers are used, so that a frame of all worlds may be pending at the same
+        time. Otherwise, all worlds are rendered. The errors are as in `signals`, with a ValueError for an unknown
+        world. The signals are an array (index in `worlds`, eye, channel, height, width).
         """
         worlds = world_indices("worlds", worlds, self.n_envs)
         if not len(worlds) <= FEW < self.n_envs:
@@ -256,7 +256,7 @@ class EyeRenderer:
         return recorded + (0 if labels is None else labels.recordings)
 
     def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
-        """Launch the kernels for the receptors' sums in these worlds, or the kernel `frozen` if it is given."""
+        """Start the kernels that sum the light over each receptor's rays; if `frozen` is given, start only it."""
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 

@@ -1,8 +1,9 @@
 """Trials of sampling methods in views of a world, before a renderer of the world is built.
 
-A trial renders some of an eye's receptors and compares their signals with signals from many more rays. The errors of
-rays and areas are computed for the populations in `sim.render.populations`, those of depth layers only for random
-receptors. All draws have fixed seeds, so the same world and eyes give the same result.
+A trial renders some of an eye's receptors and compares their signals with signals from many more rays. Errors due to
+the number of rays or areas are computed for random receptors and, if there are objects, also for receptors that see an
+object (`sim.render.populations`). Errors due to the number of depth layers are computed for random receptors only. All
+draws have fixed seeds, so the same world and eyes give the same result.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class FidelityTrials:
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Return a function that maps rays per receptor to the root mean square error of signals.
 
-        If there are two populations of receptors (`sim.render.populations`), the larger of their errors is returned.
+        In worlds with objects, the result is the larger of the errors for random receptors and for views of objects.
 
         Raises:
             NoRaysError: raised by the returned function if a receptor has no rays.
@@ -93,7 +94,10 @@ class FidelityTrials:
         return error
 
     def have_areas(self, *lights: str) -> bool:
-        """Return whether this eye and this world permit area sampling with all of these levels of light."""
+        """Return whether this eye and this world permit area sampling with light of all these kinds.
+
+        lights: "direct", "bounce" and "all" follow one, up to two, and any number of reflections, respectively
+        """
         if self._eye.lattice is not None:
             return False
         try:
@@ -104,7 +108,10 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """Return a function that maps areas per receptor to errors, with the reference's noise; see `errors`."""
+        """Return a function that maps areas per receptor to the root mean square error of signals, as in `errors`.
+
+        The reference is computed with many random rays, and its noise is included in the error.
+        """
         populations = self._populations(sampling)
         truths = [
             self._signals(self._truth(sampling, p.receptors), sampling.depth, light, p.views, TRUE_RAYS)
@@ -122,16 +129,16 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals."""
+        """Return whether shared areas, under one per receptor, are so small that neighbours still differ in signal."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:
-        """Return the number of rendered areas per receptor. Behind a pupil, it includes areas around the receptors."""
+        """Return the number of areas that are rendered per receptor, also around the field if the eye has a pupil."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
     def _truth(self, sampling: EyeSampling, receptors: np.ndarray) -> Trial:
-        """Return many rays as a reference for areas. Behind a pupil, they are drawn for these receptors only."""
+        """Return many rays, drawn for these receptors only, as the reference for the errors of area sampling."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
             return sampling.trial(int(np.clip(of_a_view // len(receptors), *TRUE_AREA)), receptors)
@@ -149,7 +156,7 @@ class FidelityTrials:
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
         """Return root mean squares of the signals due to the second reflection and to direct light.
 
-        They are for the population in which the second reflection is larger.
+        Both are for random receptors or for receptors near an object, whichever have a larger second reflection.
 
         Raises:
             ValueError: light cannot be followed after the first reflection.
@@ -192,9 +199,7 @@ class FidelityTrials:
     ) -> np.ndarray:
         """Return signals (view, channel, receptor) in as many of the views as the number of rays allows.
 
-        trial: samples of each eye, and their weights
-        depth: layers among which light is divided
-        light: level of light
+        trial, depth, light: samples and weights, depth layers that share the light, and reflections that are followed
         views: views of the signals; None: the views of the trials
         most: largest number of rays in all views together, unless fewer than 12 views would remain
         """
@@ -214,9 +219,8 @@ class FidelityTrials:
     def _factors(self, light: str, trial: Trial) -> np.ndarray:
         """Return the contribution of component k of the light in band b to channel c: mixing[c, b] basis[k, b].
 
-        The shape is (channel, component, band). `mixing` is the weight of a band, times the aperture's throughput. With
-        weights W of ray p, receptor r and depth layer l, the signals are signal_c[r] = sum_b mixing[c, b] sum_l sum_k
-        basis[k, b] sum_p W_lb[r, p] light_lk[p].
+        The shape is (channel, component, band). `mixing` is a band's weight times the aperture's throughput. Signals
+        are sum_bklp mixing[c, b] basis[k, b] W_lb[r, p] light_lk[p]: weights W, ray p, receptor r, depth layer l.
         """
         basis = (self._scene.areas if trial.extent else self._scene.tracers.tracer_for)(light).basis
         return self._eye.aperture_throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
@@ -276,9 +280,7 @@ def _in_fours(trial: Trial) -> np.ndarray:
 
 
 def _summed(weights: np.ndarray, layers: np.ndarray) -> np.ndarray:
-    """Return sums over depth layers, components and rays, (view, channel, receptor).
-
-    The sums are one matrix product, since `np.einsum` takes up to twice as long.
+    """Return sums over layer, component and ray, (view, channel, receptor); `np.einsum` takes up to twice as long.
 
     weights: (channel, layer, component, receptor, ray)
     layers: (layer, component, view, ray)

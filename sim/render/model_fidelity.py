@@ -47,8 +47,12 @@ SPLIT = 0.1
 
 @dataclass(frozen=True)
 class Trials:
-    """Errors of signals over the receptors without a uniform field (root mean square), by rays per receptor.
+    """Errors of signals for several numbers of rays per receptor.
 
+    A receptor has a uniform field if the smallest number of rays already gives it nearly the right signal. Such
+    receptors are left out.
+
+    errors: root mean square error over the other receptors, for each number of rays per receptor
     share: fraction of all receptors that do not have a uniform field
     """
 
@@ -69,17 +73,19 @@ def choose_model_fidelity(
     light: str = lighting.DIRECT,
     medium: optics.TurbidMedium | str | None = None,
 ) -> Fidelity:
-    """Return the fidelity for `ModelRenderer` that has the fewest rays with an error within the tolerance.
+    """Return a fidelity (accuracy of rendering) for `ModelRenderer`, with the smallest sufficient number of rays.
 
-    If there is none, a FidelityWarning states by how much the tolerance is exceeded. Bands are the eye's own.
+    Increasing numbers of rays are tried until the error is within the tolerance. If even the largest number is not
+    enough, a FidelityWarning states by how much the tolerance is exceeded. The number of spectral bands is not chosen:
+    it is the number that the eye has.
 
     model, eye, mounts: see `ModelRenderer`
     poses: poses at one or more moments that are typical of later use, as a list of MjData or as `sim.Poses`
     tolerance: allowed error of a signal (root mean square), over receptors whose field is not uniform; None: half of
         the eye's `noise_sigma`, but at least 0.005 times the signal of a white surface
     groups, spectra, varied, medium: see `ModelRenderer`
-    light: "direct" or "bounce", see `Fidelity`; "auto": "bounce" if direct light alone has an error above the tolerance
-        at these moments, over receptors that bounced light reaches
+    light: "direct" (one reflection) or "bounce" (up to two), see `Fidelity`; "auto": "bounce" if direct light alone has
+        an error above the tolerance, over receptors that bounced light reaches in these poses, otherwise "direct"
 
     Raises:
         ValueError: the tolerance is not positive and finite, `light` is unknown, or ModelRenderer refuses an argument.
@@ -104,7 +110,9 @@ def choose_model_fidelity(
 
 
 class ModelStages:
-    """Levels of fidelity for a model, tried at moments of its worlds; see `Stages`.
+    """The stages in which the accuracy of rendering a user model is chosen, see `Stages`.
+
+    Errors are computed by rendering the model in given poses.
 
     scene: the model and its eyes
     moments: poses in which signals are compared
@@ -120,7 +128,11 @@ class ModelStages:
         self._cached_signals = cache(self._signals)
 
     def _signals(self, rays: float, light: str) -> np.ndarray:
-        """Return the noise-free signals at all moments, with this number of rays and this level of light."""
+        """Return the noise-free signals in all poses in which signals are compared.
+
+        rays: number of rays per receptor
+        light: reflections that are followed: "direct" (one) or "bounce" (up to two)
+        """
         fidelity = _with(rays, self.eye, self.allowed, light)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MirrorWarning)  # the final renderer repeats the warnings
@@ -174,10 +186,10 @@ def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Le
 
 
 def _with(rays: float, eye: WorldEye, allowed: float, light: str) -> Fidelity:
-    """Return the fidelity with this number of rays.
+    """Return a fidelity with this number of rays per receptor.
 
-    In direct light through a perfect lens it uses adaptive edge sampling if that saves rays, except for the fidelity
-    with which the others are compared.
+    In direct light through a perfect lens, it uses adaptive edge sampling if that saves rays. The exception is the
+    fidelity with the most rays, which is the reference for the errors of all others.
     """
     at_edges = light == lighting.DIRECT and _is_perfect(eye) and rays < PERFECT_TRUTH
     at_edges = at_edges and edges_pay(eye.resolution, rays)
@@ -185,11 +197,11 @@ def _with(rays: float, eye: WorldEye, allowed: float, light: str) -> Fidelity:
 
 
 def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: float, allowed: float) -> Trials:
-    """Return the errors of increasing numbers of rays, up to the first error that is allowed.
+    """Return the errors of signals for increasing numbers of rays, up to the first error that is allowed.
 
-    seen: function that maps rays per receptor to signals (env, eye, channel, height, width)
+    seen: function that maps a number of rays per receptor to signals, array (env, eye, channel, height, width)
     ladder: numbers of rays per receptor to try, in ascending order
-    truth: number of rays per receptor of the signals with which all others are compared
+    truth: number of rays per receptor in the reference. Errors are differences from its signals
     allowed: largest allowed error of a signal
     """
     right = seen(truth)

@@ -1,9 +1,10 @@
-"""Populations of views and receptors for which the errors of trials are computed.
+"""Sets of views and receptors (populations) for which errors of rendering are computed.
 
-There are two: random receptors in views from random places and, in worlds with objects, receptors that see an object,
-in views with an object nearby. The second is separate because objects decide how an episode ends. Most receptors see
-floor and walls, and would hide errors at objects. All draws have fixed seeds, so the same world and eyes give the same
-populations.
+In a trial, the signals of a few receptors in some views are rendered and compared with a reference. There are two
+populations. The first contains random receptors in views from random places. The second, in worlds with objects,
+contains receptors that see an object, in views with an object nearby. It is separate because objects decide how an
+episode ends. Most receptors see floor and walls, and would hide errors at objects. All draws have fixed seeds, so the
+same world and eyes give the same populations.
 """
 
 from __future__ import annotations
@@ -34,7 +35,12 @@ class Population:
     counted: np.ndarray
 
     def rms(self, error: np.ndarray) -> float:
-        """Return the root mean square of an error (view, channel, receptor) over this population; 0 if it is empty."""
+        """Return the root mean square of the errors of signals over the receptors that count in each view.
+
+        It is 0 if no receptor counts in any view.
+
+        error: error of each signal, array (view, channel, receptor)
+        """
         counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
         return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 
@@ -47,9 +53,10 @@ def everywhere(scene: WorldScene, views: int) -> Population:
 
 
 def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int) -> Population:
-    """Return views near objects, and random receptors, counted in those views in which they see an object.
+    """Return views near objects, and random receptors that see an object in some of them.
 
-    In a wide eye, an object fills few receptors. Receptors that often see an object are therefore drawn more often.
+    A receptor counts only in the views in which it sees an object. In an eye with a wide field, an object fills few
+    receptors. Receptors that often see an object are therefore drawn with a higher probability.
 
     views: number of views
     rays: number of rays, through all receptors together, that test which receptors see an object

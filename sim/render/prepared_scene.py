@@ -1,4 +1,7 @@
-"""A model prepared for given eyes: built once, for choosing a fidelity and for rendering."""
+"""A MuJoCo model and its eyes, prepared once for rendering.
+
+The same prepared scene serves to choose the accuracy of rendering (`sim.render.fidelity`) and to render.
+"""
 
 from __future__ import annotations
 
@@ -35,10 +38,12 @@ Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # pos
 
 
 class PreparedScene:
-    """A model in the spectral bands of given eyes. Nothing in it depends on the fidelity, except for the bands.
+    """A MuJoCo model, prepared for rendering by given eyes: light and materials are stored in the eyes' spectral bands.
+
+    It can be rendered with any fidelity (number of samples, depth layers and light) that has these bands.
 
     model: the MuJoCo model
-    eye: optics and retina, with its own bands
+    eye: optics and retina, with the spectral bands
     mounts: places of the eyes on the model
     spectra: measured spectra of materials and lights, by name
     groups: visible geom groups
@@ -128,33 +133,45 @@ class PreparedScene:
         raise self.tracers.upright
 
     def areas(self, light: str) -> AreaTracer:
-        """Return the tracer that uses area sampling.
+        """Return the tracer for area sampling, which computes the mean light in areas of the visual field.
+
+        light: reflections that are followed: "direct" (one), "bounce" (up to two) or "all" (any number)
 
         Raises:
-            ValueError: the world has no closed forms for areas, or the tracer is "mitsuba", which traces only rays.
+            ValueError: the mean light in an area of this world has no closed form, or the tracer is "mitsuba", which
+                traces only rays.
         """
         return self.tracers.areas(light)
 
     def area_sensor(self, sampling: EyeSampling, per_receptor: float) -> Sensor:
-        """Return a sensor with this number of areas per receptor."""
+        """Return a sensor whose samples are areas (rectangles of the visual field), this number per receptor."""
         return sampling.areas(per_receptor, in_rows=self._in_rows)
 
     def area_trial(self, sampling: EyeSampling, per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the part of an area sensor, with this number of areas per receptor, that these receptors need."""
+        """Return the areas that contribute to the signals of these receptors, with their weights.
+
+        Areas are rectangles of the visual field in which the mean light is computed.
+
+        per_receptor: number of areas per receptor in the whole eye
+        receptors: indices of the receptors, row by row
+        """
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals.
+        """Return whether receptors may share areas without losing the differences between neighbouring receptors.
 
-        It is False for a perfect lens, whose receptors share no areas.
+        Areas are rectangles of the visual field in which the mean light is computed. If they are too large, neighbours
+        may have equal signals. The result is False for a perfect lens, whose receptors share no areas.
+
+        per_receptor: number of areas per receptor, below 1
         """
         return isinstance(sampling, FieldSampling) and sampling.may_share(per_receptor, in_rows=self._in_rows)
 
     @property
     def _in_rows(self) -> bool:
-        """True if areas are divided into rows as well as columns.
+        """True if the field of a receptor is divided into rows of areas as well as columns.
 
-        Walls and floor have closed forms along columns of any height, but the outlines of spheres need rows.
+        The mean light of walls and floor has a closed form in columns of any height, but outlines of spheres need rows.
         """
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0

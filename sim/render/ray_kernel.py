@@ -52,10 +52,11 @@ class KernelInputs:
 
 @dataclass(frozen=True)
 class Frame:
-    """Inputs of a kernel for all worlds at one moment.
+    """Inputs of a kernel that change from moment to moment: the poses in all worlds.
 
-    eyes: buffer of the eyes, see `EyeRays.array`
-    things: the tracer's rows, see `sim.tracing.tracer.Buffers`
+    eyes: buffer with the positions and orientations of the eyes, see `EyeRays.array`
+    things: values that the tracer reads and that differ between worlds, such as positions of moving geoms, see
+        `sim.tracing.tracer.Buffers`
     """
 
     eyes: Array
@@ -70,7 +71,10 @@ class Moving:
         self._frame: Frame | None = None
 
     def fill(self, poses: Poses) -> None:
-        """Write the eyes and the tracer's rows of these worlds to the buffers."""
+        """Write the poses of all worlds to the buffers that the kernel reads.
+
+        One buffer is for the eyes. The others are for the scene's values that differ between worlds.
+        """
         self._eyes.fill(poses)
         self._things.fill(poses)
 
@@ -90,7 +94,8 @@ class RayKernel:
     tracer: tracer that intersects the rays and computes their light
     eyes: eyes at which the rays start
     n_envs, n_eyes: numbers of worlds, and of eyes in each world
-    depth: layers among which light is divided
+    depth: depth layers, which are distances for which the eye has a PSF. The light of a ray is divided between the two
+        layers next to the distance of the visible surface
     """
 
     def __init__(self, tracer: Tracer, eyes: EyeRays, n_envs: int, n_eyes: int, depth: DepthLayers) -> None:

@@ -116,9 +116,10 @@ class ReferenceRenderer:
         return np.array([[self._picture(view) for view in self._views(state, i)] for i in range(state.n)])
 
     def radiance(self, state: WorldState) -> np.ndarray:
-        """Return the spectral radiance (env, eye, ray, band), as the batched renderer does.
+        """Return the spectral radiance in each cell of the image of each eye, (env, eye, cell, band).
 
-        Rays are the cells of an image, row by row.
+        Axes and units are those of the batched renderer's radiance, where a ray takes the place of a cell. The cells
+        of an image are listed row by row.
         """
         pictures = self.pictures(state)
         return np.moveaxis(pictures.reshape(*pictures.shape[:3], -1), 2, 3)

@@ -30,8 +30,9 @@ HARDLY_MORE = 1.1  # errors up to this multiple of the smallest error count as c
 def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: Allowed) -> Samples:
     """Return the cheapest samples whose error, including the error due to light that they omit, is allowed.
 
-    Areas are not tried if a few rays are enough. If no samples are accurate enough, return the cheapest samples whose
-    error is close to the smallest error.
+    Samples are rays, or areas: rectangles of the visual field over which light is averaged in closed form. Areas are
+    not tried if a few rays are enough. If no samples are accurate enough, return the cheapest samples whose error is
+    close to the smallest error.
 
     light: level of light (number of reflections) if rays are used
     """
@@ -69,9 +70,10 @@ def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, 
 
 
 def _left(light: Level, allowed: Allowed) -> float:
-    """Return the part of the allowed error that remains for the samples, because omitted light uses the rest.
+    """Return the error that samples may have, so that samples and omitted light together keep to the allowed error.
 
-    If nothing remains, the result is so small that no number of rays is enough.
+    Omitted light causes an error of its own, and the squares of the two errors add. If omitted light alone has the
+    allowed error or more, the result is so small that no number of rays is enough.
     """
     left_out = light.predicted_error or 0
     return math.sqrt(max(allowed.without_light**2 - left_out**2, (1e-6 * allowed.without_light) ** 2))
@@ -84,12 +86,13 @@ def _areas(
     shared: tuple[float, ...],
     allowed: Allowed,
 ) -> Samples | None:
-    """Return the fewest areas whose error is allowed, or None if area sampling is not possible in the world.
+    """Return the fewest areas per receptor whose error is allowed, or None if the world does not permit area sampling.
 
-    If no number is accurate enough, return the fewest areas whose error is close to the smallest error.
+    An area is a rectangle of the visual field over which light is averaged. If no number is accurate enough, return the
+    fewest areas whose error is close to the smallest error.
 
-    shared: fractions of an area per receptor (neighbours then share areas), in decreasing order; they are tried if one
-        area per receptor is accurate enough
+    shared: numbers of areas per receptor below 1, in decreasing order. With them, an area is larger than a receptor,
+        and neighbouring receptors share it. They are tried if one area per receptor is accurate enough.
     """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None

@@ -66,7 +66,10 @@ def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fideli
 
 
 def _moments(scene: WorldScene) -> Poses:
-    """Return poses at random places and, if there are objects, near an object, for trials of compound eyes."""
+    """Return poses of the world in which fidelities for compound eyes are compared.
+
+    The agent stands at random places. If the world has objects, further poses place it near an object.
+    """
     drawn = [random_views, near_views] if scene.world.objects else [random_views]
     views = [draw(scene.world, scene.eyes, MOMENTS) for draw in drawn]
     return Poses.joined(*(scene.poses_at(view.position, view.heading, view.objects) for view in views))

@@ -62,8 +62,11 @@ def appearances_of(
 ) -> list[Appearance]:
     """Return all visible appearances of these geoms.
 
+    A geom has one appearance, or one for each material that it may have. Appearances with an alpha of 0 are omitted.
+
     geoms: ids of visible geoms
-    materials: ids of the materials among which episodes choose for a geom, by the geom's id
+    materials: for geoms whose material differs between episodes, by the geom's id: ids of the materials of which each
+        episode chooses one
     """
     found = []
     for geom in geoms:

@@ -1,4 +1,4 @@
-"""Errors of measured colours and lamps in a few spectral bands."""
+"""Errors of receptor signals if measured spectra of materials and lamps are represented by a few spectral bands."""
 
 from __future__ import annotations
 

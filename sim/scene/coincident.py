@@ -81,7 +81,11 @@ def _coincidences(data: mujoco.MjData, geoms: Sequence[int]) -> Coincidences:
 
 
 def _near(data: mujoco.MjData, geoms: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """Generate pairs of geoms whose bounding boxes overlap, in the order of the second geom."""
+    """Generate pairs of geoms whose bounding boxes overlap.
+
+    In a pair, the geom that comes first in `geoms` is first. The pairs are sorted by the position of their second geom
+    in `geoms`.
+    """
     model, turns = data.model, data.geom_xmat[geoms].reshape(-1, 3, 3)
     box = model.geom_aabb[geoms]
     middle = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turns, box[:, :3])
@@ -92,7 +96,11 @@ def _near(data: mujoco.MjData, geoms: Sequence[int]) -> Iterator[tuple[int, int]
 
 
 def _scale(data: mujoco.MjData, first: int, last: int) -> float:
-    """Return the length [m] to which rounding errors of two geoms are proportional."""
+    """Return a length [m] that measures how inaccurately float32 places the surfaces of two geoms.
+
+    Rounding errors of points on the surfaces are proportional to this length. It grows with the size of the smaller
+    geom and with the distance of the geom `last` from the world's origin.
+    """
     model = data.model
     sizes = [float(model.geom_rbound[geom]) or np.inf for geom in (first, last)]  # a plane has no bound
     size = min(*sizes, float(model.stat.extent) if np.isinf(sizes).all() else np.inf)

@@ -37,7 +37,7 @@ class SharedBuffer:
 
     @property
     def array(self) -> Array:
-        """The same values on the device."""
+        """The buffer's `values` as an array that kernels read: the same memory with LLVM, a new copy on a GPU."""
         return self._array if dr.backend_v(self._kind) == dr.JitBackend.LLVM else self._kind(self.values)
 
 
@@ -60,7 +60,7 @@ class Divisor:
 
     @classmethod
     def from_number(cls, number: int) -> Divisor:
-        """Return the divisor `number`, on the device."""
+        """Return a divisor whose value is `number`, a whole number from 1 to 2³² - 1, as arrays on the device."""
         bits = (number - 1).bit_length()
         factor = (2**bits - number) * 2**32 // number + 1
         return cls(*map(one_number, (number, factor, min(bits, 1), max(bits - 1, 0))))

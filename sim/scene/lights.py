@@ -101,7 +101,10 @@ def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: S
 
 
 def white() -> float:
-    """Return the radiance of white under a light of diffuse 1, relative to that of Mitsuba's `d65`."""
+    """Return the factor by which the radiance of Mitsuba's `d65` is multiplied to give that of a white surface.
+
+    The surface faces a MuJoCo light whose `diffuse` is 1.
+    """
     return float(daylight(np.array([560e-9]))[0]) / float(_evaluate(mi.load_dict({"type": "d65"}), 560.0)[0])
 
 

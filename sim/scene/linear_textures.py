@@ -43,8 +43,9 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 def is_linear(model: mujoco.MjModel, texture: int) -> bool:
     """Return whether a texture contains linear light.
 
-    This is the case if the texture is marked. It is also the case if the model declares the texture as linear, and it
-    is a 2-D texture that was not read from a file. (The compiler resolves "auto" to linear only for files.)
+    A texture does so if it is listed in a mark: a tuple among the model's custom elements whose name ends with
+    "linear_textures". A 2-D texture that was not read from a file also does so if the model declares it as linear.
+    (For files, this declaration proves nothing, because the compiler may have resolved "auto" to linear.)
 
     Raises:
         ValueError: a mark lists an object that is not a texture.
@@ -72,6 +73,8 @@ def request(spec: mujoco.MjSpec, textures: Iterable[int]) -> mujoco.MjSpec:
 
 def _marked(model: mujoco.MjModel) -> set[int]:
     """Return the indices of the textures that are marked as linear.
+
+    A mark is a tuple among the model's custom elements whose name ends with "linear_textures". It lists textures.
 
     Raises:
         ValueError: a mark lists an object that is not a texture.

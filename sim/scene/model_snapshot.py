@@ -28,9 +28,9 @@ class ModelSnapshot:
     geoms: ids of the visible geoms
     hidden: ids of the geoms that are invisible only because their alpha is 0
     moving: ids of the geoms that the renderer can show in any pose
-    resizable: ids of the geoms whose sizes may differ
-    varied: ids of the geoms that may differ, with the ids of the materials that each may have
-        (`appearances.varied_geoms`)
+    resizable: ids of the geoms whose sizes in a rendered world may differ from those in the model
+    varied: ids of the geoms whose appearance in a rendered world may differ from that in the model, each with the ids
+        of the materials that it may have; no ids: its colour may differ (see `appearances.varied_geoms`)
     """
 
     def __init__(
@@ -58,7 +58,11 @@ class ModelSnapshot:
         self._counts = self._that_count()
 
     def _that_count(self) -> dict[str, list[int]]:
-        """Return the ids of the elements that are compared, by field."""
+        """Return the ids of the materials, lights and height fields whose values must be those of the model.
+
+        The ids are ordered by the field of `Poses` that contains these values in the rendered worlds. Elements that do
+        not affect images are omitted, for example materials that no geom has.
+        """
         model, either = self._model, [*self._geoms, *self._hidden]
         more = {material for materials in self._drawn.values() for material in materials}
         unset = [g for g in either if np.array_equal(model.geom_rgba[g], surfaces.UNSET_RGBA)]
@@ -106,7 +110,11 @@ class ModelSnapshot:
         return f"{kind} {getattr(self._model, kind)(index).name or str(index)!r}"
 
     def _differing(self, poses: Poses, name: str) -> list[int]:
-        """Return the ids of the elements whose field `name` of `Poses` differs from the model's in any world."""
+        """Return the ids of the elements (such as geoms) that have another value in some world than in the model.
+
+        poses: state of the rendered worlds
+        name: field of `poses` whose values are compared, such as "geom_size"
+        """
         own, here = self._own[name], getattr(poses, name)
         if here is None:
             return []

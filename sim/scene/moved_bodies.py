@@ -1,4 +1,7 @@
-"""Poses of models in which only a few bodies move. Arrays with all elements are built only when they are read."""
+"""Poses of models in which only a few bodies move.
+
+Arrays that contain all bodies, geoms, sites or cameras of the model are built only when they are read.
+"""
 
 from __future__ import annotations
 
@@ -39,10 +42,11 @@ class ReferencePose:
         return self._local[kind, index]
 
     def slots(self, geoms: Sequence[int] | np.ndarray) -> slice | list[int] | None:
-        """Return the indices in `bodies` of the bodies whose frames these geoms share.
+        """Return the index of the body of each of these geoms, in the list `bodies` of moving bodies.
 
-        The result is a slice if the indices are adjacent, because a slice copies nothing. Return None if a geom has
-        another frame. Most geoms share their body's frame.
+        With these indices, the frames of the geoms can be taken from those of the bodies. This requires that each geom
+        has the same frame as its body, as most geoms do. Return None if a geom has a frame of its own, or if its body
+        does not move. The result is a slice if the indices are adjacent, because a slice copies nothing.
         """
         key = tuple(geoms)
         if key not in self._slots:

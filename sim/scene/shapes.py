@@ -81,9 +81,10 @@ def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
 
 
 def has_shape(model: mujoco.MjModel, geom: int) -> bool:
-    """Return whether a geom's kind can be mirrored, and its asset exists if it needs one.
+    """Return whether a geom can be converted to a Mitsuba shape.
 
-    (A user-defined SDF has no mesh.)
+    Geoms of all primitive kinds can be converted. Meshes, SDFs and height fields can be converted if the model contains
+    the asset that defines them. (A user-defined SDF has no mesh.)
     """
     kind = surfaces.geom_type(model, geom)
     return kind in _PRIMITIVES or (kind in _ASSETS and model.geom_dataid[geom] >= 0)

@@ -66,7 +66,9 @@ def with_compiled_color_spaces(source: Source) -> Source:
 
 
 def _specification(source: mujoco.MjSpec | str | Path) -> tuple[Callable[[], mujoco.MjSpec], str]:
-    """Return a function that reads a specification, and the source's name in messages.
+    """Return a function that reads the specification of a model, and the name that messages use for its source.
+
+    source: an MjSpec, MJCF text, or the path of a file
 
     Raises:
         ValueError: the source has another type, or the file does not exist, or the text or file is too large.

@@ -161,7 +161,8 @@ def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
 def is_mirrored(model: mujoco.MjModel, geom: int, texture: int) -> bool:
     """Return whether a texture is visible on a geom.
 
-    Cube textures are not visible on planes: a point of a cube texture is selected by a direction, and directions within
-    a plane select no image.
+    All textures are visible, except cube textures on planes. A cube texture is looked up in the direction from the
+    geom's centre to a point. For points of a plane, these directions lie in the plane itself, so they meet the cube
+    only along a line and not in an image.
     """
     return not (faces_of(model, texture) and geom_type(model, geom) == mujoco.mjtGeom.mjGEOM_PLANE)

@@ -72,8 +72,8 @@ class Variation:
         """Draw values for one episode, by name.
 
         Factors are distributed uniformly in their logarithm. Temperatures are distributed uniformly in their reciprocal
-        (mired), in which equal steps look equally large. Colours and places are uniform between their corners. All
-        materials have the same probability.
+        (mired), in which equal steps look equally large. Each component of a colour or place is distributed uniformly
+        between its values in the two ends of the range. All materials have the same probability.
         """
         found: dict[str, Drawn] = {}
         for name, given in self.ranges.items():
@@ -100,9 +100,11 @@ class Variation:
         }
 
     def of_things(self, what: str) -> dict[str, str]:
-        """Return the names of the ranges of one quantity, by the names of the objects.
+        """Return the keys of `ranges` that belong to one quantity, by the names of the objects that have it.
 
-        what: "size", "color", "material" or "start"
+        For "size", an example is {"ball": "ball.size"}.
+
+        what: the quantity: "size", "color", "material" or "start"
         """
         return {name.rpartition(".")[0]: name for name in self.ranges if kind_of(name) == what}
 
@@ -133,10 +135,13 @@ class Variation:
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Return the lights' factors at all combinations of the ends of their ranges, (combination, band).
+        """Return the lights' factors at all combinations of the ends of the ranges that concern light.
 
-        They are 1 if light does not vary. They include the largest factor over all bands. In a single band, values
-        inside the ranges may give a larger factor, which is up to a third larger for ranges from warm to cold light.
+        All factors are 1 if light does not vary. The largest of them is the largest factor that the ranges permit in
+        any band. In one given band, however, values inside the ranges may give a larger factor than their ends, by up
+        to a third if the range extends from warm to cold light. The array has the shape (combination, band).
+
+        wavelengths: centres of the bands [m], (band,)
         """
         names = self.of_light
         ends = [self.ranges[name] for name in names]

@@ -181,11 +181,14 @@ def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
 
 
 def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
-    """Return the field of mjData that contains an object's place, and the indices in this field.
+    """Return the field of mjData that contains an object's place, and the indices of the place in this field.
+
+    thing: name of the object, a joint or a body
+    name: name of the range of the object's initial places, a key of `variation.ranges`
 
     Raises:
-        ValueError: the object is not a hinge or slide joint (for a range of numbers), nor a mocap body or a body with
-            a free joint (for a range of points).
+        ValueError: the range consists of numbers, but the object is not a hinge or slide joint; or the range consists
+            of points, but the object is neither a mocap body nor a body with a free joint.
     """
     assert variation is not None
     spatial = np.ndim(variation.ranges[name][0]) == 1

@@ -112,7 +112,7 @@ class AgentTask(BatchTask):
         return MODES[self.mode]
 
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Return 2. The numbers are the forward speed and the change of heading."""
+        """Return 2, because an action consists of two values: the forward speed and the change of heading."""
         return 2
 
     def commands(self) -> tuple[Command, ...]:

@@ -24,10 +24,10 @@ TAKEN = ("previous_action", "feels", *AUXILIARY)  # names that are reserved for 
 class EyeKind:
     """Eyes of an animal that have the same optics and retina.
 
-    name: name of their signals in an observation
+    name: name of the eyes' signals in an observation
     eye: optics and retina, or a compound eye
     mounts: places of the eyes
-    fidelity: fidelity of the eyes, or "auto"
+    fidelity: accuracy with which the eyes' views are rendered; "auto": it is chosen automatically
     """
 
     name: str

@@ -84,7 +84,10 @@ class RewardTerms:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one action in all worlds, which a task returns. Rows are those of `RewardTerms`.
+    """The outcome of one action in all worlds, which a task returns.
+
+    A row is one learning agent in one world. The rows of the first agent in all worlds come first, then those of the
+    second agent.
 
     The environment raises a ValueError if an array has another shape than stated here, if a term is not finite, or if
     an index does not belong to a world.

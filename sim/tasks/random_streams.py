@@ -52,7 +52,7 @@ class StreamsByPurpose:
 
     seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
     n: number of worlds
-    kinds: number of kinds of eyes of the agent, as the only entry
+    kinds: a sequence of one number, the number of kinds of eyes of the only agent
     motion: attribute, random numbers for objects that move at random
     """
 
@@ -146,8 +146,11 @@ class MotionNoise:
     def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
         """Restore the state of these worlds from the return value of `get_state`.
 
+        All worlds draw numbers for 64 actions in advance, and use them at the same pace.
+
         Raises:
-            ValueError: only some worlds are restored, and they have fewer or more numbers left than the other worlds.
+            ValueError: only some worlds are restored, and in the restored state, the numbers drawn in advance last for
+                fewer or more actions than the present numbers of the other worlds.
         """
         _set_states(self._generators, state["motion"], worlds)
         ahead = np.asarray(state["motion_ahead"])
@@ -163,10 +166,14 @@ class MotionNoise:
 
 
 def _roots(seed: Any, n: int) -> tuple[Any, list[tuple[Any, int]]]:
-    """Return the entropy of all streams, and for each world the entropy and the index from which its streams derive.
+    """Return the entropy of the whole batch, and an entropy and an index for each world.
 
-    seed: one seed, from which the worlds derive different streams by their indices; or a tuple with a seed for each
-        world. In the second case, a world has the same streams as the first world of a batch with this world's seed
+    A world's random streams are seeded with its entropy and its index (the first number of a SeedSequence's spawn key).
+
+    seed: one seed, or a tuple with a seed for each world. With one seed, all worlds have the same entropy, and their
+        indices differ. With a tuple, each world has its own seed as entropy and the index 0, so its streams are those
+        of the first world of a batch with one seed, if this seed is the world's.
+    n: number of worlds
     """
     if isinstance(seed, tuple):
         return seed, [(own, 0) for own in seed]

@@ -179,7 +179,10 @@ class Simulation:
         )
 
     def _any_learner(self, rows: np.ndarray) -> np.ndarray:
-        """Return whether a condition (learners · n,), learners first, holds for any learner in a world, (n,) bool."""
+        """Return for each world whether a condition holds for any of its learners, (n,) bool.
+
+        rows: True where it holds: for the first learner in all worlds, then for the next learner, (learners · n,) bool
+        """
         return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 
     def poses(self) -> Poses:
@@ -260,10 +263,9 @@ class Simulation:
                     known[name][self._everyone[worlds][fresh]] = array[fresh]
 
     def _felt_keys(self) -> list[tuple[str, int, str]]:
-        """Return three values for each entry of the agents' proprioception.
+        """Return each entry of proprioception as its name in the stored state, the agent's index, and its own name.
 
-        They are its name in the stored state, the index of the agent, and its name in the proprioception. An agent
-        without proprioception has one entry with the name "".
+        An agent without proprioception has one entry with the name "".
         """
         found = []
         for k, (agent, known) in enumerate(zip(self.agents, self.felt, strict=True)):
@@ -276,8 +278,7 @@ class Simulation:
 def check_least_return(least_return: float | None, mode: str) -> None:
     """Check that `least_return` is None, or is negative and used in training.
 
-    With a value of 0 or more, an episode could end at its first action. In evaluation, the truncation would change the
-    fitness.
+    With 0 or more, an episode could end at its first action. In evaluation, truncation would change the fitness.
 
     Raises:
         ValueError: `least_return` is not negative, or the mode is not training.

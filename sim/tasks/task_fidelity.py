@@ -73,7 +73,10 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
 
 
 def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
-    """Return the fidelities of one agent's eyes; "auto" is resolved in scenes that contain the other agents.
+    """Return the accuracy with which one agent's eyes are rendered, by the name of the kind of eyes.
+
+    If the agent's task has the setting fidelity = "auto", the fidelity is chosen from scenes that contain the other
+    agents.
 
     number: index of the agent
 
@@ -88,9 +91,11 @@ def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
 
 
 def resolve_other_fidelities(task: Task) -> Task:
-    """Return a copy of the task whose `others` with a policy have definite fidelities of eyes instead of "auto".
+    """Return a copy of the task in which the eyes of other animals have a chosen fidelity instead of "auto".
 
-    Environments then need not choose these fidelities again. They do not render the eyes of animals without a policy.
+    A fidelity is the accuracy with which eyes are rendered. The other animals are those that do not learn, in the
+    task's attribute `others`. Environments then need not choose their fidelities again. Animals without a policy are
+    unchanged, because environments do not render their eyes.
 
     Raises:
         ValueError: see `fidelities_of`.

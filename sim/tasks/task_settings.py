@@ -63,8 +63,9 @@ class TaskSettings:
     camera: name of the camera for images of the task; None: a camera that shows the whole model
     actuators: names of the actuators that an action drives; None: all actuators
     name: name of the animal, if there are several; None: the name of the class
-    failure_reward: reward of a step in which the world fails, as the term "failure". If rewards are negative costs, the
-        default of 0 is better than any normal episode. In this case, set a value below the return of an episode.
+    failure_reward: reward of a step after which a world cannot continue, for example because a method of the task
+        fails; it is listed as the reward's term "failure". If rewards are negative costs, the default of 0 is better
+        than any normal episode. In this case, set a value below the return of an episode.
     mode: "training", "evaluation" or "test" (an evaluation for final results). The environment sets it, and methods may
         read it; a class must not define it
     """

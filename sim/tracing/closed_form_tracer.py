@@ -69,9 +69,9 @@ class ClosedFormTables:
 
 @dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """Spheres and tables for one lane of the kernel.
+    """Surfaces that the rays of one world can hit: its spheres, and the walls and floor that all worlds share.
 
-    centres: centres of the visible spheres in the lane's world (Point3f)
+    centres, tables: centres of visible spheres (Point3f), and tables of all reflectances and of the walls and floor
     """
 
     centres: list[Array]
@@ -137,7 +137,10 @@ class ClosedForm:
         return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), tables)
 
     def all_bodies(self, centres: list[Array], stand: Array) -> list[Array]:
-        """Return the centres of the visible spheres and of the eyes' own body at `stand`, if this body is a sphere."""
+        """Return the centres of the visible spheres and, if the body that carries the eyes is a sphere, its centre.
+
+        centres, stand: centres of the visible spheres, and position of the body that carries the eyes
+        """
         if not self.world.has_own:
             return centres
         return [*centres, mi.Point3f(stand.x, stand.y, float(self.world.heights[-1]))]
@@ -169,7 +172,10 @@ class ClosedForm:
         return [dr.select(hit.is_lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
 
     def _hit(self, ray: Array, centres: list[Array], tables: ClosedFormTables) -> _Hit:
-        """Return the first hits of rays with walls, floor or the first bodies, as many as there are `centres`."""
+        """Return the hit of each ray with the nearest surface: a wall, the floor or a sphere.
+
+        centres: centres of the spheres that rays can hit; bodies without a centre here, at the list's end, are ignored
+        """
         t, face, normal = self.footprints.hit(ray, tables.cells)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
@@ -220,10 +226,7 @@ class ClosedForm:
         return total
 
     def _face_texel(self, face: Array, point: Array, tables: ClosedFormTables) -> tuple[Array, ...]:
-        """Return the texture of a face, and the place of a point in it.
-
-        The five results are the texture's first texel, its numbers of columns and rows, and the point's column and row.
-        """
+        """Return the first texel of a face's texture, its numbers of columns and rows, and a point's column and row."""
         columns = dr.gather(mi.Vector4f, tables.faces, face * 3)
         place = dr.gather(mi.Vector4f, tables.faces, face * 3 + 2)
         x = _affine(columns, point)
@@ -255,10 +258,7 @@ class ClosedForm:
 
 
 def _check_tops(scene: UprightScene) -> None:
-    """Refuse scenes whose reflected light has no closed form, for one of three reasons.
-
-    A ray from a wall or body could hit a wall's top, a body may change its height, or the eyes' body has a texture.
-    """
+    """Refuse scenes where light may hit a wall's top, a body may change its height or the eyes' body has a texture."""
     for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
         if not settled:
             raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")

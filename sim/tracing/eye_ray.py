@@ -1,4 +1,4 @@
-"""A ray that leaves an eye, inside a kernel."""
+"""Data about a ray from an eye into the scene, in the form in which the renderer's kernels pass it on."""
 
 from __future__ import annotations
 

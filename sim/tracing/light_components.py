@@ -13,9 +13,10 @@ GREY = 1e-4
 
 @dataclass(frozen=True)
 class Components:
-    """Factors of the radiance in band b: sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
+    """Components of light, which are traced like spectral bands, and the contribution of each component to each band.
 
-    The index k counts components, and l counts lights with the angle of incidence θ_l.
+    The radiance in band b is sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l. The index k counts components,
+    and l counts lights with the angle of incidence θ_l.
 
     reflectance: (texel, component)
     levels: levels of the lights, (light, component)
@@ -28,10 +29,13 @@ class Components:
 
 
 def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components that describe reflectances `texels` (texel, band) under `irradiance` (light, band).
+    """Return components for light that is reflected once: spectra whose sums describe all light that surfaces reflect.
 
-    They are fewer than the bands if all lights share one spectrum and the reflectances have a smaller rank. Otherwise
-    they are the bands.
+    There are fewer components than bands if all lights share one spectrum and the reflectances are linear combinations
+    of fewer spectra than there are bands. Otherwise, each component is one band.
+
+    texels: reflectances of the surfaces, (texel, band)
+    irradiance: irradiance of each light, (light, band)
     """
     n_bands = texels.shape[1]
     brightest = irradiance[np.argmax(irradiance.sum(axis=1))]
@@ -45,7 +49,11 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 
 
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components for which a reflection multiplies each component of the light by the texel's component.
+    """Return components for light that is reflected several times.
+
+    Every reflection must be a multiplication of each component of the light by the surface's reflectance in the same
+    component. One component is enough if all surfaces are grey and all lights share one spectrum. Otherwise, each
+    component is one band.
 
     texels, irradiance: see `components_of`
     """
@@ -59,7 +67,7 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 
 
 def components_in_bands(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components that are the bands, for light that passes a medium or several reflections.
+    """Return one component of light for each spectral band, for light that crosses a medium or is reflected often.
 
     texels, irradiance: see `components_of`
     """

@@ -18,12 +18,13 @@ LEAST = 1e-6  # [1/m] smallest coefficient; a path of length FARTHEST is then op
 
 @dataclass(frozen=True)
 class MediumOnRays:
-    """A medium in the components of a tracer, each of which is one band.
+    """A medium, such as water or hazy air, that attenuates light and adds veiling light on the way to an eye.
 
-    A surface of radiance L appears at the distance d with the radiance L exp(-c d) + V (1 - exp(-c d)).
+    A surface of radiance L appears at the distance d with the radiance L exp(-c d) + V (1 - exp(-c d)). The tracer's
+    components of light are spectral bands, and each band has its own c and V.
 
     attenuation: coefficient c of each component [1/m]
-    veil: veiling light V, the radiance of a path of infinite length, per component
+    veil: veiling light V of each component, the radiance of a path of infinite length
     """
 
     attenuation: tuple[float, ...]
@@ -36,9 +37,11 @@ class MediumOnRays:
         return cls(tuple(map(float, np.maximum(medium.attenuation, LEAST))), tuple(map(float, veil)))
 
     def through(self, radiance: Sequence[Array], distance: Array) -> list[Array]:
-        """Return the radiance that arrives from surfaces of this radiance at these distances [m], per component.
+        """Return the radiance that arrives at the eye from surfaces of a given radiance, per component.
 
-        A ray that hits no surface has an infinite distance, and the result is V.
+        For a ray that hits no surface, the result is the veiling light.
+
+        distance: distances of the surfaces [m]; infinite for rays that hit no surface
         """
         return [v + more for v, more in zip(self.veil, self.contrasts(radiance, [distance]), strict=True)]
 
@@ -59,9 +62,13 @@ class MediumOnRays:
     def reflected_contrasts(
         self, reflectance: Sequence[Array], light: Sequence[Array], distances: Sequence[Array]
     ) -> tuple[list[Array], list[Array]]:
-        """Return the contrasts of a surface that reflects this light, and 1 for each component.
+        """Return the contrasts of a surface with the veiling light, and factors of 1 in place of its reflectances.
 
-        The contrasts already include the reflectances, which callers replace by these factors of 1.
+        A caller without a medium multiplies the light by the reflectances. With a medium, it multiplies the contrasts
+        by the factors of 1, one per component, because the contrasts already include the reflectances.
+
+        light: light on the surface, per component
+        distances: distances from the eye [m], over which the transmission is averaged
         """
         sent = [r * e for r, e in zip(reflectance, light, strict=True)]
         return self.contrasts(sent, distances), [mi.Float(1)] * len(sent)

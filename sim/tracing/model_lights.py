@@ -1,6 +1,7 @@
 """Lights of any model, which may move: directional lights, points, spots, and the headlight of each eye.
 
-Mitsuba's emitters (`sim.scene.lights`) determine their emission, so that the renderer agrees with `sim.mirror`.
+The spectrum and strength of each light are read from its emitter in Mitsuba (`sim.scene.lights`), so that the renderer
+agrees with the Mitsuba scenes of `sim.mirror`, which contain these emitters.
 """
 
 from __future__ import annotations
@@ -112,10 +113,12 @@ class Lights:
     def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
         """Return the unit vector from a point to a light, the distance [m], and a factor of the light's level.
 
-        The level times this factor is the irradiance of a surface at the point that faces the light.
+        The level times this factor is the irradiance of a surface that is at the point and faces the light. The
+        distance to a directional light or a headlight is a large constant.
 
-        k, there: index of the light, and the lights' rows in the lane's world
+        k: index of the light
         axis: axis of the observing eye
+        there: positions and directions of all lights in the world of the ray, see `rows`
         """
         light = self.found[k]
         if light.light < 0:

@@ -2,8 +2,7 @@
 
 Direct light comes from lamps only. With bounced light (`sim.tracing.lighting`), a bounce ray leaves every visible
 surface. It collects light that a second surface reflects or emits, or light of the sky. If there is a sky or a glowing
-geom, another ray leaves the second surface and collects the light of sky and glowing geoms. This includes all light
-after at most two reflections.
+geom, another ray leaves the second surface and collects their light. All light is after at most two reflections.
 """
 
 from __future__ import annotations
@@ -39,10 +38,11 @@ class Scenes:
 
 @dataclass(frozen=True)
 class Tables:
-    """Arrays that are the same in all worlds.
+    """Arrays that are the same in all worlds. A "mover" is a moving geom with one of the materials that it may have.
 
-    bsdfs, painted, ends: BSDF and index in `Paint` of each mover, and index of the first mover of each kind
-    sky, glows: the sky's emitter, and the BSDFs of glowing geoms; None if there are none
+    bsdfs, painted: each mover's BSDF, and its geom's index among geoms whose colour differs between worlds (`Paint`)
+    ends: index of the first mover of each kind of geom, such as spheres, followed by the number of movers
+    sky, glows: Mitsuba's emitter for the sky, and BSDFs that contain the light of glowing geoms; None if there are none
     glowing: for each mover, its index in `glows`, or len(glows) if it does not glow; None if no geom glows
     """
 
@@ -56,7 +56,7 @@ class Tables:
 
 @dataclass(frozen=True)
 class Rows:
-    """Arrays that differ between worlds, for all worlds: places of movers and lights, and colours."""
+    """Arrays that contain a part for each world: places of moving geoms, places of lights, and colours of geoms."""
 
     movers: Array
     lights: Array
@@ -65,7 +65,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Scenes, rows and tables for the world of one lane."""
+    """All that a ray can meet in its world: the static scene, moving geoms, lights and colours, with fixed tables."""
 
     still: MitsubaObject
     movers: MoverRows
@@ -75,7 +75,7 @@ class Surroundings:
 
 
 class RowBuffers:
-    """Buffers for the rows of `n_envs` worlds, which kernels read."""
+    """Buffers that kernels read, for places of moving geoms and lights and for colours in `n_envs` worlds."""
 
     def __init__(self, scene: ModelScene, n_envs: int) -> None:
         self._scene = scene
@@ -84,7 +84,7 @@ class RowBuffers:
         self._movers, self._lights, self._paint = (shared.values.reshape(n_envs, -1) for shared in self._shared)
 
     def fill(self, poses: Poses) -> None:
-        """Write the rows of these worlds."""
+        """Write the places and colours in all worlds into the buffers, for these poses of geoms and lights."""
         scene = self._scene
         self._movers[:] = scene.movers.rows(poses)
         if len(scene.paint):
@@ -94,18 +94,18 @@ class RowBuffers:
             self._lights[:] = scene.lights.rows(poses).reshape(poses.n, -1)
 
     def arrays(self) -> Rows:
-        """Return the rows as arrays on the device."""
+        """Return the buffers as arrays on the device."""
         return Rows(*(shared.array for shared in self._shared))
 
 
 @dataclass(frozen=True)
 class _SurfaceHit:
-    """First hits of rays.
+    """First hits of rays. A "mover" is a moving geom with one of the materials that it may have.
 
-    si: interaction for the BSDF
-    colors, glow: factors of reflectance and emission, one spectrum for every 4 bands
+    si, bsdf: Mitsuba's interaction between ray and surface, which is the argument of the BSDF, and the BSDF
+    colors, glow: factors that multiply reflectance and emission, one spectrum for every 4 bands
     which: index of the mover, or the number of movers if the ray hits none of them
-    seen, active: True for rays that hit a surface, and for rays that are traced
+    seen, active: seen is True for rays that hit a surface, active is True for rays that are traced
     point, normal, t, direction: hit point, normal towards the ray's origin, distance [m], and direction of the ray
     """
 
@@ -155,11 +155,11 @@ class ModelTracer:
         return whole_numbers([*of_movers, len(number)]), mi.BSDFPtr(list(scene.glows.values()))
 
     def buffers(self, n_envs: int) -> RowBuffers:
-        """Return buffers for the rows of `n_envs` worlds."""
+        """Return buffers for places of moving geoms and lights and for colours in `n_envs` worlds."""
         return RowBuffers(self._scene, n_envs)
 
     def around(self, scenes: Scenes, rows: Rows, tables: Tables, world: Array) -> Surroundings:
-        """Return the surroundings of a lane in this world."""
+        """Return all that rays can meet in the worlds with these indices, one index for each ray."""
         sizes = self._scene.movers.n_rows, max(len(self._scene.lights), 1) * LIGHT_ROWS, self._scene.paint.n_rows
         movers, lights, paint = (world * n for n in sizes)
         return Surroundings(
@@ -229,9 +229,9 @@ class ModelTracer:
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return a number for the surface that each ray hits first, if `still` is `ModelScene.one_shape_per_geom`.
+        """Return which surface a ray hits first; `there.still` must be from `ModelScene.one_shape_per_geom`.
 
-        It is a mover's index, or the number of movers plus the Mitsuba id of a static shape (0 for none).
+        It is a moving geom's index in `Movers`, or the length of `Movers` plus a static shape's Mitsuba id (0: no hit).
         """
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()

@@ -49,10 +49,10 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """A mover's frame.
+    """Frame and size of one moving geom.
 
-    axes, origin: axes (three Vector3f) and origin (Vector3f) of the frame in the world
-    size, reach: half sizes (mesh: centre of its cell in the atlas); largest distance of the surface from the origin
+    axes, origin: the frame's three axes (Vector3f each) and its origin (Vector3f), in the world's frame
+    size, reach: half sizes (mesh: its place in the scene of all meshes); largest distance from origin to surface [m]
     """
 
     axes: tuple[Array, Array, Array]
@@ -71,18 +71,18 @@ class _Frame:
 
 @dataclass(frozen=True)
 class MoverRows(WorldRows):
-    """Rows of one world: one for a sphere around all movers, then 4 per mover (`ends`: first mover of each kind)."""
+    """Places and sizes of moving geoms in one world (`Movers.rows`); ends: index of the first geom of each kind."""
 
     ends: Array
 
 
 class Movers:
-    """The moving geoms of a model ("movers", one for each material a geom may have): primitives by kind, then meshes.
+    """Moving geoms, one entry ("mover") for each material that a geom may have: primitives by kind, then meshes.
 
     looks, geoms: appearance and geom id of each mover
-    atlas: the movers that are meshes
-    lifts, bsdf: distances by which surfaces are moved outwards [m], by geom; any BSDF, for the atlas
-    ends: index of the first mover of each kind, for the kernel
+    atlas, bsdf: Mitsuba's scene of all movers that are meshes, and a BSDF for this scene, which has no effect on light
+    lifts: distances by which surfaces of geoms that coincide with others are moved outwards [m], by geom id
+    ends: index of the first mover of each kind, followed by the number of movers; an array for the kernel
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Movers:
 
     @property
     def apart(self) -> bool:
-        """True if movers are intersected in a separate kernel, which cannot be inside a branch (see `computed`)."""
+        """True if a separate kernel, outside all branches, intersects moving geoms: on a GPU, if any is a mesh."""
         return self.atlas.scene is not None and on_gpu()
 
     @property
@@ -128,7 +128,7 @@ class Movers:
         return 1 + ROWS * len(self)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return rows of 4 floats: one for a sphere around all movers, then 4 per mover, (world, 4 n_rows) float32."""
+        """Return float32 rows of 4: one for a sphere around all moving geoms, then 4 per mover; (world, 4 n_rows)."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
             places, (sizes, reach) = poses.geom_places(self.geoms), self._extents(poses)
@@ -148,7 +148,7 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return a mask of appearances that a world does not show, (world or 1, mover); None if each geom has one."""
+        """Return which movers have another material than their geom in a world, (world or 1, mover); None: fixed."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -156,7 +156,7 @@ class Movers:
         return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-        """Return the half sizes (world or 1, mover, 3) and reaches (world or 1, mover) of movers [m], see `_Frame`."""
+        """Return half sizes (world or 1, mover, 3) and bounding radii (world or 1, mover) of moving geoms [m]."""
         if poses.geom_size is None:
             sizes = self._sizes[None].copy()
         else:
@@ -285,7 +285,7 @@ def _frame(there: MoverRows, k: Array) -> _Frame:
 
 
 def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
-    """Return whether a ray hits the sphere of this row."""
+    """Return whether a ray hits the sphere, around one or all moving geoms, whose centre and radius a row contains."""
     x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)

@@ -1,9 +1,9 @@
 """Colours that differ between worlds ("paint"), as reflectances of geoms in the eye's bands.
 
-The BSDF of a painted geom is white, times its texture if it has one. The kernel multiplies its reflectance by the
-colour in the lane's world, as MuJoCo multiplies a texture by a colour. As in all scenes, Mitsuba converts colours to
-spectra (Jakob and Hanika 2019). A glowing geom emits light of this colour, with the spectrum of
-`sim.scene.lights.emission`.
+The BSDF of a painted geom is white, times the geom's texture if there is one. When the kernel (the program that traces
+rays) renders a world, it multiplies the BSDF's reflectance by the geom's colour in this world, as MuJoCo multiplies a
+texture by a colour. As in all scenes, Mitsuba converts colours to spectra (Jakob and Hanika 2019). A glowing geom emits
+light of this colour, with the spectrum of `sim.scene.lights.emission`.
 """
 
 from __future__ import annotations
@@ -26,22 +26,23 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class PaintRows(WorldRows):
-    """Rows of one world: reflectances of the painted geoms.
+    """Reflectances in one world of the geoms whose colour differs between worlds, in rows of four floats.
 
-    painted: see `Paint`
+    painted: index of each moving geom among these geoms, see `Paint`
     """
 
     painted: Array
 
 
 class Paint:
-    """Colours of the painted geoms. The scene's Mitsuba variant must be active.
+    """Colours of the "painted" geoms, whose colours differ between worlds. The scene's Mitsuba variant must be active.
 
     geoms: ids of the painted geoms
-    movers: geom id of each mover
+    movers: geom id of each mover. A mover is a moving or painted geom with one of the materials that it may have
     wavelengths: centres of the bands [m], (band,)
     glow: True if any of the painted geoms glows
-    painted: index in `geoms` of each mover's geom, or len(geoms) for geoms without paint, for the kernel
+    painted: for each mover, the index of its geom in `geoms`, or len(geoms) if this geom is not painted; an array for
+        the kernel. A last entry, len(geoms), is for rays that hit no mover
     """
 
     def __init__(
@@ -88,9 +89,12 @@ class Paint:
         return np.where(unset, self._own, here[..., :3])
 
     def factors(self, which: Array, there: PaintRows, seen: Array, *, glow: bool = False) -> list[Array]:
-        """Return the factors of a mover's reflectance or (if `glow`) emission, as spectra; 1 for geoms without paint.
+        """Return the factors by which colours multiply reflectance or, if `glow`, emission, as spectra of 4 bands.
 
-        which: index of the mover
+        The factors are 1 for geoms that have the same colour in all worlds.
+
+        which: index of the moving geom ("mover") that a ray hits, or the number of movers if it hits none
+        there: the colours in the ray's world
         seen: True for rays that hit a surface
         """
         k = dr.gather(mi.UInt32, there.painted, which, seen)

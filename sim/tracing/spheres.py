@@ -143,6 +143,6 @@ def _to_local(spheres: Spheres, k: int) -> Array:
 
 
 def _quadratic(ray: Array, centre: Array, radius: float) -> tuple[Array, Array]:
-    """Return half the linear and the constant coefficient of |ray(t) - centre|² = radius² as an equation for t."""
+    """Return b and c of the equation t² + 2 b t + c = 0 for the distances t at which a ray crosses a sphere."""
     from_centre = ray.o - centre
     return dr.dot(from_centre, ray.d), dr.squared_norm(from_centre) - radius * radius

@@ -28,10 +28,10 @@ class Buffers(Protocol):
     """Buffers that kernels read, for all values that differ between worlds."""
 
     def fill(self, poses: Poses) -> None:
-        """Write the rows of these worlds."""
+        """Write the values of all worlds into the buffers, for these poses of geoms and lights."""
 
     def arrays(self) -> Any:
-        """Return the rows as arrays on the device."""
+        """Return the buffers as arrays on the device."""
 
 
 class Tracer(Protocol):
@@ -57,10 +57,15 @@ class Tracer(Protocol):
         """Arrays that the kernel reads."""
 
     def buffers(self, n_envs: int) -> Buffers:
-        """Return buffers for the rows of `n_envs` worlds."""
+        """Return buffers for all values that differ between `n_envs` worlds, such as places of moving geoms."""
 
     def around(self, scenes: Any, rows: Any, inputs: Any, world: Array) -> Any:
-        """Return the surroundings of a lane in this world, from the scenes, rows and inputs."""
+        """Return all that rays can meet in their worlds, such as surfaces and lights.
+
+        scenes, inputs: `scene` and `inputs` of this tracer, passed as arguments of the kernel
+        rows: values of all worlds, which `Buffers.arrays` returns
+        world: index of each ray's world
+        """
 
     def radiance(self, seen: EyeRay, there: Any, samples: Array) -> tuple[list[Array], Array]:
         """Return the light along each ray, one array per component, and the distance to the visible surface [m].
@@ -73,7 +78,8 @@ class Tracers:
     """The tracers of a scene by level of light (`lighting.LEVELS`), for rays and for areas.
 
     scene, places: the scene, and the positions of the eyes in it
-    name: "closed_form", "mitsuba", or "auto": the closed form if the scene has one, otherwise Mitsuba
+    name: "closed_form" (formulas for upright walls, a floor and spheres), "mitsuba" (any scene), or "auto": the closed
+        form if the scene has one, otherwise Mitsuba
     stand: the body that the eyes are fixed to; None: derived from their mounts
 
     Raises:
@@ -91,7 +97,7 @@ class Tracers:
 
     @cached_property
     def upright(self) -> UprightScene | NoClosedForm:
-        """The closed form of the scene, or the reason why there is none."""
+        """The scene as upright walls, a floor and spheres, or the reason why it cannot be represented by them."""
         try:
             return upright_scene(self._scene, self._places.stand() if self._stand is None else self._stand)
         except NoClosedForm as reason:

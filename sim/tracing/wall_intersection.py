@@ -35,10 +35,11 @@ class CellTables:
 
 
 class Footprints(Protocol):
-    """A method of intersecting rays with walls.
+    """A method of intersecting rays with upright walls.
 
-    how: description for reports
-    tables: the grid's cells, for the kernel; None: walls are tested one by one
+    how: description of the method, for reports
+    tables: cells of the grid through which the method follows rays, as arrays for the kernel; None: there is no grid,
+        and walls are tested one by one
     """
 
     how: str
@@ -196,7 +197,7 @@ class Cells:
         return (column >= 0) & (column < self._columns) & (row >= 0) & (row < self._rows)
 
     def _place(self, point: Array) -> tuple[Array, Array]:
-        """Return x and y of a point relative to the grid's lower corner, in sides of a cell."""
+        """Return x and y of a point relative to the grid's lower corner, in units of a cell's side."""
         return tuple((point[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
 
 

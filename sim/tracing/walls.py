@@ -26,7 +26,10 @@ _KEPT = KeptValues(MOST_MODELS)
 
 
 class NoClosedForm(ValueError):
-    """A world has no closed form. The message states the reason."""
+    """A world cannot be rendered by formulas in closed form, which exist for upright walls, a floor and spheres.
+
+    The message states the reason.
+    """
 
 
 @dataclass(frozen=True)

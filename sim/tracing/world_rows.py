@@ -1,4 +1,4 @@
-"""Rows of four floats that kernels read, for all values that differ between worlds."""
+"""Values that differ between worlds, such as positions and colours, stored in rows of four floats for kernels."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from sim.scene.device_arrays import three
 
 @dataclass(frozen=True)
 class WorldRows:
-    """Rows of one lane's world.
+    """Values of one ray's world, such as positions and colours, in rows of four floats that kernels read.
 
-    fours: rows of all worlds, flat
-    first: index of the first row of this world
+    fours: the rows of all worlds, one after another, in a flat array of floats
+    first: index of the first row of the ray's world
     """
 
     fours: Array

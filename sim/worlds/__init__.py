@@ -5,7 +5,7 @@ world        build_world; World: a compiled world
 detection    an open field with a goal and adversaries, also for tracking
 foraging     the field of the task detection, with objects that differ in ultraviolet reflectance only
 navigation   the built-in courses between walls
-course       Course: a course on which the distance from the start hardly has to decrease
+course       Course: a course that hardly leads back towards its start
 maze         random mazes
 random_course  random courses
 layout_family  LayoutFamily: random mazes or courses in disjoint sets for training, selection and test

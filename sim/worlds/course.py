@@ -82,7 +82,7 @@ class Course:
 
     @cached_property
     def signs(self) -> np.ndarray:
-        """Characters of the drawing, (row, column), row 0 in the south."""
+        """Characters of `drawing`, (row, column). Row 0 is in the south, which is the last line of the drawing."""
         return read_only(np.array([list(line) for line in reversed(self.drawing.split())]))
 
     @cached_property
@@ -133,11 +133,12 @@ class Course:
         return float(np.arctan2(ahead[0] - cell[0], ahead[1] - cell[1]))
 
     def fall(self, start: Cell) -> tuple[float, Cell]:
-        """Return the largest necessary decrease of the distance from a start [m], and the cell before this decrease.
+        """Return how far an agent must come back towards a start on its way to the goal [m], and from which cell.
 
         The method considers the cells of all paths on which every step from the start shortens the remaining path. From
-        each of these cells, the agent takes the path to the goal on which the distance from the start decreases least.
-        The result is the largest of these decreases.
+        each of these cells, the agent takes the path to the goal that stays as far away from the start as possible. The
+        agent comes back by the cell's distance from the start, minus the smallest distance from the start on this path.
+        The result is the largest such difference, and the cell that has it.
         """
         ease = self._ease(start)
         return max((_apart(start, cell) - float(ease[cell]), cell) for cell in self._ahead(start))
@@ -148,9 +149,10 @@ class Course:
         return np.asarray(CELL * np.hypot(rows - start[0], columns - start[1]))
 
     def _ease(self, start: Cell) -> np.ndarray:
-        """Return the smallest distance from the start on the best path from each cell to the goal [m], (row, column).
+        """Return how far from the start an agent can stay on its way from each cell to the goal [m], (row, column).
 
-        The best path is the one on which this smallest distance is largest.
+        On each path from a cell to the goal, one point is nearest to the start. The result is the distance of this
+        point from the start, for the path on which this distance is largest; -1 if there is no path.
         """
         ease, apart = np.full(self.walls.shape, -1.0), self._apart_from(start)
         queue = [(-float(apart[cell]), cell) for cell in _cells(self.goal)]

@@ -1,4 +1,4 @@
-"""Detection: an open walled field with a goal and two adversaries, whose stripes have another orientation."""
+"""Detection: an open walled field with a goal, which has vertical stripes, and two adversaries with horizontal ones."""
 
 from __future__ import annotations
 

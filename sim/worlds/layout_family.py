@@ -36,7 +36,8 @@ _WALLS, _STRIPES = 0, 1  # purposes of a layout's random numbers
 class LayoutFamily:
     """Random courses or mazes in three disjoint sets, for `sim.build_world` and `sim.make_vec_env`.
 
-    Courses fulfil the conditions of `sim.Course`: the distance from the start never has to fall by more than 1.5 m.
+    Courses fulfil the conditions of `sim.Course`: on the way to the goal, an agent never has to come back towards its
+    start by more than 1.5 m.
 
     seed: seed of all layouts and of the stripes on their walls, 0 to 2¹²⁸
     n_training, n_selection, n_test: number of layouts in each set, 1 to 100
@@ -109,10 +110,10 @@ class LayoutFamily:
 
 @dataclass(frozen=True)
 class LayoutSet:
-    """One set of a family: an argument of `sim.build_world` and `sim.make_vec_env`.
+    """One of the three sets of layouts in a `sim.LayoutFamily`, for `sim.build_world` and `sim.make_vec_env`.
 
-    family: the family
-    name: "training", "selection" or "test"
+    family: the family of layouts that contains the set
+    name: name of the set: "training", "selection" or "test"
 
     Raises:
         ValueError: the family is no LayoutFamily, or there is no such set.

@@ -109,7 +109,8 @@ def build_world(
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
     layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
         episode starts in any of its layouts
-    wall_height: height of all walls [m], in [0.4, 100]; 0.5 in the published code
+    wall_height: height of all walls [m], in [0.4, 100]. In the code published by Tiwary, Young et al. (*Science
+        Advances* 11(51), 2025), it is 0.5
     eyes: eyes for which the agent gets cameras, with the names of `Eyes.names()`; None: no cameras
     spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the
         task defines, or replace them. Each is an `optics.Spectrum`, or a name that `optics.reflectance` or
@@ -175,7 +176,8 @@ def _layout(spec: mujoco.MjSpec, task: str, rng: np.random.Generator, mazes: int
 def _check_layouts(task: str, layouts: Any, alone: bool) -> None:
     """Check the type of `layouts`, and that the task has layouts.
 
-    alone: True if no other argument, such as `mazes`, defines the layouts; this is required
+    alone: True if `seed`, `mazes` and `course` have their default values. It must be True, because `layouts` replaces
+        these arguments
 
     Raises:
         ValueError: a check fails, or `alone` is False.

@@ -106,8 +106,8 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
 def standing(run: Run) -> dict[str, Any]:
     """Return the state of a run, its best candidate and its generations as JSON values by name.
 
-    The exception is "mishaps", a list of `EpisodeFailure`, whose fields are JSON values. The state is "running" if a
-    process holds the lock of the run, else "finished" or "interrupted".
+    Only the value of "mishaps" is not JSON: it is a list of `EpisodeFailure` objects, whose fields are JSON values. The
+    state is "running" if a process holds the lock of the run, else "finished" or "interrupted".
 
     Raises:
         OSError: the lock or config.toml cannot be read.

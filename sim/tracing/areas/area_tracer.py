@@ -2,8 +2,7 @@
 
 Each area is divided among floor, walls, sky and spheres. The part of a surface that is visible in an area is a patch.
 The surface's texture is averaged over the patch, and each light is multiplied by the fraction of the patch that it
-reaches. Colours and components are the same as in `sim.tracing.closed_form_tracer`, which traces rays through the same
-worlds.
+reaches. Colours and components are those of `sim.tracing.closed_form_tracer`, which traces rays.
 """
 
 from __future__ import annotations
@@ -39,17 +38,17 @@ STRETCHES = 2
 
 
 class AreaTracer:
-    """A tracer that uses area sampling.
+    """A tracer that averages light over areas, rectangles into which the visual field is divided.
 
     rays: tracer of rays through the same world, for the same light
-
     name, why: name of the tracer, and the reason for its choice, for reports
     light: level of light, one of `lighting.LEVELS`
-    basis: (component, band): contribution of each component to each band
+    basis: (component, band): contribution of each component of the light's spectrum to each band
 
     Raises:
-        NoClosedForm: the walls have several heights or lie on no grid, a texture changes along two axes, a shadow is
-            longer than a cell, or light is reflected more than once and there are no walls or too many cells.
+        NoClosedForm: the walls have several heights, overlap or lie on no grid, a texture changes along two axes, or a
+            shadow is longer than a cell of the grid. If light is reflected more than once, there are two more reasons:
+            there are no walls, or there are too many cells between the walls.
     """
 
     name = "areas"
@@ -146,7 +145,7 @@ class AreaTracer:
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
-        """Return the rows `place` of a world's table (`IlluminatedBodies`); bodies: centres of the world's bodies."""
+        """Return the rows with the numbers `place` of a table of the light on bodies whose centres are `bodies`."""
         assert self._reflected
         assert inputs.reflected
         reflected = partial(self._reflected.on_body, tables=inputs.reflected)
@@ -216,9 +215,9 @@ class AreaTracer:
     ) -> list[Array]:
         """Return the fractions of the area in which a sphere hides walls and floor, followed by the sphere's light.
 
-        There are three fractions: for the left wall, the right wall and the floor. The light of the sphere, per
-        component, is multiplied by the fraction of the area that the sphere fills. Parts of the sphere that nearer
-        spheres hide are omitted.
+        There are three fractions: for the left wall, the right wall and the floor. The light has one array per
+        component of its spectrum, for each depth layer. It is multiplied by the fraction of the area that the sphere
+        fills. Parts of the sphere that nearer spheres hide are omitted.
         """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
@@ -286,9 +285,10 @@ def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) 
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
-    """Return eight numbers per face, flat, from which the kernel finds the texture at a point.
+    """Return eight numbers per face, in a flat array, from which the kernel finds the texture at a point (x, y, z).
 
-    They are the texel's column, affine in (x, y, z), the first texel, the number of columns and two zeros.
+    Four are the factors of x, y, z and 1 whose sum is the texel's column. The texture's first texel, its number of
+    columns and two zeros follow.
     """
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows

@@ -46,7 +46,10 @@ class BodyLight:
         return cls(illumination, lit, around, [a - b for a, b in zip(left, free, strict=True)])
 
     def on(self, normal: Array) -> list[Array]:
-        """Return the light per component on a surface with this normal."""
+        """Return the irradiance where the body's surface has this normal, one array per component of the spectrum.
+
+        The components are a few spectra, or the bands, of which all light in the world is a sum.
+        """
         light = self.illumination.arriving(normal, self.visibility)
         if not self.around:
             return light
@@ -56,13 +59,15 @@ class BodyLight:
 
 @dataclass(frozen=True)
 class LitSphere:
-    """A sphere in an area.
+    """A sphere that is visible in an area, and the light on it.
+
+    An area is a rectangle of an eye's visual field over which light is averaged.
 
     number: index of the sphere among the bodies
     view: visible part of the sphere
     light: light on the sphere
     now: inputs of the current frame
-    depth: layers among which its light is divided
+    depth: depth layers among which the sphere's light is divided
     """
 
     number: int

@@ -1,4 +1,4 @@
-"""The grid of free cells in a world of walls, and the places of points in it."""
+"""The grid of square cells, free or filled by a wall, that divides a world, and a lookup of the cell around a point."""
 
 from __future__ import annotations
 

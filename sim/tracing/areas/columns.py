@@ -1,10 +1,14 @@
-"""The walls behind an area: the faces at its left and right borders, and the edge between them.
+"""The walls that are visible in an area, a small rectangle of an upright eye's visual field (`patch.Area`).
 
-The coordinate a runs across an area (`sim.tracing.areas.patch.Area`). An upright eye at the height z sees a wall in
-column a at the distance t. The unit of t is the length of the direction's horizontal part. The foot of the wall is
-visible at the slope (floor - z)/t, and its top at (top - z)/t. The inverse distance 1/t is linear in a, so the
-fractions of the area that floor, wall and sky fill have closed forms. If rays at the two borders of the area hit
-different walls, a corner or an edge lies between them. Its column is computed from the ends of the walls.
+At most two faces of walls are taken into account: the face that is visible at the area's left border, and the face at
+its right border. If these are different faces, a corner or an edge lies between them. The column in which the edge is
+visible is computed from the ends of the faces.
+
+A column is a vertical line in the area. Its position a runs from -1/2 at the left border to 1/2 at the right border.
+In column a, the eye at the height z sees a point of a face at the horizontal position pupil + t level, where the vector
+level = `Area.level(a)` is the horizontal part of the ray's direction. The foot of the face is visible at the slope
+(floor - z)/t, and its top at the slope (top - z)/t. The inverse distance 1/t is linear in a, so there are closed forms
+for the fractions of the area that floor, wall and sky fill.
 """
 
 from __future__ import annotations
@@ -42,10 +46,13 @@ class Face:
 
 @dataclass(frozen=True)
 class Piece:
-    """A wall's face in columns start <= a <= end of an area.
+    """The part of a wall's face that is visible between two columns of an area, a rectangle of the visual field.
 
-    inverse_distance: inverse of the face's distance at a = 0, and its slope along a [1/m]
-    floor_share, wall_share, sky_share: fractions of the area that floor, wall and sky fill in these columns
+    A column is a vertical line in the area, at the position a from -1/2 (left border) to 1/2 (right border).
+
+    start, end: positions a of the first and the last column
+    inverse_distance: inverse distance 1/t of the face in the column a = 0, and its change per unit of a [1/m]
+    floor_share, wall_share, sky_share: fractions of the area that floor, wall and sky fill between the two columns
     """
 
     face: Face
@@ -58,19 +65,22 @@ class Piece:
 
     @property
     def middle(self) -> Array:
-        """Column in the middle of the piece."""
+        """Position a of the column in the middle between `start` and `end`."""
         return (self.start + self.end) / 2
 
     def inverse_distance_at(self, a: Array) -> Array:
-        """Return the inverse distance 1/t of the face in column a [1/m]."""
+        """Return the inverse distance 1/t [1/m] at which this face is visible in the column at the position a.
+
+        The visible point lies at the horizontal position pupil + t `Area.level(a)`.
+        """
         return dr.maximum(dr.fma(self.inverse_distance[1], a, self.inverse_distance[0]), LEAST_NEARNESS)
 
     def place(self, area: Area, a: Array) -> Array:
-        """Return the point of the wall that is visible in column a (Point2f)."""
+        """Return the horizontal position (Point2f) at which the face is visible in the column at the position a."""
         return area.origin.xy + area.level(a) / self.inverse_distance_at(a)
 
     def patch(self, area: Area, floor: float, top: float) -> Patch:
-        """Return the visible patch of the wall; floor, top: heights of the floor and of the wall's top [m]."""
+        """Return the part of the face that is visible in the area; floor, top: heights of floor and wall top [m]."""
         near = self.inverse_distance_at(self.middle)
         bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
         low = dr.maximum((floor - area.origin.z) * near, bottom)
@@ -90,10 +100,12 @@ class Piece:
 
 
 class Columns:
-    """Pieces of walls behind areas, in a world of walls of one height.
+    """Search for the parts of walls that are visible in areas, rectangles of the visual field.
+
+    All walls of the world have the same height.
 
     top: height of the walls' tops [m]
-    face_ends: ends of all faces, for the kernel
+    face_ends: attribute, positions of the left and right ends of all faces, an argument of the kernel
     """
 
     def __init__(self, walls: Walls, footprints: Footprints) -> None:
@@ -104,9 +116,13 @@ class Columns:
         self.face_ends = floats(_face_ends(walls))
 
     def pieces(self, area: Area, faces: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
-        """Return the left and the right piece. If both borders have the same face, the right piece is empty.
+        """Return the visible parts of the two faces that appear at the area's left and right borders.
 
-        faces: indices of the faces at the area's left and right border, see `first_faces`
+        An edge between the faces separates the parts. If the same face is visible at both borders, the right part is
+        empty.
+
+        faces: indices of the faces at the left and the right border, see `first_faces`
+        face_ends: the attribute `face_ends`, passed as an argument of the kernel
         """
         half = mi.Float(0.5)
         left, right = (self._face(index, face_ends) for index in faces)
@@ -160,7 +176,12 @@ class Columns:
         return self.behind(area, piece, Rectangle(mi.Float(0), mi.Float(0), mi.Float(1), mi.Float(1)))
 
     def behind(self, area: Area, piece: Piece, part: Rectangle) -> Piece:
-        """Return the piece as it is visible in a part of the area."""
+        """Return the piece of a wall's face, limited to what the eye sees of it in a smaller rectangle of the area.
+
+        Floor, wall and sky are counted only within this rectangle, but still as fractions of the whole area.
+
+        part: the smaller rectangle, in units of the area's sides
+        """
         start, end = (dr.clip(part.a + sign * part.width / 2, piece.start, piece.end) for sign in (-1, 1))
         near = [piece.inverse_distance_at(a) for a in (start, end)]
         bottom, ceiling = (area.up + (part.b + sign * part.height / 2) * area.height for sign in (-1, 1))
@@ -173,7 +194,10 @@ class Columns:
 
 
 def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
-    """Return the inverse distance of a face's line at a = 0, and its slope along a [1/m]."""
+    """Return the inverse distance 1/t of a face in the middle column of an area, and its change across the area [1/m].
+
+    The face is extended to an infinite line in plan, so that every column hits it.
+    """
     side = face.right - face.left
     scale = dr.rcp(_cross(face.left - area.origin.xy, side))
     return _cross(area.ahead, side) * scale, _cross(area.right, side) * scale

@@ -45,7 +45,7 @@ class IlluminatedBodies:
 
     @property
     def nodes_per_body_set(self) -> int:
-        """Number of rows of a world's table."""
+        """Number of rows that the bodies of one world occupy in the table: ten per body, one for each place on it."""
         return PLACES * len(self._radii)
 
     def table(self, place: Array, bodies: list[Array], walls_around: Array | None, reflected: Reflected) -> list[Array]:
@@ -53,12 +53,12 @@ class IlluminatedBodies:
 
         The fractions are in groups of four. There are four harmonics per component.
 
-        Walls block the light at all places. Other bodies block it only at places on a side, not at the place that
-        represents the whole body.
+        A body has nine places on its sides, in a grid of three by three, and a tenth place that stands for the whole
+        body. Walls block the light at all ten places. Other bodies block it only at the nine places on the sides.
 
-        place: row of a world's table
+        place: index of the row among the rows of one world: 10 · (index of the body) + (index of the place on it)
         bodies: centres of the world's bodies
-        walls_around: for each cell of the grid, which of its neighbours are walls (`WallShadows.around`)
+        walls_around: for each cell of the walls' grid, which of its neighbours are walls (`WallShadows.around`)
         reflected: function that returns harmonics for a body's index, the index of a group of four, and the body's
             centre
         """

@@ -130,9 +130,10 @@ class Baking:
         return light.reshape(-1, light.shape[-1])
 
     def _on_body(self, radius: float, height: float) -> np.ndarray:
-        """Return spherical harmonics of the light on a body's surface, (place, 16, component).
+        """Return spherical harmonics of the light on a body's surface, for many positions of the body.
 
-        The places of the body are in order of cell, y and x.
+        The positions form a grid in each free cell of the walls' grid. The result lists them in order of cell, y and
+        x. Its shape is (position, 16 harmonics, component).
 
         radius, height: radius of the body, and height of its centre [m]
         """

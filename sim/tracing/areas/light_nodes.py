@@ -63,10 +63,11 @@ class LightNodes:
         return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
 
     def body_margin(self, radius: float) -> float:
-        """Return the smallest distance [m] between a cell's borders and the tabulated positions of a body's centre.
+        """Return the smallest distance [m] between the tabulated positions of a body's centre and the border of a cell.
 
-        It is the radius, because walls may stand at the borders, and a body's centre cannot be closer to a wall. The
-        upper limit for large bodies is a quarter of the side of the cell.
+        The cells are the squares of the walls' grid. The distance is the body's radius, because walls may stand at the
+        borders, and a body's centre cannot be closer to a wall. For large bodies, the distance is a quarter of the
+        cell's side instead.
 
         radius: radius of the body [m]
         """
@@ -74,16 +75,19 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Index of each cell among the free cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
+        """Index of each cell of the walls' grid among the free cells, those without a wall; 0 for cells with a wall.
+
+        The numbers are a flat float32 array for the kernel, row by row (`CellGrid.numbers`).
+        """
         return self.grid.numbers.astype(np.float32).ravel()
 
 
 @dataclass(frozen=True)
 class NodeTables:
-    """Reflected light at the nodes.
+    """Tables of the reflected light at the nodes, the points of floor and walls for which it was computed in advance.
 
-    cells: see `CellGrid.numbers`
-    floor, walls: light at their nodes, one array per component
+    cells: index of each cell of the walls' grid among the cells without a wall, see `CellGrid.numbers`
+    floor, walls: irradiance at the nodes of the floor and of the walls, one array per component
     """
 
     cells: Array
@@ -132,10 +136,12 @@ class NodeLight:
 
 
 def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
-    """Yield index and weight of the four nodes around a position.
+    """Yield index and weight, for bilinear interpolation, of the four nodes around a position on a rectangle.
 
-    first: index of the first node of this cell, or of this floor or wall in the cell
-    axes: x and y in [0, 1], each with its number of nodes
+    The rectangle, such as the floor or one wall of a cell, has a regular grid of nodes.
+
+    first: index of the rectangle's first node
+    axes: the position's x and y on the rectangle, in [0, 1], each with the number of nodes along this axis
     """
     (x, nx), (y, ny) = axes
     x, y = dr.clip(x, 0, 1) * (nx - 1), dr.clip(y, 0, 1) * (ny - 1)

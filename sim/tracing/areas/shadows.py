@@ -42,10 +42,11 @@ def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, 
 
 
 def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: Array) -> Array:
-    """Return the fraction of a patch that one light reaches past a sphere.
+    """Return the fraction of a patch of a surface on which a sphere casts no shadow, for one light.
 
-    On small patches, the rim of the shadow is treated as one straight line, or as two. On large patches, the shadow is
-    treated as a disk within the patch.
+    The shadow's fraction is the smaller of two estimates. The first estimate treats the shadow as a strip between two
+    parallel straight lines that touch its rim on opposite sides. It suits patches that are small against the shadow.
+    The second estimate treats the shadow as a disk that lies wholly within the patch. It suits large patches.
 
     direction: unit vector towards the light
     way: vector from the middle of the patch to the centre of the sphere
@@ -63,12 +64,13 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: A
 
 
 class WallShadows:
-    """Shadows of walls of one height. The shadows reach at most into the next cell of the walls' grid.
+    """Shadows of walls of one height. A shadow must not be longer than a cell, a square of the walls' grid.
 
-    Below the walls' tops, a ray from a point in a free cell to a light enters at most the next cell along x or the next
-    cell along y, and from there the cell across the corner. A table states for each cell which of these neighbours are
-    walls. Three straight lines across the patch separate points whose rays enter different neighbours, or pass above
-    the wall there.
+    Below the walls' tops, a ray towards a light therefore crosses at most one border of cells along x and one along y.
+    It enters the neighbouring cell along x or the one along y, and then possibly their common neighbour, the diagonal
+    one. A table states which neighbours of each cell are walls. A patch of a surface is divided by three straight
+    lines. The lines separate points whose rays pass above a neighbouring wall from points whose rays hit it, and points
+    whose rays first enter the neighbour along x from points whose rays first enter the neighbour along y.
 
     around: table for the kernel that states, for each cell, which of its neighbours are walls; None without walls
 
@@ -118,9 +120,13 @@ class WallShadows:
         return only_where(concerns, lit, [1.0] * len(directions))
 
     def _lit_from(self, patch: Patch, direction: list[float], row: Array, column: Array, around: Array) -> Array:
-        """Return the fraction of a patch that no neighbouring wall shades.
+        """Return the fraction of a patch of a surface on which no wall in a neighbouring cell casts a shadow.
 
-        The neighbours are the cells that a ray to the light enters along x, along y, or through the corner.
+        Rays to the light may enter three neighbours: the one along x, the one along y, and the diagonal one.
+
+        direction: unit vector towards the light
+        row, column: cell in front of the patch
+        around: bits that state which of the nine cells around are walls, in the order of `NEIGHBOURS`
         """
         dx, dy = (math.copysign(max(abs(d), NEVER_ZERO), d) for d in direction[:2])
         dz = direction[2]
@@ -147,7 +153,13 @@ def _share(value: Array, patch: Patch, gradient: tuple[float, float, float]) -> 
 
 
 def _behind(direction: list[float]) -> tuple[tuple[int, int], ...]:
-    """Return the neighbours (row, column) that light from a direction crosses: along x, along y, through the corner."""
+    """Return the three neighbours of a cell that rays from the cell towards a light may enter.
+
+    They are the neighbour along x, the neighbour along y and the diagonal neighbour, each as its offset in rows and
+    columns from the cell.
+
+    direction: vector towards the light
+    """
     x, y = (1 if d > 0 else -1 for d in direction[:2])
     return (0, x), (y, 0), (y, x)
 

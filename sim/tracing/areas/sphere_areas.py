@@ -1,7 +1,8 @@
-"""The fraction of an area that a sphere fills, and the patch of the sphere that is visible there.
+"""The fraction of an area of the visual field (`patch.Area`) that a sphere fills, and the surface visible there.
 
-A sphere's outline on the tangent plane is a conic. Strips of its inside are treated as parallelograms. Their length is
-that of the mean chord for ellipses (exact areas, unless they are clipped), and of the middle chord for other outlines.
+A sphere's outline on the tangent plane is a conic. Strips of its inside are treated as parallelograms. In an
+ellipse, a strip has the length of its mean chord, so its size is exact unless the area's border cuts the chord. In
+other outlines, a strip has the length of its middle chord.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ NEARLY_OPEN = 1e-4  # chosen: outlines whose length exceeds about 100 times thei
 
 @dataclass(frozen=True)
 class SphereTexture:
-    """A texture that changes along one axis.
+    """A sphere's texture, which changes along one axis.
 
-    texture: place of the texture in the tables
+    texture: index of the first texel and number of columns in the tables of all textures (`StripeTables`)
     to_column: map from texture coordinates to a column of the texture: column = to_column @ (u, v, 1)
     frame: rotation from the sphere's axes to the world's, (3, 3)
     """
@@ -44,11 +45,10 @@ class SphereTexture:
 
 @dataclass(frozen=True)
 class Slice:
-    """A slice of a sphere's visible part in an area.
+    """A slice of the part of a sphere that is visible in an area, a rectangle on the eye's tangent plane.
 
-    share: fraction of the area that the slice fills
-    seen: direction of its middle
-    along, across: sides of the slice on the area's plane
+    share, seen: fraction of the area that the slice fills, and direction from the eye to the slice's middle
+    along, across: sides of the slice on the tangent plane
     patch: part of the sphere's surface in the slice
     """
 
@@ -145,7 +145,7 @@ class _Edge:
 
 @dataclass(frozen=True)
 class _Outline:
-    """A sphere's outline on an area's tangent plane, in units of the area's sides.
+    """A sphere's outline on the eye's tangent plane, in units of the sides of an area, a rectangle on this plane.
 
     closed: True if the outline is an ellipse, which the other fields describe
     middle: middle of the ellipse, across and along the area
@@ -162,16 +162,19 @@ class _Outline:
     high: Array
 
     def edge(self, share: Array) -> _Edge:
-        """Return the edge at `share`, from 0 to 1. The angle of an ellipse is linear in it, or else the place is."""
+        """Return the edge of a strip at the fraction `share`, from 0 to 1, of the way across the visible part.
+
+        The ellipse's parameter is linear in `share`. If the outline is no ellipse, the position across the area is.
+        """
         angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
         place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), share - 0.5)
         return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
 
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
-        """Return length and middle of the average chord between two edges, clipped to the area.
+        """Return length and middle of the ellipse's average chord between two edges of a strip, clipped to the area.
 
-        Unless the chord is clipped, the areas of ellipses are exact with this length.
+        This length times the strip's width is exactly the area of the ellipse in the strip, unless it is clipped.
         """
         double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
         mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
@@ -238,11 +241,9 @@ def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arr
 
 
 def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
-    """Return the fraction of a slice that another sphere hides.
+    """Return the fraction of a slice of one sphere that another sphere hides, whose outline is treated as straight.
 
-    The sphere's outline is approximated by a straight line in the slice.
-
-    way: vector from the eye to the sphere's centre
+    way, radius: vector from the eye to the other sphere's centre, and radius of this sphere [m]
     """
     seen, sides = slice_.seen, (slice_.along, slice_.across)
     length, moment = dr.norm(seen), dr.cross(way, seen)
@@ -252,13 +253,12 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 
 
 def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
-    """Return length and middle, in units of `side`, of the chord on which start + x side hits the sphere.
+    """Return length and middle of the interval in [-1/2, 1/2] of those x whose ray along start + x side hits a sphere.
 
-    On the chord, q2 x² + 2 q1 x + q0 > 0 with the coefficients in the code, |x| is at most 1/2, and points lie ahead of
-    the eye.
+    The ray at x hits the sphere if the quadratic q2 x² + 2 q1 x + q0 is positive and the sphere is ahead of the eye.
 
-    way: vector from the eye to the sphere's centre
-    tangent: squared length of the tangents from the eye to the sphere
+    way, tangent: vector from the eye to the sphere's centre, and squared length of the tangents from the eye to it
+    start, side: direction from the eye to the middle of a line across the area, and the line's whole length as a vector
     """
     a, b = dr.dot(way, start), dr.dot(way, side)
     q2 = b * b - dr.squared_norm(side) * tangent
@@ -281,11 +281,11 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
-    """Return the patch around the point at which a ray in the direction `seen` hits the sphere.
+    """Return the patch of a sphere around the point at which a ray from the pupil in the direction `seen` hits it.
 
     way, tangent: see `_chord`
-    along, across: sides of the patch on the area's plane
-    origin, centre: the pupil, and the centre of the sphere
+    along, across: sides of the patch as the eye sees it, on the eye's tangent plane
+    origin, centre: positions of the pupil and of the sphere's centre
     """
     length = dr.squared_norm(seen)
     ahead = dr.dot(way, seen)

@@ -120,20 +120,30 @@ class Stripes:
         return [dr.gather(mi.Float, tables.means[k], mi.UInt32(texture.first)) for k in range(self.components)]
 
     def _once(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the integral over columns of the texture minus its mean, up to the position `middle + beyond`."""
+        """Return the first integral of the texture's deviation from its mean, up to the column `middle + beyond`.
+
+        The deviation is integrated along the texture's axis, separately for each component.
+        """
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma((row.w - row.z) / 2, past, row.z), past, row.y) for row in rows]
 
     def _twice(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the second integral of the texture minus its mean, up to the position `middle + beyond`."""
+        """Return the second integral of the texture's deviation from its mean, up to the column `middle + beyond`.
+
+        The second integral is the integral of the first one (`_once`), separately for each component.
+        """
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
     def _rows(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> tuple[list[Array], Array]:
-        """Return the row of the last texel centre up to middle + beyond, per component, and the distance from it.
+        """Return the table rows of the texel before the position `middle + beyond`, and the distance from it [texels].
 
-        Whole texels are separated from `middle` before `beyond` is added. A sum with a large column number would be
-        rounded, and such errors would not cancel in differences.
+        This texel is the last one whose centre is not beyond the position. There is one row per component, and the
+        distance is from the texel's centre to the position.
+
+        The number of whole texels in `middle` is split off before `beyond` is added to the remainder. The sum of a
+        large column number and `beyond` would be rounded, and these errors would not cancel in differences of
+        integrals.
         """
         whole = dr.floor(middle)
         past = (middle - whole) + beyond
@@ -147,11 +157,12 @@ class Stripes:
 def _least_side(largest: float) -> float:
     """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most 0.001.
 
-    It is at least one texel, because textures are linear between texels. A mean is a sum of four values of the second
-    integral, divided by the product of the sides. Each value is rounded twice: in the table, and after the polynomial
-    within a texel is added.
+    It is at least one texel, because textures are linear between texels. The mean reflectance over a parallelogram is
+    computed from four values of the second integral of the texture's deviation from its mean. Their sum is divided by
+    the product of the parallelogram's sides. Each value is rounded twice: in the table, and after the polynomial within
+    a texel is added.
 
-    largest: largest value of the second integral
+    largest: largest absolute value of the second integral
     """
     return max(1.0, math.sqrt(8 * HALF_ULP * largest / ROUNDING))
 
