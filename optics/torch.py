@@ -135,7 +135,7 @@ def _images(
     At coarse tolerances, PyTorch computes members with the same pupil and sensor distance as one stack, on the device
     `place`. Dr.Jit computes all other members.
 
-    light: the pupils, distances and angle, which contain the tensors `numbers`, by name.
+    light: the pupils, distances and angle. `numbers` lists the tensors in them: {"pupils[0].aperture_radius": tensor}.
     fixed: the same with plain numbers, without derivatives.
     """
     convert = partial(on_device, place) if numbers or place.type != "cpu" else np.asarray

@@ -76,8 +76,8 @@ class Pace:
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
     """Return how fast one worker process trains and evaluates each animal (its pace), by the animal's name.
 
-    All workers measure at the same time. If several workers train the same animal, each quantity of the pace is the one
-    that predicts the longest run.
+    All workers measure at the same time. If several workers train the same animal, their measurements differ. For each
+    field of the pace, the result contains the measured value that predicts the longest run.
 
     animals: animals that are trained for the measurement, by name
     workers: number of worker processes

@@ -39,8 +39,8 @@ class RunPlan:
     config: settings of the run
     directory: run directory
     workers: number of worker processes
-    paces: how fast a worker trains and evaluates each of the two animals in `animals`, by the animal's name; {} if this
-        has not been measured
+    paces: how fast a worker trains and evaluates an animal, by the name of the animal: "start", whose genes have their
+        start values, and "middle", whose genes are in the middle of their ranges; {} if this has not been measured
     """
 
     config: RunConfig
@@ -95,8 +95,9 @@ class RunPlan:
     def disk_bytes(self) -> int:
         """Predicted size of policies, record, report and EXR files of the run [bytes].
 
-        Policies and EXR files of the two animals in `animals` differ in size. For each kind of file, the larger size is
-        used. The size of a policy is part of the paces, so the plan must come from `measured`.
+        Two animals represent all others: one whose genes have their start values, and one whose genes are in the middle
+        of their ranges. Their policies and EXR files differ in size, and the larger size is used for each kind of file.
+        Sizes of policies are known only after a short training, so the plan must be a result of the method `measured`.
         """
         policy = max(pace.policy_bytes for pace in self.paces.values())
         pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
@@ -193,9 +194,10 @@ def steps_each(config: RunConfig) -> str:
 
 
 def _gene_lines(config: RunConfig) -> list[str]:
-    """Return lines that list, for each cluster, the open genes, which are the genes that the search varies.
+    """Return lines that list the open genes, which are the genes that the search varies.
 
-    Genes that the search varies only from a later generation on have a separate line, which states this generation.
+    Each cluster (morphological, optical, neural or spectral genes) has its own line. Genes of a cluster that the search
+    varies only from a later generation on have a separate line, which states this generation.
     """
     genes = Genotype(config.genome).open_genes
     lines = []

@@ -250,7 +250,7 @@ def _merge(below: Tree, above: Tree) -> Tree:
 
 
 def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
-    """Check that animals with these eyes have each gene whose own settings a source contains.
+    """Check that each gene that a source of settings names individually exists in animals with these eyes.
 
     Settings of a group of genes, such as `genome.optical`, are not checked: they apply to those genes that exist.
 

@@ -67,10 +67,10 @@ def _check_light(eye: EyeConfig) -> None:
 
 
 def _check_compound(eye: EyeConfig) -> None:
-    """Check that compound eyes have optics, and that no setting of the other kind of eyes is changed.
+    """Check that compound eyes have optics, and that settings without effect on this kind of eyes have their defaults.
 
-    For camera eyes, `eye.facet_area` must have its default. For compound eyes, all settings that only camera eyes use,
-    such as `eye.sensor_width`, must have their defaults.
+    Eyes are either compound or camera eyes. For camera eyes, `eye.facet_area` must have its default. For compound eyes,
+    all settings that only camera eyes use, such as `eye.sensor_width`, must have their defaults.
 
     Raises:
         ConfigError: one of these conditions is not met.

@@ -124,11 +124,11 @@ class RunConfig:
             raise ConfigError(message, *keys)
 
     def _check_task(self) -> None:
-        """Check that the task has the genes and settings of the run, and allows its number of frames per action.
+        """Check that the run's genes, settings and number of rendered frames per action suit the task.
 
         Raises:
             ConfigError: the genome contains a gene that the task lacks, or a setting that the task lacks differs from
-                its default, or the task does not allow this number of rendered frames per action.
+                its default, or the task does not allow the number `eye.frames` of rendered frames per action.
         """
         for name in OPTIONAL_GENES:
             if name in self.genome and not self.card.has_gene(name):

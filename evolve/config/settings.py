@@ -97,9 +97,9 @@ class WorldConfig:
     def test(self) -> dict[str, Any]:
         """Arguments of `sim.build_world` that define the worlds in which final results are measured.
 
-        If the layouts are a family of random layouts (`world.layouts`), these worlds have the layouts of its test set,
-        which neither training nor selection uses. If layouts are fixed, they are the worlds in which fitness is
-        evaluated.
+        If `world.layouts` requests a family of random layouts, the worlds have the layouts of the family's test set,
+        which neither training nor selection uses. If the layouts are fixed, final results are measured in the same
+        worlds as fitness.
         """
         return {**self.evaluation, **self._walls("test")}
 

@@ -258,8 +258,8 @@ class OpenedRun(Run):
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
         every: number of actions from one file to the next, 1 to 1,000,000
-        out: folder of the files, which are those of the command `evolve export` and which `sim.read_exr` reads; None:
-            `exr` in the run directory
+        out: folder of the files; None: `exr` in the run directory. The command `evolve export` writes the same files.
+            `sim.read_exr` reads them
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.

@@ -109,8 +109,8 @@ class PolicyConfig:
         """Return the shape of the policy as JSON values.
 
         The record of a run contains a hash of each policy file, so all versions must write a policy as the same bytes.
-        Older versions stored neither `wiring` nor `beside`, the observation's entries other than the eyes' signals.
-        Shapes that these versions could describe are therefore still written without these values.
+        Older versions lacked the fields `wiring` and `beside` (observations other than the eyes' signals and the
+        previous action). Shapes that these versions could describe are therefore still written without these fields.
         """
         left_out = {"beside"} | ({"wiring"} if self.wiring == DIRECT else set())
         left_out |= set() if self.directions else {"directions"}

@@ -30,9 +30,9 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
 
     Raises:
         ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
-            requires arguments, its model cannot be compiled, or one of its settings is invalid. If `encoded_textures`
-            is False, a model that is already compiled is also an error if it has textures that the compiler decided to
-            be linear. The message is one line; it names file and line of an error in the user's code.
+            requires arguments, its model cannot be compiled, or one of its settings is invalid. Or `encoded_textures`
+            is False, and the task's model is already compiled and has textures that the compiler decided to treat as
+            linear. The message is one line; it names file and line of an error in the user's code.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)
@@ -52,9 +52,9 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
 
 
 def _resolve_textures(task: Task | BatchTask) -> None:
-    """Declare those colour textures of a task's model linear that MuJoCo's compiler would choose to treat as linear.
+    """Set `colorspace="linear"` for colour textures of a task's model that MuJoCo would otherwise decide to be linear.
 
-    The compiler chooses if a texture's colour space is "auto". The chosen textures get `colorspace="linear"` instead.
+    MuJoCo's compiler decides this only for textures whose colour space is "auto". All other textures are unchanged.
 
     Raises:
         ValueError: the model has such textures but is already compiled, or it cannot be compiled.

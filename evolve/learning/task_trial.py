@@ -45,8 +45,8 @@ def check_settings(config: RunConfig) -> None:
             it defines `auxiliary` (additional signals of receptors, such as depth), which evolving eyes do not have.
 
     Raises:
-        ConfigError: the task has several mounts and does not define `place`, the user has not named its code, or its
-            module cannot be executed.
+        ConfigError: the task has several mounts and does not define `place`, the user has not named the task's code
+            (for example by `--task`), so that it must not be executed, or its module cannot be executed.
     """
     if (code := config.choice.named_code) is None:
         return

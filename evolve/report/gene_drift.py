@@ -57,12 +57,15 @@ class QuantityDrift:
 
 @dataclass(frozen=True)
 class Drift:
-    """Comparison of the animals of runs with those of searches whose fitness is random.
+    """Comparison of the animals of runs with the animals of searches whose fitness is random.
+
+    Each compared quantity, such as a gene, has one value per run and one per search: its mean over the candidates of
+    the last generations.
 
     of: number of runs
-    generations: generations over whose candidates the means are computed, counted from 0
+    generations: these last generations, counted from 0
     searches: number of searches with random fitness
-    moved: compared quantities, such as genes, each with its values in the runs and in the searches
+    moved: the quantities, each with its values in the runs and a summary of its values in the searches
     costs: True if the searches subtract the costs of eyes and brain from a random task fitness
     """
 
@@ -74,20 +77,20 @@ class Drift:
 
     @property
     def random(self) -> str:
-        """Description of the random numbers that the searches maximise, "fitness" or "task fitness minus costs".
+        """Name of the quantity that the searches maximise: "fitness" or "task fitness minus costs".
 
-        If there are costs, only the task fitness is random.
+        "fitness" is a random number. If there are costs, only the task fitness is random.
         """
         return "task fitness minus costs" if self.costs else "fitness"
 
     def as_plain_values(self) -> dict[str, Any]:
-        """Return the comparison of the runs with the searches with random fitness as JSON values."""
+        """Return, as JSON values, how the runs compare with searches that have random fitness."""
         first, last = self.generations[0], self.generations[-1]
         moved = [asdict(one) for one in self.moved]
         return {"generations": [first, last], "searches": self.searches, "random": self.random, "moved": moved}
 
     def lines(self) -> list[str]:
-        """Return the comparison of the runs with the searches with random fitness as lines of a table, with notes."""
+        """Return the lines of a table, with notes, that compares the runs with searches that have random fitness."""
         rows = [("", "run" if self.of == 1 else f"mean of {self.of} runs", "null model", "95 % of its searches", "p")]
         for one in self.moved:
             numbers = (f"{one.mean:.4g}", f"{one.median:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{one.p:.2g}")

@@ -89,8 +89,8 @@ class Voice(OwnedStream):
     def _judge(self, fault: OSError | ValueError) -> None:
         """Handle an error of the stream that receives the text: raise it, print a note on stderr, or ignore it.
 
-        If `patient` is True, nothing is raised, and the command continues without this output. If `name` is None, only
-        a closed pipe or terminal can be raised.
+        If `patient` is True, nothing is raised, and the command continues without this output. If `name` is None, an
+        error is raised only if the pipe or terminal has been closed. All other errors are then ignored.
 
         Raises:
             BrokenPipeError: the pipe or terminal has been closed, and `patient` is False.

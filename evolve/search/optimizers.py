@@ -156,7 +156,8 @@ class CMA(Named):
     members of the better half are recorded as the parents of each new candidate.
 
     nevergrad has an option for noisy functions, but its CMA-ES uses this option only to recommend a single best genome.
-    The option is not set, because the best candidate is taken from the record.
+    The option is not set, because the best candidate is taken from the record of the run, which contains every
+    evaluated candidate with its fitness.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:

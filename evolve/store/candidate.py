@@ -108,10 +108,11 @@ class Candidate:
         return self if free else replace(self, fitness=self.fitness - costs, costs=self.costs + costs)
 
     def recordable(self) -> Candidate:
-        """Return the candidate as a record restores it: with escaped, shortened text, and NaN for infinity in a list.
+        """Return the candidate as it is after it has been written to a run's record and read back.
 
-        If a value of the outcome has the wrong type or is outside the range that a record allows, the candidate counts
-        as failed. Its outcome is then the reason, with `seconds` and `episode_failures` if both can be recorded.
+        Invalid characters in messages are escaped, long messages are shortened, and infinity in a list becomes NaN. If
+        a value of the outcome has the wrong type or is outside the range that a record allows, the candidate counts as
+        failed. The outcome is then the reason, with `seconds` and `episode_failures` if both can be recorded.
 
         Raises:
             ValueError: another value, such as the genome or the seed, cannot be recorded.

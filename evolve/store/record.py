@@ -196,11 +196,12 @@ def _furthest(lines: Lines) -> tuple[Candidate, ...]:
 
 
 def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
-    """Return the candidates of a record, in the order of ids, after a line for the candidate `new` is appended to it.
+    """Return the candidates of a run's record, in the order of ids, after `new` has been appended to the record.
 
-    The result is that of `_furthest`, but is found without a pass over all lines of the record.
+    A record has a line for each rung of training that a candidate has reached. The line of the last rung counts. The
+    result equals that of `_furthest` for the longer record. It is found without a pass over all lines.
 
-    candidates: result of `_furthest` before the line is appended
+    candidates: result of `_furthest` before `new` is appended
     """
     at = bisect_left(candidates, new.id, key=lambda candidate: candidate.id)
     known = at < len(candidates) and candidates[at].id == new.id

@@ -155,10 +155,10 @@ def megalopta(rings: int = 10) -> AppositionEye:
 
     Its receptors are those that `optics.receptors_of("honeybee")` returns.
 
-    Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. The facet's diameter of 36 µm, the focal length of
-    97 µm, the rhabdom's diameter of 8 µm and length of 350 µm, and the interommatidial angle of 1.4° are quoted from
-    later articles. Only the abstract has been read: the facets are nearly twice as wide and the rhabdoms four to five
-    times as wide as those of bees that are active by day.
+    Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. Only the abstract of this article has been read.
+    It states that the facets are nearly twice as wide and the rhabdoms four to five times as wide as those of bees that
+    are active by day. The facet's diameter of 36 µm, the focal length of 97 µm, the rhabdom's diameter of 8 µm and
+    length of 350 µm, and the interommatidial angle of 1.4° are quoted from later articles.
 
     rings: rings of ommatidia around the central one.
 

@@ -91,8 +91,9 @@ class PixelatedAperture(Aperture):
     def nodes_across(self, cycles: float, digits: float) -> int | None:
         """Return the number of quadrature nodes along a side of a pixel if all nodes lie on common rows and columns.
 
-        The number is the field `fixed` if that is not None. Otherwise it is the number with which the sums are as
-        accurate as with the result of `nodes` for the same arguments. None: more than 32 nodes would be needed.
+        The number is the field `fixed` if that is not None. Otherwise the integral over the pupil, a weighted sum over
+        the nodes, is as accurate with this number as with the nodes that `nodes` returns for the same arguments. None:
+        more than 32 nodes would be needed.
         """
         if self.fixed is not None:
             return self.fixed

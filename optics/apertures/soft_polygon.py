@@ -83,10 +83,11 @@ class _Line:
     edge. d is the signed length of the perpendicular, positive if the point lies on the inner side.
 
     The kernel that softens the edge covers a disc around the point. If the piece ends within this disc, its
-    contribution is the integral ∫ d H(r) dt, where t runs from 0 to s, r² = d² + t², and H is that of `radial_table`.
-    If the piece ends outside the disc, its contribution is that of the infinite half-line, minus the angle that the
-    rest of the half-line subtends, divided by 2π. The half-line's value is tabulated: an infinite line is the edge of a
-    half-plane. If the edge misses the disc, the piece contributes the angle that it subtends, divided by 2π.
+    contribution is the integral ∫ d H(r) dt, where t runs from 0 to s, r² = d² + t², and H is the function that
+    `radial_table` tabulates. If the piece ends outside the disc, its contribution is that of an infinite half-line,
+    minus α/(2π), where α is the angle that the rest of the half-line subtends at the point. The half-line contributes
+    half of T(d) - 1/2, where T is the transmittance of a soft-edged half-plane. T depends only on d and is tabulated.
+    If the edge misses the disc, the piece contributes the angle that it subtends, divided by 2π.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:

@@ -87,8 +87,8 @@ def _panel(
     """Return heights and weights of the quadrature nodes in a panel, the horizontal band from `low` to `high`.
 
     At a circle's top or bottom, the length of a horizontal chord changes like a square root of the height. If the panel
-    begins or ends there, the height is substituted by a sin² of a new variable, of which the length is a smooth
-    function.
+    begins or ends there, the nodes are placed along a new variable u, with the height low + (high - low) sin²(πu/2).
+    The chord's length is a smooth function of u.
 
     tangent: heights of the tops and bottoms of circles.
     cycles: cycles of the integrand between `low` and `high`.

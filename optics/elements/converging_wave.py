@@ -103,7 +103,7 @@ def is_of_samples(system: Any) -> bool:
 
 
 def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave:
-    """Return the wave of an object of another program that describes the light in a pupil by rays.
+    """Convert an object of another optics program, which contains rays in a pupil, to a wave.
 
     system: the object, such as optiland's WavefrontData. Its attributes are pupil_x, pupil_y, pupil_z and radius [mm],
         and opd [waves].
@@ -144,7 +144,7 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
 
 
 def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWave:
-    """Return the wave of an object of another program that describes the light in a pupil by samples on a grid.
+    """Convert an object of another optics program, which contains samples on a grid in a pupil, to a wave.
 
     system: the object, such as prysm's Wavefront. Its attributes are data (complex), dx [mm] and wavelength [µm]. The
         samples in `data` lie on a plane that is parallel to the image plane.

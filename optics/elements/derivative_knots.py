@@ -39,8 +39,9 @@ class DerivativeKnots:
 
     borders: ascending borders of the cells, the same along x and along y, in units of the pupil's radius, from -1 to 1.
         They include the borders between the pixels of a relief of pixels.
-    splines: number of cubic splines, 1 or 2, that are factors of a derivative of the light, in addition to the light of
-        the other parts of the pupil. It is 2 if the mask and also the relief or wavefront carry derivatives.
+    splines: number of cubic splines, 1 or 2, in a derivative of the light, which is the product of these splines and
+        the light that leaves the rest of the pupil. It is 2 if the mask and also the relief or wavefront carry
+        derivatives.
     maps: names, rows and columns of the maps that carry derivatives, such as "height: 32 x 32".
     names: names of these maps, as arguments of `Pupil`.
     """
@@ -53,8 +54,9 @@ class DerivativeKnots:
     def without_maps(self, pupil: Pupil) -> Pupil:
         """Return the pupil without the maps (relief, wavefront or mask) that carry derivatives.
 
-        In each cell, these maps are polynomials of low degree. The number of quadrature nodes in a cell is therefore
-        planned for the bandwidth of the pupil that is returned.
+        The rows and columns of these maps' samples divide the pupil into rectangular cells. In each cell, the maps are
+        polynomials of low degree. The number of quadrature nodes in a cell therefore depends on the bandwidth of the
+        pupil that is returned, and not on these maps.
         """
         without: dict[str, Any] = dict.fromkeys(self.names)
         return replace(pupil, **without)

@@ -83,10 +83,10 @@ class ExitPupil:
 
     @property
     def image_height(self) -> float:
-        """Distance [m] of the image plane from the origin of the coordinates of the other program's object.
+        """Distance [m] of the image plane from the origin of coordinates in the optics program that computed the lens.
 
         The distance is measured perpendicular to the plane. It is positive if the plane lies behind the origin, in the
-        direction of the light.
+        direction of the light. It is read from an object of that program, such as optiland's WavefrontData.
 
         Raises:
             ValueError: the object does not contain this distance, as with prysm's Wavefront.

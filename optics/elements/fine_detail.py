@@ -37,10 +37,11 @@ def band_of(samples: np.ndarray, level: float) -> float:
 
 
 def power_beyond(samples: np.ndarray) -> np.ndarray:
-    """Return the power (mean square) of the components of a map over a square from each frequency upwards.
+    """Return, for each frequency, the power (mean square) of a map's components at this frequency and above.
 
-    Entry k of the result is the total power of all components with at least k/4 cycles over half the side of the
-    square, along x or along y. The result has one entry for each sample along the axis with more samples.
+    The map is sampled over a square. Entry k of the result is the total power of all components with at least k/4
+    cycles over half the side of the square, along x or along y. The result has one entry for each sample along the axis
+    with more samples.
 
     The best-fitting bicubic polynomial is subtracted first, because a polynomial bends light and does not scatter it.
     The cosine transform continues the samples by their mirror images, without jumps. The ends of the samples therefore

@@ -63,8 +63,9 @@ class PixelRelief(Relief):
 
         The limit holds for frequencies along x and along y. The power spectrum of the light behind the pupil is that of
         the samples (a discrete Fourier transform), repeated periodically and multiplied by sinc², the power spectrum of
-        one pixel. The spectrum is computed up to its 32nd repetition on either side. The result is infinity if more
-        than `share` / 2 of the light may lie beyond. It is 0 if all heights within the aperture are equal.
+        one pixel. The spectrum is computed up to its 32nd repetition on either side. The result is infinity if the
+        frequencies beyond this range contain more than `share` / 2 of the light along x or along y. It is 0 if all
+        heights within the aperture are equal.
 
         turns: phase in waves per metre of height [1/m].
         opening: aperture of the pupil.

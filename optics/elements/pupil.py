@@ -268,8 +268,8 @@ class Pupil:
     def scatter(self, wavelength: float, share: float) -> float:
         """Return the frequency [1/m] along x and y beyond which at most a fraction `share` of the light is scattered.
 
-        Pixels or fine detail of the relief, fine detail of the wavefront, and the mask each scatter light up to some
-        frequency. The result is the sum of the three. Callers add that of the geometrical rays' slopes (Carson's rule).
+        The result is the sum of the frequencies up to which the relief (its pixels or fine detail), the wavefront (its
+        fine detail) and the mask scatter. By Carson's rule, callers add the steepest ray's slope / wavelength.
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))

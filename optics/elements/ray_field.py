@@ -107,9 +107,11 @@ class RayField(Mask):
     def bandwidth(self, level: float, radius: float) -> float:
         """Return the spatial frequency [1/m] above which the mask's amplitude varies by less than `level`.
 
-        It is the sum of the frequencies for the optical path (times 2), for the pupil's own mask and, with a lens, for
-        the directions of the rays. These directions, as functions of the distance from the axis, have singularities at
-        the imaginary distances ±i f, where f is the focal length.
+        It is the sum of up to three such frequencies. The first is twice the frequency above which the optical path
+        through the pupil varies little. It is doubled because the field depends on products of the path's slopes. The
+        second is the frequency of the pupil's own mask. With a lens, the third is that of the directions of the rays.
+        These directions, as functions of the distance from the axis, have singularities at the imaginary distances
+        ±i f, where f is the focal length.
         """
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)

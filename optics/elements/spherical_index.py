@@ -47,8 +47,8 @@ class SphericalIndex:
 
         Raises:
             ValueError: light could stay inside the sphere, because n r/R decreases outwards somewhere. A decrease is
-                allowed at values above 1, which is the value just outside the surface, or above the value just inside
-                the surface.
+                allowed only where n r/R exceeds its value just outside the surface, which is 1, or its value just
+                inside the surface, which is n there.
         """
         found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
         t = np.linspace(0, 1, 20 * TERMS)

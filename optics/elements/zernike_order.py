@@ -62,13 +62,15 @@ def fringe_mode(j: int) -> Mode:
 
 
 def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
-    """Return a dictionary {(n, m): coefficient} of coefficients that are given by the numbers of a numbering.
+    """Return Zernike coefficients by mode, {(n, m): coefficient}, given the coefficients by number.
+
+    A published numbering, such as that of Noll, assigns the number to each polynomial.
 
     given: {number: coefficient}, or a sequence of coefficients, the first of which has the number 1.
     mode: function that converts a number to a mode (n, m), such as `noll_mode`.
 
     Raises:
-        ValueError: the argument is of another kind, a number does not exist, or a coefficient is not finite.
+        ValueError: `given` is of another kind, a number does not exist, or a coefficient is not finite.
     """
     if isinstance(given, Mapping):
         for j, value in given.items():

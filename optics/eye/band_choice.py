@@ -42,9 +42,9 @@ def choose_bands(
     receptors: `Receptors`, or a name or peak wavelengths for `optics.receptors_of`.
     kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
         side of a receptor. None: the kernel is the same for all wavelengths.
-    white: signal of a white surface with kernels that contain all light, relative to the signal if no light were lost.
-        Behind a pupil, it is the pupil's `transmission`. Errors are divided by it. None: the signal with the given
-        kernels, whose windows may omit some light.
+    white: signal of a white surface, relative to the signal that it would give if the pupil's mask absorbed no light.
+        It is the pupil's `transmission`, and includes light outside the windows of the kernels. Errors are divided by
+        it. None: the signal computed from the given kernels, whose windows may omit some light.
 
     Raises:
         ValueError: the tolerance is outside its range, or the receptors are invalid.

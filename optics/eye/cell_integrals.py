@@ -97,9 +97,10 @@ def _knots(x: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _over_samples(integrals: np.ndarray, degree: int) -> np.ndarray:
-    """Return the matrix Q C⁻¹, which maps samples to the integrals of the spline through them over the retina's cells.
+    """Return the matrix Q C⁻¹, which maps the samples of a function to the function's integrals over cells.
 
-    C contains the values of the B-splines at the samples. The shape is (cell, sample).
+    Cells are the equal rectangles into which the retina is divided. The function is the spline through the samples, a
+    sum of B-splines. C contains the values of the B-splines at the samples. The shape is (cell, sample).
 
     integrals: Q, the integrals of the B-splines over the cells, array (cell, B-spline).
     """

@@ -103,8 +103,8 @@ class Eye(EyeSpec):
     def psf(self, z: Scalar = math.inf) -> PSFResult:
         """Return the PSF on the retina for a point at the distance z [m] along the axis.
 
-        The point lies in the direction `eccentricity_deg`, seen by the middle of the retina. The window loses less than
-        the fraction `tolerance` of the light (exceptions: see `kernel`). A perfect lens has one sample with all power.
+        This point lies in direction `eccentricity_deg`, so its image is at the retina's middle. The window loses less
+        than the fraction `tolerance` of light (exceptions: see `kernel`). A perfect lens has one sample with all power.
 
         Raises:
             ValueError: z is not positive.
@@ -138,7 +138,7 @@ class Eye(EyeSpec):
         are even if samples_per_receptor is even. The sum is relative to receptors that absorb all light.
 
         Raises:
-            ValueError: an argument is invalid, the waveguide has no mode, or it is combined with derivatives.
+            ValueError: an argument is invalid, a waveguide has no mode, or waveguides are combined with derivatives.
             AccuracyError: see `optics.psf`.
         """
         positive("z", z, infinite=True, carried=True)

@@ -44,7 +44,7 @@ class EyeSpec:
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
         AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance. An
-            `Eye` with bands="auto" also computes PSFs, with the errors of `optics.psf`.
+            `Eye` with bands="auto" also computes PSFs, and raises an AccuracyError if `optics.psf` would raise one.
     """
 
     pupil: Pupil | None = None

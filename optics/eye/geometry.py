@@ -94,7 +94,10 @@ def check_vertical(vertical_fov_deg: float | None, fov_deg: Scalar) -> None:
 
 
 def etendue(widest_pupil: float, receptor_area: float, focal: float) -> float:
-    """Return the etendue [m² sr] of a receptor behind the eye's widest pupil, whose throughput is 1 by definition.
+    """Return the etendue [m² sr] of a receptor that receives light from the eye's widest pupil.
+
+    It is the receptor's area, times the pupil's area divided by the squared focal length. The widest pupil is the one
+    whose throughput is 1 by definition.
 
     widest_pupil: diameter [m] of the widest pupil.
     receptor_area: area [m²] of the receptor on the retina.

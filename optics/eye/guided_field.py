@@ -102,10 +102,11 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
     """Return E, the fraction of a source's light that a waveguide accepts and absorbs, integrated over cells.
 
-    E depends on the source's direction. The cells form a window of directions around that of the receptor. The window
-    is widened until it contains the integral of E over all directions, except for a fraction of at most the tolerance.
-    Its half width is at most that of `spot` plus the radius of the waveguide's modes. The shape is (row, column), and
-    areas of cells are in squared tangents.
+    E depends on the source's direction. The cells, equal rectangles in the scene, form a window of directions around
+    that of the receptor. The window is widened until it contains the integral of E over all directions, except for a
+    fraction of at most the tolerance. Its half width is at most the half side of `spot` plus the radius of the
+    waveguide's modes. Directions are measured as tangents of angles, so each integral is in units of a squared tangent.
+    The result is an array (row, column), with one integral for each cell.
 
     pitch: distance [m] between samples of the PSF on the retina.
     """
@@ -140,10 +141,10 @@ class _Cells:
     tolerance: float
 
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points at which a receptor's field is evaluated for its integrals over cells, and their weights.
+        """Return quadrature nodes in every cell of the row, (cell, node), and the weights of the nodes, (node,).
 
-        The points are quadrature nodes in every cell of the row, as an array (cell, node). They are tangents of angles,
-        minus that of the middle of the row. The weights (node,) sum to a cell's side.
+        At these directions, a receptor's field is evaluated, to integrate it over each cell. A node is the tangent of
+        an angle, minus the tangent of the direction of the row's middle. The weights sum to a cell's side.
 
         from_cell: False for a single point in the centre of each cell.
         """
@@ -174,7 +175,8 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
     """Return integrals of E over cells, (row, column), and their share of E's integral over all directions.
 
-    E is the accepted fraction of a source's light. Areas of cells are in squared tangents.
+    E is the accepted fraction of a source's light. Directions are measured as tangents of angles, so each integral is
+    in units of a squared tangent.
     """
     from scipy.ndimage import map_coordinates
 

@@ -1,9 +1,10 @@
-"""Kernels of an eye for a scene with a range of distances and directions: the fewest within the tolerance.
+"""Kernels of an eye for a scene with a range of distances and directions, as few kernels as the tolerance allows.
 
-A kernel depends on the position of the light source. Kernels are computed for a few positions, the nodes, and
-interpolated linearly between them (see `kernel_interpolation`). The nodes are evenly spaced over the tangent plane.
-Along depth they are evenly spaced in inverse distance 1/z, because defocus is linear in 1/z, or they are the distances
-of the scene itself. The scene is divided into cells, one or more per receptor along each axis. The signal is then
+A kernel, the receptive field of a receptor, depends on the position of the light source. Kernels are computed for a few
+positions, the nodes, and interpolated linearly between them (see `kernel_interpolation`). The nodes are evenly spaced
+over the tangent plane. Along depth they are evenly spaced in inverse distance 1/z, because defocus is linear in 1/z, or
+they are the distances of the scene itself. The scene is divided into cells, one or more per receptor along each axis.
+The signal is then
 
     signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene,
 

@@ -100,7 +100,8 @@ class NodeChoice:
 
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
-    samples_per_receptor: number of cells along the side of the square over which errors are averaged.
+    samples_per_receptor: number of kernel samples along a side of the area over which a receptor averages light. Errors
+        of signals are averaged over this area. With 1, there is no average.
     white: function that returns the signal of a white surface with these kernels, divided by its signal with kernels
         that lose no light. It is less than 1 behind masks and with waveguides. Errors are divided by it. With
         waveguides, a call of this function takes long, because it computes a kernel.

@@ -67,10 +67,11 @@ class _Scene:
     def passing(self, layer: Layer) -> Array:
         """Return the fraction of the light from farther layers that passes a layer, at each cell of the retina.
 
-        Some cells of the layer belong to a surface that continues in a farther layer. They hide nothing of it, but the
-        farther layer has a gap in their place. Seen from a cell of the retina, they cover a part of the pupil, and
-        light of the farther layer comes only through the remaining part. The hidden fraction is therefore the part of
-        the pupil that hiding cells cover, divided by this remaining part. The shape is (band, *shape).
+        A layer contains the scene's cells in one range of distances, of two kinds. Hiding cells lie in front of a
+        farther surface. The other cells belong to a surface that continues in a farther layer. They hide nothing, but
+        in their place the farther layer has no cells of its own. Seen from a cell of the retina, the hiding cells cover
+        a fraction h of the pupil, and the other cells a fraction g. Light of the farther layer then comes only through
+        the fraction 1 - g of the pupil, so the passing fraction is 1 - h/(1 - g). The shape is (band, *shape).
         """
         import drjit as dr
 
@@ -81,9 +82,10 @@ class _Scene:
         return dr.clip(1 - hidden, 0, 1)
 
     def _coverage(self, source: np.ndarray, cells: np.ndarray) -> Array:
-        """Return the fraction of the pupil that selected cells of the scene cover, seen from each cell of the retina.
+        """Return, for each cell of the retina, the covered fraction of the pupil, an array (band, *shape).
 
-        The shape is (band, *shape). For the arguments, see `_Scene`.
+        Seen from this cell, the selected cells of the scene lie in front of a part of the pupil and cover it. For the
+        arguments, see `_Scene`.
         """
         ones = np.ones_like(self.light)
         return self._blurred([ones * share for share in self._shares(source, cells)], self._whole)

@@ -85,9 +85,10 @@ def _least_jump(inverse_distance: np.ndarray, parallax: float) -> float:
 
 
 def _highest_neighbour(values: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return, for each cell, the highest value among the selected ones of itself and its eight neighbours.
+    """Return, for each cell, the highest value of the selected cells in a square of 3 x 3 cells around it.
 
-    The result is -inf where none of these nine cells is selected.
+    The square contains the cell itself and its eight neighbours. Cells that are not selected are ignored. The result,
+    an array (Y, X), is -inf where none of these nine cells is selected.
 
     values: value of each cell, array (Y, X).
     cells: True for selected cells, array (Y, X).

@@ -55,8 +55,9 @@ def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
 def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
     """Return the fewest spectral bands whose error is within the eye's tolerance, see `choose_bands`.
 
-    retina: the eye's retina, with two cells along each side of a receptor. Its wavelengths may be empty, because they
-        are replaced by those of each number of bands that is tried.
+    retina: the eye's retina, with two cells along each side of a receptor. Its field `wavelengths` may be empty. It is
+        not used, because several numbers of bands are tried, and kernels are computed at the wavelengths of these
+        bands.
     direction: tangents (right, down) of the direction in which the kernels are computed.
     """
     if eye.pupil is None:

@@ -101,8 +101,8 @@ class ReceptorLattice(ReadOnlyArrays):
     def counted(self, places: np.ndarray) -> np.ndarray:
         """Convert positions (x, y) on the retina to coordinates in which every receptor is 1 wide and 1 high.
 
-        This is the inverse of `places`. The receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2] in
-        the result, an array (..., 2).
+        This conversion is the inverse of the method `ReceptorLattice.places`. In the new coordinates, the receptor
+        (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. The result is an array (..., 2).
 
         places: positions (x, y), in units of the width and the height of an average receptor, array (..., 2).
         """

@@ -53,7 +53,7 @@ class Description:
     interommatidial_angle_deg: angle Δφ between horizontally neighbouring receptors.
     interommatidial_vertical_deg: the same between vertically neighbouring receptors.
     interommatidial_range_deg: smallest and largest angle between receptors over the whole eye, horizontally and
-        vertically, ((smallest, largest), (smallest, largest)). None: receptors are alike on the retina.
+        vertically, ((smallest, largest), (smallest, largest)). None: all receptors have the same size on the retina.
     plan: plan of the PSF of the least accurate band.
     white_signal: signal of a receptor that sees white: the throughput, reduced by the losses of waveguides.
     unknown: one line, with the reason, for each measure that cannot be computed accurately enough from the PSF. The

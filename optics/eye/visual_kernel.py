@@ -1,4 +1,4 @@
-"""Receptive fields behind a pupil: a window that contains the light, and the PSF integrated over the retina's cells."""
+"""Receptive fields behind a pupil: integrals of the PSF over all cells of the retina that light of a source reaches."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float]) -> PSFResult:
     """Return the PSF of a point at distance z [m]. It lacks at most `retina.tolerance` of the light of any wavelength.
 
-    If a relief is too steep for this, light farther from the image than a side of the retina counts as blocked.
+    Light of a steep relief may count as blocked if it lands farther from the image than a side of the retina.
 
     direction: tangents (right, down) of the point's direction in the visual field.
 
@@ -142,9 +142,9 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
 
 
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
-    """Return the result of `compute` for the square that the light reaches.
+    """Return the result of `compute` for the square that the light reaches or, if `compute` fails, a smaller square.
 
-    If this fails for a steep relief, half its side is limited to the retina's longer side, then to its shorter side.
+    Two smaller ones are tried for steep reliefs: half the side is at most the retina's longer, then its shorter side.
 
     Raises:
         AccuracyError: `compute` fails for every square. The error is the one for the first square.
@@ -169,8 +169,8 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
 def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
     """Return the square around the geometric image that the light reaches.
 
-    most: largest half side [m]. With the retina's longer side, the square contains the light that arrives at any
-        receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
+    most: largest half side [m]. If it equals the retina's longer side, the square still contains the light that arrives
+        at any receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
 
     Raises:
         CellsError: too many cells, into which receptors are divided, would be necessary along the square's side.

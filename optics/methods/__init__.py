@@ -12,7 +12,7 @@ diffraction_kernel   the kernel of the integral, with its near field
 method_sampling      Sampling: the interface of all methods
 rayleigh_sommerfeld  the direct sum: the reference
 angular_spectrum     the angular spectrum on grids, propagated as a whole or with its paraxial part split off
-spectrum_sampling    the planes between which the angular spectrum transforms fields, and the sums between them
+spectrum_sampling    the grids between which the angular spectrum transforms fields, and the Fourier sums that do this
 row_blocks           blocks of rows of a large pupil, whose spectra are summed
 derivative_cells     nodes between the knots of spline maps, for derivatives with respect to the maps' samples
 pixelated_spectrum   the angular spectrum of pupils made of pixels
@@ -26,17 +26,17 @@ remaining_factor     the slow factor, divided by its values along both axes
 window_sampling      `low_rank` at coarse tolerances, for one PSF, with as few samples as its light needs
 window_plan          samples of several pupils at coarse tolerances: as few as the light in the window needs
 window_geometry      the part of a `window_plan` that does not depend on reliefs and wavefronts
-window_edges         soft edges of these pupils, and how densely they are sampled; smoothed waves of wide pupils
-window_bands         spatial frequencies of the light and of these soft edges
-window_rank          number of points of the window that interpolate the slow factor for these samples
+window_edges         soft edges of pupils of a `window_plan`, and their sampling density; smoothed waves of wide pupils
+window_bands         spatial frequencies of the light and of the soft edges of `window_edges`
+window_rank          number of points of the window between which a `window_plan` interpolates the slow factor
 window_images        PSFs of several pupils from the samples of `window_plan`
 window_stack         PSFs of several sources and wavelengths through one pupil, from the same samples of the pupil
 stack_operation      the PSFs of `window_stack` as one operation of PyTorch, with derivatives by the pupil's phase
 pixel_nodes          quadrature nodes in the pixels of a stepped relief, for `low_rank` at coarse tolerances
 sampled_path         heights of reliefs and wavefronts at samples of the pupil, from arrays that many pupils share
-window_check         error of PSFs from the samples of `window_plan`: a few places are summed over other samples
-window_crossings     the places of `window_check`, where rows and columns cross that are drawn with the light
-mirrored_matrix      products with matrices that do not change if rows and columns are both mirrored
+window_check         error of PSFs from a `window_plan`, by comparison with a sum over finer samples at a few points
+window_crossings     the points of `window_check`: crossings of a few rows and columns, mostly through bright parts
+mirrored_matrix      products with matrices that do not change if the orders of rows and columns are both reversed
 window_sums          sums over the pupil for `window_sampling` and `window_stack`, and their adjoint
 far_field            a Fourier transform from the pupil to directions for each of a few points (nodes) of the window
 far_field_nodes      the choice of the nodes of `far_field`, and their weights in every direction
@@ -48,7 +48,7 @@ scalar_theory        upper bound on the error of scalar theory
 rays                 end points of rays in geometrical optics
 pupil_sampling       samples of the pupil for matrix products
 sine_samples         samples of the pupil that are evenly spaced in the sines of rays to the window
-sine_stack           such samples of several pupils at once
-single_stack         such samples of a single pupil, as a stack of one pupil that is kept for further PSFs
+sine_stack           samples as in `sine_samples`, for several pupils at once
+single_stack         samples as in `sine_stack` for a single pupil, kept for further PSFs of this pupil
 spectral_taper       the taper that fades a spectrum out before grazing incidence
 """

@@ -79,14 +79,15 @@ class GridSampling(SpectrumSampling):
 
 
 def whole_spectrum(problem: Problem) -> list[GridSampling]:
-    """Return samplings for which propagation of the spectrum as a whole meets the problem's tolerance."""
+    """Return samplings with which propagation of the spectrum as a whole meets the problem's tolerance."""
     return _samplings(problem, "angular_spectrum")
 
 
 def split_spectrum(problem: Problem) -> list[GridSampling]:
-    """Return samplings for which propagation with the paraxial part split off meets the problem's tolerance.
+    """Return samplings with which the split method meets the problem's tolerance.
 
-    Fresnel's integral adds the paraxial part of the phase after the rest of the propagation.
+    A sampling defines the grids on which a field is computed. The split method first propagates the spectrum without
+    the paraxial part of its phase. Fresnel's integral then adds this part.
     """
     return _samplings(problem, "split_angular_spectrum")
 
@@ -117,8 +118,8 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
     """Return the period [m] after which the field repeats, and the number of its samples at the window's pitch.
 
     Fourier transforms on a grid repeat the field after each period. The period is so long that the light of these
-    copies does not reach the window. Light farther from the axis than the problem's `reach` is an exception, because it
-    is negligible except behind a steep relief.
+    copies does not reach the window. Unless `problem.steep` is True, this does not apply to light that arrives farther
+    from the axis than `problem.reach`. Such light is negligible, so its copies may overlap the rim of the window.
 
     outermost: distance [m] from the axis at which the pupil ends.
     """

@@ -1,8 +1,9 @@
 """The diffraction kernel along one axis of the window, relative to its value at the middle of the window.
 
-The kernel is a Fourier kernel times a factor that varies slowly over the window (see `slow_factor`). Along one axis,
-both depend on a single position in the window and on a single sine, the direction of a point of the pupil along this
-axis as seen from the middle of the window.
+The kernel is a Fourier kernel times a factor that varies slowly over the window (see `slow_factor`). A point of the
+pupil is identified by two sines, the components along x and y of its direction as seen from the middle of the window.
+Along one axis of the window, the Fourier kernel and the slow factor depend on two numbers only: the position in the
+window and the sine of the point of the pupil, both along this axis.
 """
 
 from __future__ import annotations
@@ -31,9 +32,11 @@ class HasDirections(Protocol):
 
     @property
     def elsewhere(self) -> float | np.ndarray:
-        """Sine along y at which the slow factor along x is evaluated, and the reverse.
+        """Sine along one axis for which the slow factor along the other axis is evaluated.
 
-        The sine of the pupil's centre is subtracted.
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Along x, it is evaluated for points
+        of the pupil with this sine along y. Along y, it is evaluated for points with this sine along x. The sine of the
+        pupil's centre is subtracted.
         """
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -44,9 +47,10 @@ class HasDirections(Protocol):
 class AxisFactor:
     """The slow factor along x (0) or y (1), relative to its value at the middle of the window.
 
-    The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window. Along
-    the other axis, the sine of all points of the pupil is that of the pupil's centre plus `samples.elsewhere`. The
-    points of the pupil, and the factor at the middle of the window, are computed once.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window. The
+    sines of a point of the pupil are the components of its direction along x and y, as seen from the middle of the
+    window. Points with different sines along `axis` have the same sine along the other axis. It is the sine of the
+    pupil's centre plus `samples.elsewhere`. The points, and the factor at the middle of the window, are computed once.
 
     sines: sines of the points along the axis, minus the sine of the pupil's centre. The array has as many dimensions as
         the positions for which `at` is called.
@@ -71,7 +75,11 @@ class AxisFactor:
 
     @cached_property
     def pupil(self) -> tuple[Pair, Pair, Pair]:
-        """Points of the pupil, their directions, and amplitude and phase of the slow factor in the window's middle."""
+        """Points of the pupil, their directions, and amplitude and phase of the slow factor in the window's middle.
+
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Points are (x, y) [m], directions
+        are sines along x and y relative to the pupil's centre, and the phase is in waves.
+        """
         kind, elsewhere = self.sines.dtype, self.samples.elsewhere
         none = np.zeros((1,) * self.sines.ndim, kind)
         other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)

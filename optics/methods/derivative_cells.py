@@ -67,7 +67,9 @@ def _divided(opening: Aperture, borders: tuple[float, ...], halvings: int) -> Pi
 
 
 def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
-    """Return the relative errors of derivatives for 1 to MOST_NODES nodes along a cell, (number of nodes,).
+    """Return the relative errors of derivatives, integrated with 1 to MOST_NODES quadrature nodes along a cell's side.
+
+    Cells are the rectangles into which the knots of spline maps divide the opening. The shape is (number of nodes,).
 
     z: half the phase [rad] that the light behind the pupil gains across a cell, at points that are evenly spread over
         the opening.

@@ -69,7 +69,11 @@ class FarFieldSampling:
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square that contains the power of the rounding errors, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, for an estimate of their size.
+
+        The power of all rounding errors is a fraction of the power of the light, see `Sampling.plane`. The width is
+        one period of the Fourier transform of the pupil's samples.
+        """
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -82,10 +86,12 @@ class FarFieldSampling:
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
-    """Return a list with one sampling: directions that oversample the field, and nodes in the window.
+    """Return a list with one sampling, or an empty list if the method is not suitable for the window.
 
-    The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is interpolated between the nodes. The
-    list is empty if the method is not suitable for the window.
+    The sampling consists of samples of the pupil, directions towards the window, and a few points of the window
+    (nodes). The field is computed for the directions. They are denser than the field requires, so that it can be
+    interpolated between them. The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is interpolated
+    between the nodes.
     """
     half = problem.window.half_width
     sine = half / math.hypot(half, problem.distance)

@@ -38,15 +38,16 @@ class WindowNodes:
 
     @property
     def tangents(self) -> list[tuple[float, float]]:
-        """Tangents (x/z, y/z) of the directions of the kept nodes."""
+        """Tangents (x/z, y/z) of the directions to the kept nodes, the points where the slow factor is evaluated."""
         at = np.tan(self.half_angle * chebyshev_points(self.count))
         return [(float(at[column]), float(at[row])) for row, column in self.kept]
 
     def weights(self, angle: np.ndarray, dtype: str) -> np.ndarray:
         """Return the weights with which values at the kept nodes are summed, for all directions of a square grid.
 
-        The kept nodes are the few at which the slow factor is evaluated. The weights interpolate from them to the
-        directions. The result is an array (kept node, real or imaginary part, direction).
+        The kept nodes are the few points of the window at which the slow factor is evaluated. This is the ratio of the
+        diffraction kernel to a Fourier kernel. The weights interpolate from the kept nodes to the directions. The
+        result is an array (kept node, real or imaginary part, direction).
 
         angle: atan(x/z) of the directions, (y, x). The grid is symmetric, so the transpose of `angle` is atan(y/z).
         """

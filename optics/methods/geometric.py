@@ -121,7 +121,8 @@ class PinholeSampling:
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the square over which rounding errors are spread, here infinity.
 
-        All light is in one sample, so rounding errors add none to others, see `Sampling.plane`.
+        All light is in one sample of the window. The other samples are exactly 0, without rounding errors. See
+        `Sampling.plane`.
         """
         return math.inf
 
@@ -213,9 +214,10 @@ def _quadratic_basis(t: Array) -> tuple[Array, Array, Array]:
 def _ray_error(problem: Problem) -> float:
     """Return the relative L2 error of an intensity that is computed from the density of rays.
 
-    Rays lack the fringes of diffraction along the rim of the shadow. The width of the wrong rim is the sum of a Fresnel
-    zone and a cell of the window, over which a ray is spread. The error exceeds 1 if rays cross, if a mask scatters
-    light, or if the rays hit so small an area that diffraction or the size of a cell determines the spot.
+    Rays lack the fringes of diffraction along the rim of the shadow. The intensity is therefore wrong in a strip
+    along this rim. The strip is as wide as a Fresnel zone plus a cell of the window, over which a ray is spread. The
+    error exceeds 1 if rays cross, if a mask scatters light, or if the rays hit so small an area that diffraction or the
+    size of a cell determines the spot.
 
     If the rays magnify the pupil by m, the fringes of an edge are those at the distance z/m without a lens, magnified
     by m. The reason is that a quadratic phase only scales Fresnel's integral (Goodman, eq. 4-17).

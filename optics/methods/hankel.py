@@ -71,7 +71,11 @@ class HankelSampling:
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square that contains the power of the rounding errors, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, for an estimate of their size.
+
+        The power of all rounding errors is a fraction of the power of the light, see `Sampling.plane`. The width is
+        twice the sum of the pupil's radius and of the largest radius at which the image is computed.
+        """
         return 2 * (self.line.radius + problem.radius)
 
     @property

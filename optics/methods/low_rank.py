@@ -60,7 +60,11 @@ class LowRankSampling:
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square that contains the power of the rounding errors, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, for an estimate of their size.
+
+        The power of all rounding errors is a fraction of the power of the light, see `Sampling.plane`. The width is
+        one period of the Fourier transform of the pupil's samples, for their mean spacing.
+        """
         return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
 
     @property

@@ -1,9 +1,11 @@
 """Quadrature nodes within the pixels of a stepped relief, for `low_rank` at coarse tolerances.
 
-Because pixels have straight borders, the Fourier kernel has the positions of the nodes as its variable, instead of
-their sines as seen from the window. The kernel then differs more from the diffraction kernel. Factors along x and along
-y (`axis_kernel`) correct most of this difference. A pixel has as few nodes along an axis as the phase of lens,
-wavefront and path requires for an average point of the window, because light behind a relief may arrive anywhere.
+Light of a node is multiplied by the Fourier kernel e^{-ik s·u}, with u a position in the window. For other pupils, s
+contains the sines of a sample (see `sine_samples`). Here, s is the position of the node divided by the distance of the
+window's plane, because the borders of pixels are straight lines in position, but not in sines. This kernel differs more
+from the diffraction kernel. Factors along x and along y (`axis_kernel`) correct most of the difference. The number
+of nodes in a pixel follows from the phase of the path through lens and wavefront to the window. It is sufficient on
+average over the points of the window, because a relief may send light to any of them.
 """
 
 from __future__ import annotations
@@ -49,12 +51,14 @@ POINTS = 40  # choice: number of points of the pupil that determine the rank
 class PixelNodes:
     """Quadrature nodes of a pupil of pixels, as a replacement for `SineSamples` in sums over the pupil.
 
-    The direction of a node, its position divided by the distance of the window's plane, takes the place of the sine.
+    `SineSamples` describes a sample by its sines, the components of a unit vector. Here, the direction of a node, its
+    position divided by the distance of the window's plane, takes the place of the sines.
 
     nodes: positions and weights of the nodes.
     centre: centre (x, y) [m] of the window.
     distance: distance [m] of the window's plane.
-    elsewhere: direction along y at which `axis_kernel.AxisFactor` evaluates the factor along x, and the reverse.
+    elsewhere: a direction. `axis_kernel.AxisFactor` evaluates a factor of the kernel along x for points of the pupil
+        in this direction along y, and a factor along y for points in this direction along x.
     """
 
     nodes: PixelSamples
@@ -116,7 +120,8 @@ class PixelNodes:
 class PixelStack(SineStack):
     """A stack of one pupil of pixels, for code that expects a `SineStack`.
 
-    The directions of the nodes (position divided by the window's distance) take the place of the samples' sines.
+    A `SineStack` describes samples of pupils by their sines, the components of unit vectors from the window's centre.
+    Here, the directions of the nodes (position divided by the window's distance) take the place of the sines.
 
     nodes: positions and weights of the nodes.
     """
@@ -183,10 +188,10 @@ class PixelPlan(NamedTuple):
 
 
 def pixel_plan(problem: Problem) -> PixelPlan | None:
-    """Return the nodes with which a pupil of pixels meets a coarse tolerance; None if there would be too many.
+    """Return the fewest quadrature nodes per pixel for which the error is within the tolerance; None if too many.
 
-    The result is also None if the pupil has no pixels, or if derivatives with respect to maps or the pupil's radius are
-    requested.
+    The pupil is divided into the pixels of a stepped relief. The result is also None if it has no pixels, or if
+    derivatives with respect to maps or the pupil's radius are requested.
     """
     aperture = problem.pixelated
     if aperture is None or problem.knots is not None or problem.resized or (across := _across(problem)) is None:
@@ -228,11 +233,12 @@ def _across(problem: Problem) -> int | None:
 
 @lru_cache(maxsize=MOST_NODES)
 def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return squared errors of integrals of the wave e^{2iφt} over a whole pixel and over part of it, (phase,) each.
+    """Return squared errors of integrals of the wave e^{2iφt} over a whole pixel, and over a part of a pixel.
 
     t in [0, 1] is the position across the pixel, and the table PHASES contains the values of φ. If the edge of the
     aperture cuts a pixel, only a part [0, p] is open. The second errors are averaged over the values of p in PARTS. The
-    weights of `count` Gauss-Legendre nodes in [0, 1] integrate the interpolating polynomial over each part.
+    wave is known at `count` Gauss-Legendre nodes in [0, 1]. A polynomial in t interpolates it between the nodes, and is
+    integrated from 0 to 1 or from 0 to p. Both results are arrays (phase,).
     """
     (at, _), (t, size), found = gauss_legendre(count), gauss_legendre(MOST_NODES), []
     for part in (1.0, *PARTS):

@@ -132,7 +132,7 @@ class Problem:
 
     @cached_property
     def slopes(self) -> Slopes:
-        """Slopes of the wavefront behind the pupil, on a grid fine enough for the samples of relief and wavefront."""
+        """Gradient of the optical path across the pupil. The grid resolves the pupil's height profile and wavefront."""
         return self.light.pupil.slopes(self.light.wavelength, self.light.source)
 
     @cached_property
@@ -142,7 +142,7 @@ class Problem:
 
     @cached_property
     def other_detail(self) -> float:
-        """The same as `detail` for a pupil without the relief, wavefront or mask whose samples carry derivatives."""
+        """Frequency [1/m] above which the pupil varies little (see `detail`), if maps with derivatives are removed."""
         assert self.knots is not None
         others = self.knots.without_maps(self.light.pupil)
         return others.bandwidth(self.light.wavelength, DETAIL_PART * self.tolerance)
@@ -159,12 +159,12 @@ class Problem:
 
     @cached_property
     def turning(self) -> float:
-        """Highest frequency [1/m] of the pupil's phase plus that of the path to the window. In focus, it is low."""
+        """Highest frequency [1/m] at which the phase of paths to the window varies over the pupil; low in focus."""
         return self._turning[0]
 
     @cached_property
     def turning_inside(self) -> float:
-        """Highest frequency [1/m] of the pupil's phase plus that of the path to the window, without the soft edge."""
+        """Highest frequency [1/m] at which the phase of paths to the window varies over the disk without soft edge."""
         return self._turning[1]
 
     @cached_property
@@ -183,8 +183,8 @@ class Problem:
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
         """Return the aperture, divided into rectangles (cells) that contain quadrature nodes; None for too many cells.
 
-        band: highest frequency [1/m] in the pupil's plane of the light that the nodes must resolve. None: they
-            resolve the sum of the phases of the pupil and of the path, for all points of the window.
+        band: highest frequency [1/m] of the light's spectrum, if the nodes are for its computation. None: the nodes are
+            for light in the window, so they resolve the phase of paths through the pupil to all of its points.
         """
         assert self.knots is not None
         slopes = self._turning_slopes if band is None else self._slopes
@@ -199,7 +199,7 @@ class Problem:
 
     @cached_property
     def _turning_slopes(self) -> np.ndarray:
-        """Slopes of the wavefront plus the path to any point of the window, at the same points as `_slopes`."""
+        """Slopes like `_slopes`, of the path up to the window. Each is an upper bound for all points of the window."""
         return self.slopes.spread(self._beyond_rim, (self.window, self.distance, self.medium_n))
 
     @property

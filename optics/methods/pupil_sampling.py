@@ -102,7 +102,8 @@ class PixelSamples:
         """Distance from the axis [m] beyond which there are no nodes with light.
 
         It is the pupil's radius plus the diagonal of the widest pixel, because pixels that the aperture's edge cuts
-        also have nodes outside the aperture. Their weights integrate over the open part of each pixel alone.
+        also have nodes outside the aperture. The weights of a pixel's nodes are still those of an integral over its
+        open part only.
         """
         return self.radius * (1 + math.sqrt(2) * self.aperture.widest)
 

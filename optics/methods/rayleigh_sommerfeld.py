@@ -86,9 +86,9 @@ class NodeSampling:
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of a square in the window's plane, from which the size of rounding errors follows.
 
-        Rounding errors have a fraction of the power of all light, which is spread evenly over this square (see
-        `Sampling.plane`). Its width is that of the focus times the square root of the number of nodes, because the
-        rounding errors of the summands are independent.
+        The power of all rounding errors is a fraction of the power of the light. It is taken as spread evenly over this
+        square (see `Sampling.plane`). The square is as wide as the focus times the square root of the number of nodes,
+        because the rounding errors of the summands are independent.
         """
         return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
 

@@ -1,10 +1,10 @@
 """The remaining factor of the diffraction kernel, after the parts that depend on x alone or on y alone are removed.
 
-The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `slow_factor`). The
-axis factors are its values on the x axis and on the y axis of the window, for light from points of the pupil that also
-differ along this axis only (see `AxisFactor`). The remaining factor is the slow factor divided by both axis factors.
-All are relative to their values at the middle of the window. The remaining factor varies even more slowly over the
-window than the slow factor.
+The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `slow_factor`). It has
+two axis factors. The one along x consists of its values on the x axis of the window, for light from points of the pupil
+that differ from each other only in their sine along x. The one along y is its counterpart (see `AxisFactor`). The
+remaining factor is the slow factor divided by both axis factors. All are relative to their values at the middle of the
+window. The remaining factor varies even more slowly over the window than the slow factor.
 """
 
 from __future__ import annotations
@@ -43,6 +43,8 @@ class RemainingFactor:
     def at(self, window: Pair) -> np.ndarray:
         """Return the remaining factor for light that arrives at positions of the window, complex.
 
+        It is the slow factor (kernel over Fourier kernel), divided by its axis factors, its values along x and along y.
+
         window: positions (u, v) [m] relative to the middle of the window. They have as many dimensions as the
             attribute `directions`, with which they broadcast.
         """
@@ -71,10 +73,12 @@ class RemainingFactor:
         return np.asarray(turned(size, waves, self.dtype))
 
     def _paired(self, window: Pair) -> np.ndarray:
-        """Return the remaining factor if each point of the pupil has its own position in the window.
+        """Return the remaining factor for pairs of one point of the pupil and one position (u, v) in the window.
 
-        The slow factor (the kernel divided by a Fourier kernel) is evaluated at positions (u, v), (u, 0) and (0, v)
-        together. The last two give the axis factors, by which the first is divided.
+        It is the slow factor (the kernel divided by a Fourier kernel), divided by its axis factors. The slow factor is
+        evaluated at (u, v), (u, 0) and (0, v) together. The last two values are the axis factors.
+
+        window: positions u and v [m], arrays of the same shape as the attribute `directions`.
         """
         (u, v), none, (points, directions, middle) = window, np.zeros_like(window[0]), self._three
         at = np.stack([u, u, none], axis=1), np.stack([v, none, v], axis=1)
@@ -88,8 +92,9 @@ class RemainingFactor:
         """Points of the pupil, their directions, and amplitude and phase of the slow factor at the window's middle.
 
         The slow factor is the kernel divided by a Fourier kernel. Axis 1 of the arrays counts the values for this
-        factor itself, for its axis factor along x, and for its axis factor along y. The points for an axis factor have
-        the same sine along the other axis. The shapes are (pupil, 3, ...).
+        factor itself, and for the slow factor along the x axis and along the y axis of the window (`AxisFactor`). For
+        the x axis, all points of the pupil have one fixed sine along y. For the y axis, they have one along x. The sine
+        is that of the direction from the window's middle. The shapes are (pupil, 3, ...).
         """
         _, points, directions = self._pupil
         own, shape = (points, directions, self._middle), directions[0].shape
@@ -113,7 +118,10 @@ class RemainingFactor:
 
     @cached_property
     def _pupil(self) -> tuple[Path, Pair, Pair]:
-        """Geometry (`path`), points (x, y) [m] of the pupil, and `directions` (s, t) of these points, all `rounded`."""
+        """The attribute `path`, points (x, y) [m] of the pupil, and the `directions` (s, t) of these points.
+
+        Their numbers are rounded to the type in which path lengths are computed, see `rounded`.
+        """
         points = self.samples.points_at(*self.directions)
         if self._kind == "float64":
             return self.path, points, self.directions

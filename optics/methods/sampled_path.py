@@ -1,5 +1,6 @@
-"""Heights of reliefs and lengths of wavefronts at samples of the pupil, from arrays that many pupils share.
+"""Heights of reliefs and aberrations of wavefronts at samples of the pupil, from arrays that many pupils share.
 
+An aberration is the length [m] by which a wavefront is ahead of the wavefront without aberrations.
 Polynomials are interpolated from a few points across the pupil. A relief or wavefront can also be a map, a table of
 values that cubic splines interpolate. Its values at the samples are the product of a sparse matrix and the coefficients
 of the splines. This matrix and the weights of the interpolation only depend on the positions of the samples and the
@@ -58,9 +59,10 @@ def sampled_height(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Ar
 
 
 def sampled_wavefront(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Array | None:
-    """Return the length [m] by which the wavefront is ahead at samples, array (row, column); None without one.
+    """Return the aberration of the pupil's wavefront at samples, array (row, column); None without an aberration.
 
-    `sampled_height` explains the arguments.
+    It is the length [m] by which the wavefront is ahead of the wavefront without aberrations. `sampled_height` explains
+    the arguments.
     """
     wavefront = pupil.wavefront
     if wavefront is None:
@@ -92,7 +94,8 @@ def _interpolated(
 ) -> Array:
     """Return values at samples, array (row, column), interpolated from a few points of the pupil if possible.
 
-    values: function of positions (x, y) [m], whose result is in the library of the computation.
+    values: function of NumPy arrays x and y [m]. It returns an array of NumPy or PyTorch, the library in which
+        `convert` creates arrays.
     powers: number of powers of x and of y of a polynomial; None for other functions, which are not interpolated.
     """
     many, few = len(samples.at), (powers or 0) + SPHERE_POINTS

@@ -48,8 +48,9 @@ class SineSamples:
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: a value of s - s₀. `axis_kernel.AxisFactor` computes how the diffraction kernel differs from a Fourier
-        kernel along x, for points of the pupil with this sine along y. Along y, the points have this sine along x.
+    elsewhere: a component of s - s₀. `axis_kernel.AxisFactor` computes how the diffraction kernel differs from a
+        Fourier kernel along one axis of the window, x or y. It does so for points of the pupil whose s - s₀ has this
+        component along the other axis.
     """
 
     edge: PupilEdge
@@ -61,7 +62,10 @@ class SineSamples:
 
     @property
     def at(self) -> np.ndarray:
-        """Sines of the samples along either axis as seen from the window's centre, minus that of the pupil's centre."""
+        """Sines of the samples along either axis, each minus the sine of the pupil's centre along this axis.
+
+        Sines are the x and y components of the unit vector from the window's centre to a point.
+        """
         return self.grid.x
 
     @property
@@ -183,9 +187,10 @@ def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """Return the fewest samples that resolve the phase of pupil plus path; None if their spacing would be too uneven.
+    """Return the fewest samples that resolve the phase over the pupil; None if their spacing would be too uneven.
 
-    The result is also None if the grid would be too large.
+    It is the phase of the light behind the pupil plus the phase of the path from there to a point of the window. The
+    result is also None if the grid would be too large.
     """
     edge = problem.soft_edge(problem.turning)
     return evenly_in_sines(problem, edge, problem.turning + edge.stopband)

@@ -40,8 +40,8 @@ class SineGeometry:
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the angle between the axis and the line to the outermost sample with light, (pupil,).
-    elsewhere: sines relative to those of the pupils' centres, (pupil,). `axis_kernel.AxisFactor`, a factor of the
-        kernel along one axis, is computed for points with this sine along the other axis.
+    elsewhere: a fixed sine for each pupil, minus the sine of the pupil's centre, (pupil,). `axis_kernel.AxisFactor`, a
+        factor of the kernel along x or y, is computed for points with the fixed sine along the other axis.
     """
 
     distance: np.ndarray
@@ -197,7 +197,7 @@ class SineStack(SineGeometry):
             return self._paths(stack, *self.points)
 
         def computed() -> tuple[np.ndarray, np.ndarray]:
-            """Return paths through Chebyshev points, without reliefs and wavefronts, and powers of these points."""
+            """Return, at Chebyshev points, paths [waves] without reliefs and wavefronts, and the powers y^i x^j."""
             side = self.at[:, [0, -1]]
             nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
             points = self.points_at(nodes[:, None, :], nodes[:, :, None])
@@ -237,7 +237,8 @@ def rim_sines(
     Sines are the x and y components of the unit vector from the window's centre to a point. The first result is the
     largest difference, along x or y, between the sine of a point on the rim and the sine of the pupil's centre. The
     second is the largest sine of the angle between the axis and the line to a point on the rim. The third is True for
-    pupils in which samples with evenly spaced sines have similar distances from each other. All are arrays (pupil,).
+    pupils in which samples with evenly spaced sines are fairly evenly spaced [m] in the pupil's plane, too: their
+    spacing at the rim is at most MOST_STRETCH times that at the centre. All are arrays (pupil,).
 
     outermost: radii [m] of the rims.
     """
@@ -286,7 +287,7 @@ def _profile(edge: SoftAperture, curvature: float, dtype: str) -> np.ndarray:
     Its values are in the middle of equal steps of r² up to the outermost radius with light, followed by a 0.
 
     curvature: if it is not 0, the values for a ring are those of `curved_ring`, complex in single precision.
-    dtype: type of all other tables.
+    dtype: type of the table in all other cases, "float32" or "float64".
     """
     if curvature and isinstance(edge, SoftAnnulus):
         return np.append(curved_ring(edge.edge, edge.inner, curvature, SMOOTHED_LEVELS), 0)

@@ -83,7 +83,8 @@ def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: floa
     along a few lines through the window, for light from points on the rim of the pupil, including its soft edge.
 
     half: distance [m] from the window's centre within which the Chebyshev points lie.
-    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c}, for samples that are not sines.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. It is
+        not used if the samples of the pupil are evenly spaced in sines (`SineSamples`).
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
@@ -94,9 +95,10 @@ def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: floa
     lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
 
     def rest(at: np.ndarray) -> np.ndarray:
-        """Return the factor by which the diffraction kernel differs from a Fourier kernel, along lines in the window.
+        """Return the slow factor along lines in the window, for light from points on the rim of the pupil.
 
-        The lines are parallel to x or y. at: positions [m] along each line. Shape: (line, point of the rim, position).
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The lines are
+        parallel to x or y. at: positions [m] along each line. Shape: (line, rim point, position).
         """
         u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
         return slow_factor(path, rim, directions, (u, v))
@@ -175,12 +177,13 @@ def cross_term(
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return a and b, so that the part of the slow factor that x and y do not contribute separately is about 1 + a b.
+    """Return a and b, whose product describes how the slow factor depends on x and y together: as about 1 + a b.
 
-    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel, relative to the middle
-    of the window. This part is its value at (u, v), divided by its values at (u, 0) and (0, v). The product a b is
-    the term -ik us vt/D of the exponent, where k = 2π/λ, and 1/D is the mean inverse distance over the pupil. Because a
-    depends on u and s, and b on v and t, the term costs as much as a second Fourier kernel along each axis.
+    The slow factor F(u, v) is the factor by which the diffraction kernel differs from a Fourier kernel, relative to the
+    middle of the window. The quotient F(u, v) / (F(u, 0) F(0, v)) would be 1 if F were a function of x times a function
+    of y. It is about 1 + a b. The product a b is the term -ik us vt/D of the exponent, where k = 2π/λ, and 1/D is the
+    mean inverse distance over the pupil. Because a depends on u and s, and b on v and t, the term costs as much as a
+    second Fourier kernel along each axis.
 
     directions: s and t, the x and y components of the unit vectors from the window's centre to samples of the pupil,
         minus those of the unit vector to the pupil's centre. Their last two axes broadcast with those of `window`.

@@ -110,7 +110,7 @@ class _Gaussian(NamedTuple):
         return x * self.mean[0] + y * self.mean[1], self.between((x, y), (x, y))
 
     def between(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Return the covariance [m²] of the displacement's components along two unit vectors (x, y)."""
+        """Return the covariance [m²] of the displacements from the sample along two unit vectors (x, y)."""
         xx, xy, yy = self.covariance
         return one[0] * other[0] * xx + (one[0] * other[1] + one[1] * other[0]) * xy + one[1] * other[1] * yy
 
@@ -194,10 +194,12 @@ class SmoothPupil:
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the integral of each Gaussian over the aperture, complex (point,).
 
-        The integral is the product of a factor for each side of the aperture that lies near the point. The factor is
-        the fraction of the Gaussian on the open region of the side. Where the relief is steep, only light that one side
-        diffracts remains. This light comes from points on this side. The factors of the other sides are therefore
-        computed for the conditional distribution of the Gaussian on this side.
+        Each side of the aperture is a line or a circle that divides the plane into an open and a dark region. A side
+        near the point multiplies the integral over the whole plane by a factor: the fraction of the Gaussian in the
+        open region of this side. Where the relief is steep, nearly all light is too steep to remain after the
+        convolution. Only light that is diffracted at one of the sides remains, and it comes from points on this side.
+        The factors of the other sides are therefore computed for the conditional distribution of the Gaussian on this
+        side.
 
         inner: Gaussians of the points.
         x, y: positions of the points, in radii of the pupil.

@@ -71,9 +71,10 @@ class SmoothSpectrum(SpectrumSampling):
 
     @cached_property
     def closed_form(self) -> Grid:
-        """Grid at which `smooth` computes the light in closed form, convolved with its Gaussian.
+        """Grid of the samples of the light behind the pupil that `smooth` computes in closed form.
 
-        If there is a second Gaussian (`blur`), the samples of `pupil` are computed from these samples.
+        This light is convolved with the Gaussian of `smooth`. If there is a second Gaussian (`blur`), the light at this
+        grid is then convolved with it numerically. The result is the light at the grid `pupil`.
         """
         if self.blur == 0:
             return self.pupil
@@ -112,9 +113,9 @@ class SmoothSpectrum(SpectrumSampling):
     def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
         """Return the transfer function to the window, divided by the spectra of two Gaussians, complex (fy, fx).
 
-        The light is convolved with these Gaussians: that of `smooth` and, unless `blur` is 0, the one with the width
-        `blur`. The division reverses the convolution. The function is even along both axes, so only its values at
-        non-negative frequencies are returned.
+        The light is convolved with these Gaussians. The first has the width `smooth.width`. The second has the width
+        `blur`, and is absent if `blur` is 0. The division reverses the convolution. The transfer function is even along
+        both axes, so only its values at non-negative frequencies are returned.
         """
         found = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
         exponent = 2 * math.pi**2 * (self.smooth.width**2 + self.blur**2)

@@ -106,9 +106,10 @@ class SpectrumSampling:
     def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
         """Return a field over the window with its complete phase.
 
-        If the split method computed the field, it is multiplied by e^{iπr²/λz}/i. The function `arrived` omits this
-        factor, because the intensity does not depend on it. r is the distance from the axis in the window, and z that
-        of the window from the pupil.
+        The split method propagates light to a relay plane, and from there to the window by Fresnel's integral. A field
+        that was computed in this way lacks the factor e^{iπr²/λz}/i, because the intensity does not depend on it. The
+        field is multiplied by this factor here. r is the distance from the axis in the window, and z is the distance of
+        the window from the pupil.
 
         field: result of `arrived`.
         """
@@ -122,6 +123,7 @@ class SpectrumSampling:
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`.
 
-        The square lies in the plane of the window. Its width is the period with which the sums repeat the field there.
+        The square lies in the plane of the window. The Fourier sum that computes the field in this plane repeats it
+        periodically. The width of the square is this period.
         """
         return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx

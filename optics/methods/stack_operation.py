@@ -23,10 +23,11 @@ __all__ = ["is_single", "stack_images"]
 def is_single(size: Array, waves: Array | None) -> bool:
     """Return whether `stack_images` can compute the PSFs.
 
-    The phase must be a tensor of PyTorch in the processor's memory and carry derivatives, and the factor must not.
+    The light behind the pupil is S e^{2πi w}. The phase w (`waves`) must be a tensor of PyTorch in the processor's
+    memory and carry derivatives. The factor S (`size`) must not carry derivatives.
 
-    size: factor of the light behind the pupil without the phase of relief and wavefront.
-    waves: this phase [waves]; None without relief and wavefront.
+    size: S, the light without the phase of relief and wavefront.
+    waves: w, the phase of relief and wavefront [waves]; None without relief and wavefront.
     """
     tensor = waves is not None and library(waves) is not np and on_host(waves)
     return tensor and carries_derivative(waves) and not carries_derivative(size)

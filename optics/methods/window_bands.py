@@ -23,8 +23,8 @@ class Bands:
 
     density: highest frequencies that the samples must resolve, which are also the numbers of samples per radius.
     passband: frequencies up to which softening the edge does not change the spectrum of the aperture.
-    around: largest differences between the frequency of a ray at the edge and the frequencies at which diffraction at
-        the edge sends the ray's light into the window.
+    around: largest changes of frequency at the edge that matter. The edge diffracts a ray of one frequency to a band of
+        frequencies around it. Only frequencies of light that arrives in the window are counted.
     """
 
     density: np.ndarray

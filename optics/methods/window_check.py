@@ -129,7 +129,8 @@ class _CheckSums:
 
         Increasing numbers of points are tried. For each, the interpolated G is compared with the value that follows
         from the diffraction kernel itself, for rays from the middle and from the rim of the pupil to the corners of the
-        window. The first number is usually sufficient for the largest phase of G on these rays.
+        window. The number that is tried first depends on the largest phase of G on these rays, and is usually
+        sufficient.
         """
         samples, (left, top) = self.samples, ([0, 1, 0, 1], [0, 0, 1, 1])
         angle, radius = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None] * np.array([0, *[1] * 12])
@@ -227,12 +228,14 @@ def _remaining(
     directions: tuple[np.ndarray, np.ndarray],
     place: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Return the factor that remains of the diffraction kernel, computed from this kernel itself, complex.
+    """Return the diffraction kernel, divided by its parts that are treated separately, as a complex array.
 
-    The kernel is divided by its value at the middle of the window, by the Fourier kernel, and by the slow factors along
-    both axes. `RemainingFactor` computes the same from a formula for the slow factor.
+    The parts are the kernel's value at the middle of the window, the Fourier kernel, and two axis factors. The axis
+    factors are the values of the slow factor, by which the kernel differs from a Fourier kernel, on the axes of the
+    window. `RemainingFactor` computes this quotient from a formula for the slow factor.
 
-    directions: sines (s, t) of points of the pupils, minus those of the pupils' centres.
+    directions: x and y components (s, t) of the unit vectors from the window's centre to points of the pupils, minus
+        those of the unit vectors to the pupils' centres.
     place: positions (u, v) [m] relative to the middle of the window. All arrays are broadcast.
     """
     (s, t), (u, v) = directions, place

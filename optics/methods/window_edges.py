@@ -2,13 +2,13 @@
 
 Samples of a pupil are evenly spaced in the sines of their directions as seen from the window. A spacing Δs of the sines
 repeats the light of the window with the period λ/Δs. The period must be at least half the width of the window, plus the
-distance from the middle within which nearly all light arrives. The light that is diffracted at the edge of the pupil
-spreads further. A soft edge keeps this light out of the window. Softening the edge changes light only far from the
-geometrical rays of the edge, where there is little light.
+distance from the middle within which nearly all light arrives. Light that the edge of the pupil diffracts spreads
+further. A soft edge keeps it out of the window. Softening changes light only far from the geometrical rays of the edge,
+where there is little light.
 
 If most light of a strongly curved wave misses the window, and the aperture is a disk or a ring, the wave can be
-convolved with the same kernel that softens the edge (`curved_disk`). This smoothing removes light in directions far
-from the window. The number of samples is then almost independent of the directions of the rays at the edge.
+convolved with the same kernel that softens the edge (`curved_disk`). This removes light in directions far from the
+window. The number of samples is then almost independent of the directions of the rays at the edge.
 """
 
 from __future__ import annotations
@@ -111,9 +111,10 @@ class WindowEdges:
     def _unless_mapped(
         self, wide: Callable[[], list[SoftAperture]], narrow: Callable[[], list[SoftAperture]]
     ) -> list[SoftAperture]:
-        """Return one soft aperture per beam: narrow with derivatives or a map in the pupil, else wide.
+        """Return a soft aperture for each beam, with a narrow or a wide edge.
 
-        The fine detail of maps sends light from the edge in all directions. `wide` and `narrow` return all apertures.
+        The edge is narrow if derivatives are requested, or if a relief or wavefront is a map, whose fine detail sends
+        light from the edge in all directions. The functions `wide` and `narrow` compute the apertures of all beams.
         """
         mapped = self.stack.mapped
         if self.derivatives is not None or mapped.all():
@@ -124,7 +125,7 @@ class WindowEdges:
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, Bands]:
-        """Curvatures of waves that are convolved with the edge's kernel, 0 for others, (beam,), and frequency bands."""
+        """Values of the property `curvature`, and frequency bands for the samples and the soft edges of the pupils."""
         none = np.zeros(len(self.tolerance))
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
@@ -139,10 +140,10 @@ class WindowEdges:
 
     @cached_property
     def _rim_curvature(self) -> np.ndarray:
-        """Curvatures of the waves: mean local frequencies [cycles per radius] near the rim, (beam,).
+        """Curvatures c of waves that resemble e^{iπcr²} near the rim, with r in radii of the pupil, (beam,).
 
-        They are relative to a wave that converges to the middle of the window, positive for light that leaves the axis,
-        and rounded to multiples of CURVATURE_STEP.
+        At the rim, c is the local frequency [cycles per radius], relative to a wave that converges to the middle of the
+        window. It is positive for light that leaves the axis, and rounded to multiples of CURVATURE_STEP.
         """
         slopes, (along_x, along_y) = self.stack.slopes, self._to_middle
         r2 = np.square(slopes.x) + np.square(slopes.y)
@@ -151,7 +152,10 @@ class WindowEdges:
         return np.asarray(np.rint(outward / CURVATURE_STEP) * CURVATURE_STEP)
 
     def _bands(self, curvature: np.ndarray) -> Bands:
-        """Return the light's frequency bands if waves with these curvatures are convolved with the edge's kernel."""
+        """Return the frequency bands for the samples and the soft edge of each pupil.
+
+        curvature: frequencies at the rim of waves convolved with the soft edge's kernel, 0 for other waves, (beam,).
+        """
         slopes, bend, cycles, mapped = self.stack.slopes, curvature[:, None], self.geometry.cycles, self.stack.mapped
         along, curved = self._along, bool(curvature.any())
         rest = _unbent(self._to_middle, slopes, curvature) if curved else along
@@ -177,7 +181,7 @@ class WindowEdges:
         return Bands(density, passband, near).stepped(self.stepped)
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> Bands:
-        """Return the frequency bands of light that carries derivatives. Frequencies are in cycles per radius.
+        """Return the frequency bands [cycles per radius] for PSFs with derivatives, which need a sharper edge.
 
         rim: median frequencies of the rays at the edge, (beam,).
         direct: frequencies that the samples must resolve for light that the edge does not diffract, (beam,).
@@ -200,7 +204,7 @@ class WindowEdges:
 
     @cached_property
     def _masks(self) -> np.ndarray:
-        """Highest frequencies of the masks' amplitudes that matter, in cycles per radius, (beam,)."""
+        """Cycles per radius above which masks change amplitudes by less than the tolerance and 0.1, (beam,)."""
         return self.stack.mask_cycles(np.minimum(self.tolerance, 0.1))
 
     def _reach(self, along: np.ndarray) -> np.ndarray:
@@ -215,17 +219,14 @@ class WindowEdges:
 
     @cached_property
     def _along(self) -> np.ndarray:
-        """Larger of the local frequencies along x and along y of each ray [cycles per radius], (beam, ray).
-
-        A ray to the middle of the window has the frequency 0.
-        """
+        """Larger frequency of each ray, along x or y [cycles/radius], 0 if it hits the window's middle, (beam, ray)."""
         return np.asarray(np.maximum(*map(np.abs, self._to_middle)))
 
     def _steepest(self, curvature: np.ndarray) -> np.ndarray | float:
-        """Return the frequencies [cycles per radius] that nearly no ray at the rim exceeds, (beam,).
+        """Return the local frequencies of light [cycles per radius] that nearly no point of the rim exceeds, (beam,).
 
-        They are determined for polynomials of high order, which are steepest at the rim, and are otherwise 0.
-        `curvature` is the part of the frequencies at the rim that is subtracted first, see `_unbent`.
+        Polynomials of high order are steepest at the rim. Without them, and for maps, the result is 0. First, the
+        frequency of a curved wave is subtracted. Its value at the rim is `curvature`, see `_unbent`.
         """
         slopes = self.stack.rim_slopes
         if slopes is None:
@@ -240,10 +241,7 @@ class WindowEdges:
         return self._paths(self.stack.slopes)
 
     def _paths(self, slopes: StackSlopes) -> tuple[np.ndarray, np.ndarray]:
-        """Return the local frequencies [cycles per radius] of rays along x and along y, (beam, ray).
-
-        A ray to the middle of the window has the frequency 0.
-        """
+        """Return rays' frequencies along x and y [cycles/radius], 0 if they hit the window's middle, (beam, ray)."""
         path = self.geometry.to_middle(slopes.across)
         return (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
 
@@ -278,10 +276,12 @@ class WindowEdges:
 
 
 def _unbent(paths: tuple[np.ndarray, np.ndarray], slopes: StackSlopes, curvature: np.ndarray) -> np.ndarray:
-    """Return the larger frequency, along x or y, of each ray without curvature [cycles per radius], (beam, ray).
+    """Return the local frequency of each ray after that of a curved wave is subtracted, (beam, ray).
 
-    paths: frequencies of the rays along x and along y, with curvature.
-    curvature: curvatures to be subtracted, frequencies at the rim [cycles per radius], (beam,).
+    Frequencies [cycles per radius] are subtracted along x and along y, and the larger absolute value is returned.
+
+    paths: frequencies of the rays along x and along y, from which nothing is subtracted yet.
+    curvature: frequency of the curved wave at the rim, (beam,). Nearer to the axis, it is proportionally lower.
     """
     parts = zip(paths, (slopes.x, slopes.y), strict=True)
     return np.asarray(np.maximum(*(np.abs(part - curvature[:, None] * at) for part, at in parts)))

@@ -88,10 +88,10 @@ class WindowGeometry:
 
     @cached_property
     def cycles(self) -> np.ndarray:
-        """Frequencies in the pupils of light that arrives at the sides of the window, (beam,).
+        """Spatial frequencies in the pupil's plane of light that arrives at the sides of the window, (beam,).
 
-        The frequency is the number of cycles of the phase per radius of the pupil, and 0 for light that arrives at the
-        middle of the window.
+        A frequency is the number of cycles of the light's phase per radius of the pupil. It is 0 for light that arrives
+        at the middle of the window.
         """
         radius, distance, *_ = self.light.arrays
         return np.asarray(self.half * radius / (self.light.wavelength * distance))
@@ -112,9 +112,11 @@ class WindowGeometry:
         return found
 
     def rays(self, across: int) -> PlannedRays:
-        """Return some of the points that are spread evenly over the pupils, with the data of their rays.
+        """Return some points of each pupil, with the data of the rays that start there.
 
-        across: number of points across the pupil, see `disk_points`.
+        They are every n-th point of a square grid in the pupil (see `disk_points`), about 100 to 200 points.
+
+        across: number of points of this grid along a diameter of the pupil.
         """
 
         def computed() -> PlannedRays:
@@ -146,9 +148,10 @@ class WindowGeometry:
         return found
 
     def ray_factor(self, across: int, steepest: np.ndarray, elsewhere: np.ndarray) -> RemainingFactor:
-        """Return the slow factor, divided by its values along both axes of the window, for the points of `rays`.
+        """Return the quotient of the slow factor and its values on the x axis and on the y axis of the window.
 
-        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel.
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The quotient is for
+        light from the points of the pupils that the method `rays` returns.
 
         across: number of points across the pupil, see `disk_points`.
         steepest, elsewhere: see `SineGeometry`.

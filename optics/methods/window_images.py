@@ -70,9 +70,10 @@ def window_image_errors(
 def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dtype: str) -> list[tuple[Any, Any]]:
     """Return pairs of matrices, each with the kernels (see `_along`) for the rows and for the columns of the window.
 
-    PSFs with the same samples share the matrices. With `cross_term`, there are two pairs, whose sums are added. If the
+    PSFs with the same samples share the matrices. If `crossed` is True, there are two pairs, the second one for
+    `cross_term`. Each pair yields a field over the window, and the sum of both fields is the field of the PSF. If the
     matrices are mirrored (`MirroredMatrix`), the list holds both pairs. Else they are joined to one larger pair,
-    because one large product takes less time than two. The shapes of this pair are (pupil, y, 2 · sample) and
+    because one large product takes less time than two. This pair has the shapes (pupil, y, 2 · sample) and
     (pupil, 2 · x, sample).
     """
     window = path.window
@@ -100,9 +101,9 @@ def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dty
 def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: str) -> np.ndarray:
     """Return the diffraction kernel along x (`axis` 0) or y (1), multiplied by interpolation weights, complex.
 
-    The kernel depends on the position in the window (place) and on the sample of the pupil. It is multiplied by the
-    Lagrange weight of each node a at this position. The last axis counts all pairs of a node and a sample, so the shape
-    is (pupil, place, node · sample).
+    The kernel depends on the position in the window (place) and on the sample of the pupil. Between the nodes, which
+    are points of the window, values are interpolated. The weight of a node is its Lagrange polynomial at the place. The
+    last axis counts all pairs of a node and a sample, so the shape is (pupil, place, node · sample).
     """
     kernel = window_kernel(path, samples, axis, dtype)
     if len(nodes) == 1:

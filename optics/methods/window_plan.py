@@ -98,7 +98,11 @@ class WindowPlan:
 
     @property
     def crossed(self) -> np.ndarray:
-        """True for beams whose sums over the pupil include `cross_term` instead of an interpolation, (beam,)."""
+        """True for beams whose slow factor is approximated with `cross_term` instead of interpolation, (beam,).
+
+        The slow factor is the quotient of the diffraction kernel and a Fourier kernel. `cross_term` corrects the
+        product of its values on the window's axes.
+        """
         return self._ranks[1]
 
     @cached_property
@@ -107,10 +111,11 @@ class WindowPlan:
 
     @cached_property
     def elsewhere(self) -> np.ndarray:
-        """Typical sines of the points of the pupils as seen from the middle of the window, (beam,).
+        """Typical sines of the directions from the middle of the window to points of the pupils, (beam,).
 
         They are the values of `WindowRays.mean_sine`, and serve as `elsewhere` of `SineGeometry`. They are rounded to
-        multiples of the largest sine at the rim, divided by ELSEWHERE, so that similar PSFs can share arrays.
+        multiples of a step, so that similar PSFs can share arrays. The step is 1/ELSEWHERE of the largest sine at the
+        rim.
         """
         step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
         return np.asarray(np.rint(self._rays.mean_sine / step) * step)
@@ -126,7 +131,7 @@ class WindowPlan:
 
         `window_check` estimates the errors of the PSFs from sums over the finer samples.
 
-        places: indices of the beams. Their entries of `counts` must be equal.
+        places: indices of the beams. All these beams must have the same number of samples (`counts`).
         """
         count = int(self.counts[places[0]])
         sets = (count, 0.0, self._rims, self.edges.edges), (
@@ -181,10 +186,11 @@ class WindowPlan:
 def plan_costs(window: Grid, rank: Any, across: Any, finer: Any, crossed: Any = False) -> tuple[Any, Any]:
     """Return the predicted time [s] and memory [bytes] of a PSF; the arguments are numbers or arrays (beam,).
 
-    rank: number of points along an axis of the window between which the slow factor is interpolated.
+    rank: number of points along an axis of the window between which the slow factor is interpolated. The slow factor is
+        the factor by which the diffraction kernel differs from a Fourier kernel.
     across: number of samples along an axis of the pupil.
-    finer: number of the finer samples along an axis from which `window_check` estimates the error of the PSF.
-    crossed: whether the sum over the pupil includes `cross_term`.
+    finer: number of samples along an axis of a second, finer grid, with which `window_check` estimates the PSF's error.
+    crossed: whether the sum over the pupil includes `cross_term`, which then replaces the interpolation.
     """
     (height, width), inner = window.shape, rank * across
     products = (inner * inner * width + height * inner * width) * np.where(crossed, 2, 1)

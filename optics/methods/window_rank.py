@@ -41,7 +41,7 @@ RANK_OF_DISTANCE = 3  # least rank for derivatives by the distance, which are qu
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Kinds of derivatives of a PSF that are requested, and for which it needs more samples.
+    """Requests for those derivatives of a PSF that require more samples than the PSF alone.
 
     moves: whether derivatives with respect to the distance of the window are requested.
     cells: number of intervals between the knots of an interpolated map (relief or wavefront), along a diameter of the
@@ -60,8 +60,9 @@ class WindowRays:
         the point that the ray hits, moved outwards along both axes by the distance over which diffraction spreads the
         light. Positions outside the window are then moved to the nearest side of the window.
     weight: weights of the rays, with a mean of 1, (beam, ray). Rays that miss the window have a small weight.
-    mean_sine: weighted root mean square of the sines along an axis of the directions from the rays' points of the pupil
-        to the middle of the window, minus the sine of the pupil's centre, (beam,).
+    mean_sine: typical difference between two directions, seen from the middle of the window: to a ray's point of the
+        pupil, and to the pupil's centre, (beam,). It is the weighted root mean square of the x and y components of the
+        difference between both unit vectors.
     """
 
     window: tuple[np.ndarray, np.ndarray]
@@ -94,14 +95,16 @@ def window_ranks(
     tolerance: np.ndarray,
     derivatives: Derivatives | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ranks with which the slow factor is accurate enough, and whether `cross_term` is needed, each (beam,).
+    """Return the ranks that the tolerance requires, and whether `cross_term` is needed, each (beam,).
 
-    The rank is the number of points along an axis of the window between which the slow factor is interpolated, or 0 if
-    it would exceed MOST_RANK. With `cross_term`, it is 1. The interpolation is tested near the points where the rays
-    hit the window, because the light arrives there. If derivatives are requested, a change of the pupil may send light
-    to any point of the window. The error is then also tested on average over the whole window.
+    The slow factor is the quotient of the diffraction kernel and a Fourier kernel. The rank is the number of points
+    along an axis of the window between which this factor is interpolated, or 0 if it would exceed MOST_RANK. With
+    `cross_term`, it is 1. The interpolation is tested near the points where the rays hit the window, because the light
+    arrives there. If derivatives are requested, a change of the pupil may send light to any point of the window. The
+    error is then also tested on average over the whole window.
 
-    factor: slow factor, divided by its values along both axes, for the points of the pupils where the rays start.
+    factor: slow factor at a position (u, v) of the window, divided by its values at (u, 0) and (0, v), for light from
+        the points of the pupils where the rays start.
     tolerance: tolerances of the PSFs, (beam,).
     """
     half, path, directions = geometry.half, factor.path, factor.directions

@@ -47,8 +47,9 @@ class WindowSampling:
     factor.
 
     rank: number of points along an axis of the window between which the slow factor is interpolated.
-    crossed: True if `plain_intensity` approximates the slow factor with `cross_term`, without interpolation. The field
-        and intensities with derivatives are then interpolated, with a rank of at least CROSSED_RANK.
+    crossed: True if `plain_intensity` approximates the slow factor by a formula (`cross_term`), not by interpolation.
+        This formula is not used for the complex field or for intensities with derivatives. For these, the slow factor
+        is interpolated, with a rank of at least CROSSED_RANK.
     half_width: distance [m] from the middle of the window within which the interpolation points lie.
     """
 

@@ -95,10 +95,12 @@ def positive(
 
 
 def without_derivative(name: str, value: Any) -> Any:
-    """Return `value`; ValueError about `name` if it, or an entry of it, carries a derivative, which would be lost.
+    """Return `value`, or raise a ValueError if `value` or one of its entries carries a derivative, which would be lost.
 
-    The other functions of this module that check numbers call this one. Exceptions are `pair`, `plain_reals`, and calls
-    with carried=True, which accept derivatives.
+    The functions of this module that check numbers call this one. Only `pair`, `plain_reals`, and functions called with
+    carried=True do not, because they accept derivatives.
+
+    name: name of the checked argument, for the message.
     """
     if type(value) is float:
         return value  # fast path: planning calls this thousands of times

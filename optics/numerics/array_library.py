@@ -156,10 +156,10 @@ def on_host(x: Array) -> bool:
 
 
 def _sum_of_products(values: Array, matrix: Any) -> Array:
-    """Return the product of a sparse matrix and a vector of PyTorch, on the device of the vector.
+    """Return the product of a sparse matrix and a vector `values` of PyTorch, on the device of the vector.
 
-    For each entry of the matrix, the number of the vector at its column is selected and multiplied by it. The products
-    are then added row by row.
+    Each entry of the matrix is multiplied by the element of the vector whose index is the column of the entry. The
+    products are then added row by row.
     """
     own, key = library(values), (id(matrix), str(values.device), str(values.dtype))
     # The matrix is kept with its entries, so that no other matrix has its id.
@@ -168,10 +168,10 @@ def _sum_of_products(values: Array, matrix: Any) -> Array:
 
 
 def _entries(values: Array, matrix: Any) -> tuple[Array, Array]:
-    """Return the columns of the entries of a sparse matrix, and their values, on the device of `values`.
+    """Return the column indices of the entries of a sparse matrix, and the entries, on the device of `values`.
 
-    The shape of the values is (row, entry). Rows with fewer entries than others are filled up with zeros. The columns
-    are in the same order, but flat.
+    The entries have the shape (row, entry of the row). Rows with fewer entries than others are filled up with zeros.
+    The column indices are a flat array. Its order is that of the entries, one row after the other.
     """
     counts = np.diff(matrix.indptr)
     column = np.arange(max(int(counts.max(initial=0)), 1)) < counts[:, None]

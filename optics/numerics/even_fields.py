@@ -41,8 +41,9 @@ def even_seconds(shape_in: Shape, shape_out: Shape) -> float:
 def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int = 0) -> Field:
     """Return the Fourier sum of an even field u, Σ_j u[j] exp(± 2πi j·k / period), on one quarter of `grid`.
 
-    j and k are counted from the centre, as in `fourier.dft2`. The field and the result are stored only from the centre
-    sample to the end of the longer sides, see `quarter`.
+    j and k are counted from the centre sample, as in `fourier.dft2`. Along each axis, the field and the result contain
+    only the samples from the centre to one end, see `quarter`. If the number of samples is even, this is the end of the
+    side with one more sample.
 
     field: u on the quarter of a plane of `shape` samples, or on some rows of this quarter, which start at row `first`.
     """

@@ -109,7 +109,7 @@ def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> n
 
 
 def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
-    """Return u[j] exp(±2πi j·c / period) for a field u. Its sum at samples k equals the sum of u at samples k + c.
+    """Return u[j] exp(±2πi j·c / period) for a field u. The `dft2` of this product at k is the `dft2` of u at k + c.
 
     by: ±c, (x, y), in samples of the output. Fractions are allowed.
     """

@@ -114,13 +114,13 @@ def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
 
 
 def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
-    """Return the sums and the differences of rows j and -j of a field that is already summed along x.
+    """Return v[j, k] + v[-j, k] and v[j, k] - v[-j, k], where v is the Fourier sum of a field along x alone.
 
-    Each is a list of the real and the imaginary part, (j, k), for j from 0 and frequencies k along x of both signs. At
-    j = 0, one of the two equal rows counts as 0.
+    The row j is counted from the middle row of the field, from 0 on. k is the frequency along x, of either sign. Each
+    result is a list of real and imaginary part, (j, k). At j = 0, both terms are the same row, so v[j, k] counts as 0.
 
-    across: four tensors (row, |k|): sums along x of the even part times cosines, real and imaginary, followed by sums
-        of the odd part times sines. `_both_sides` combines them for k of either sign.
+    across: parts of v, four tensors (row, |k|): sums along x of the field's even part times cosines, real and
+        imaginary, followed by sums of its odd part times sines. `_both_sides` combines them for k of either sign.
     size: number of rows of the field, and number of frequencies k.
     """
     ny, mx = size

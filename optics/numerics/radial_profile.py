@@ -64,11 +64,16 @@ class RadialProfile:
 
     @property
     def is_table(self) -> bool:
-        """True if the image is computed at the radii of the evenly spaced table, not at Chebyshev points."""
+        """True if the image is computed at evenly spaced radii, the table that is interpolated onto the grid.
+
+        If False, the image is computed at Chebyshev points, and the table is interpolated from these.
+        """
         return self.points == self.table + TAPS - 1
 
     def pays(self, outputs: int) -> bool:
-        """Return whether the image is computed at fewer radii here than the window has samples (`outputs`).
+        """Return whether this profile has fewer radii, at which the image is computed, than the window has samples.
+
+        outputs: number of samples of the window.
 
         The radii always extend from the axis to `rim`. A window far off the axis contains only a small part of this
         range, so it may have fewer samples than there are radii.

@@ -70,11 +70,11 @@ class ScatteredSum:
         return found
 
     def _factor(self) -> np.ndarray:
-        """Return the factors (y, x) that convert the Fourier transform of the stored cells to the sums.
+        """Return the factors, one for each sample k of the grid, that correct for the spreading of points, (y, x).
 
-        The points are spread over cells, the squares of a grid finer than that of the sums. Each factor is a phase
-        factor for the position of the stored cells on this finer grid, divided by the Fourier transform of the
-        spreading kernel.
+        The scattered points are spread by a kernel over cells, the squares of a finer grid, which is then Fourier
+        transformed. Only the block of cells that contains the spread points is stored. Each factor is a phase factor
+        for the position of this block on the finer grid, divided by the Fourier transform of the kernel.
         """
         axes = []
         for first, n in zip(self.first, self.shape, strict=True):

@@ -66,8 +66,8 @@ def acceptance_function(ommatidium: Ommatidium, wavelengths: np.ndarray, loss: f
     loss: fraction in [1e-5, 0.1].
 
     Raises:
-        ValueError: an argument is outside its valid range, the rhabdom guides no mode, or see `Waveguide.modes`. The
-            pupil has a relief of pixels, or one of the pupil's parameters carries a derivative.
+        ValueError: an argument is outside its valid range, the rhabdom guides no mode, the pupil has a relief of
+            pixels, or one of the pupil's parameters carries a derivative. See also `Waveguide.modes`.
     """
     of_kind("ommatidium", ommatidium, Ommatidium, "Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6))")
     at = tuple(float(one) for one in wavelength_row(wavelengths))

@@ -83,8 +83,8 @@ class Ommatidium:
         wavelength: vacuum wavelength [m].
 
         Raises:
-            ValueError: an angle has a sine above 0.5 or below -0.5, the shapes of the angles cannot be broadcast, or
-                the rhabdom has no modes. The pupil has a relief of pixels, or one of the pupil's parameters carries a
+            ValueError: an angle has a sine above 0.5 or below -0.5, the shapes of the angles cannot be broadcast, the
+                rhabdom has no modes, the pupil has a relief of pixels, or one of the pupil's parameters carries a
                 derivative. See also `Waveguide.modes`.
         """
         x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)

@@ -71,10 +71,11 @@ def radiated(
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
     """Return a function that maps a mode's index to values of G D², for a waveguide on the pupil's axis.
 
-    Each value belongs to a point of the pupil. D is its distance from the waveguide's end, and G(sin θ, D) is the
-    integral over that end, defined at the top of the module, which determines the radiated field. Here, D is z/cos θ
-    with the distance z of the end from the pupil, so G depends on θ alone. The values are interpolated linearly between
-    closely spaced points.
+    Each value belongs to a point of the pupil. D is the distance of this point from the waveguide's end, and θ its
+    angle from the waveguide's axis. G(sin θ, D) is proportional to the field that the mode radiates to the point. It is
+    an integral over the waveguide's end, see the top of the module. For a waveguide on the axis, D is z/cos θ, where z
+    is the distance of the end from the pupil, so G depends on θ alone. It is computed at closely spaced θ, and
+    interpolated linearly between them.
 
     sine, distance: sin θ and D of the points, (point,).
     k: wavenumber [1/m].
@@ -96,9 +97,10 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
     """Return a function that maps a mode's index to values of G D², for a waveguide off the pupil's axis.
 
-    Each value belongs to a point of the pupil. D is its distance from the waveguide's end, and G(sin θ, D) is the
-    integral over that end, defined at the top of the module, which determines the radiated field. G is interpolated in
-    sin θ and in 1/D, which are independent of each other.
+    Each value belongs to a point of the pupil. D is the distance of this point from the waveguide's end, and θ its
+    angle from the waveguide's axis. G(sin θ, D) is proportional to the field that the mode radiates to the point. It is
+    an integral over the waveguide's end, see the top of the module. G is interpolated in sin θ and in 1/D, which are
+    independent of each other.
 
     sine, distance: sin θ and D of the points, (point,).
     k: wavenumber [1/m].

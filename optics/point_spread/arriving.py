@@ -221,11 +221,12 @@ class _Sum:
         """Return the derivatives of `fraction`, the power inside a circle, with respect to h, to each W and to each u.
 
         h is the radius of the pupil divided by the wavelength. W is the optical path [waves] and u the amplitude at a
-        node of the pupil. The spectrum at a frequency is the inner sum of `fraction`, over the nodes.
+        node of the pupil. The spectrum at a frequency (sx, sy) is the sum of u exp(2πi (W - h (sx x + sy y))) over the
+        nodes (x, y). `fraction` is the weighted sum of its squared modulus over the frequencies, times h².
 
         at: h, and W and u of all nodes.
         places: coordinates x, y of the nodes, followed by the coordinates sx, sy of the frequencies.
-        back: conjugate of the spectrum times the weight w of the frequency, as real and imaginary part.
+        back: conjugate of the spectrum times the weight of the frequency, as real and imaginary part.
         total: the value of `fraction`.
         """
         import drjit as dr

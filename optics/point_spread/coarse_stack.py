@@ -33,9 +33,10 @@ def coarse_stack(
     The result is None if other methods are faster, or must be used.
 
     stack: the light, whose numbers may carry derivatives of PyTorch. If these numbers are on a GPU, the GPU computes
-        the PSFs and their errors. The processor then receives only the inputs of `without`, the errors, and the
-        positions in the window at which PSFs are compared with a finer sum to find the errors.
-    without: the same light without derivatives, for NumPy.
+        the PSFs and their errors.
+    without: copy of the light for NumPy, without derivatives, from which the processor plans the samples. If `stack` is
+        on a GPU, the only other data that are copied to the processor are the errors, and the positions in the window
+        at which PSFs are compared with a finer sum to find the errors.
     tolerance, method: see `optics.psf`.
     """
     # Dr.Jit computes the edge of the aperture, so PyTorch cannot compute derivatives with respect to the radius.

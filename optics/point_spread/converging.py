@@ -182,8 +182,8 @@ class Converging(ReadOnlyArrays):
 
         The result is None if the comparison would take too long.
 
-        fields: the fields to be checked, (y, x). Each key states the light to which the field belongs: the weights of
-            the `RayField` that is the mask of its pupil.
+        fields: the fields to be checked, (y, x). The key of a field contains the weights of a `RayField`, a mask of the
+            pupil. The field is compared with the direct sum for light through the pupil with this mask.
         """
         errors = [
             spot_check(self._behind(weights), problem, np.abs(field.ravel()) ** 2, CHECK_SECONDS)

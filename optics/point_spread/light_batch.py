@@ -93,8 +93,8 @@ class LightBatch:
         """Return the PSFs of those members that can be computed together, in stacks, with an error below the tolerance.
 
         The result maps the index in `members` to the PSFs of a pupil at its distances, (wavelength, y, x). A stack is
-        light through one pupil from several sources, whose PSFs follow from one plan. Members that miss the tolerance
-        at any wavelength are left out.
+        light from several sources through one pupil. The samples of the pupil are planned once for the whole stack.
+        Members that miss the tolerance at any wavelength are left out.
 
         fixed: the same light without derivatives.
         wavelengths: vacuum wavelengths [m], (wavelength,).

@@ -94,8 +94,8 @@ class Weighing:
 
     least: shortest possible time of a PSF [s].
     per_sample: time per sample of the window [s].
-    asking: assumed time [s] to plan the method's samples. Where these are usually planned in vain, the value is larger
-        than the actual time, so that the method is tried less often.
+    asking: assumed time [s] to plan the method's samples. Some methods are rarely chosen after their samples are
+        planned. For these, the assumed time exceeds the actual time, so that they are tried less often.
     """
 
     least: float

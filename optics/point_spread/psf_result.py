@@ -2,8 +2,8 @@
 
 A pupil of radius R illuminates a point of the sensor, at the distance z, with rays whose sines differ by at most
 2R/√(R² + z²). The highest frequency of the intensity is therefore f_c = 2R/(λ√(R² + z²)), with the wavelength λ behind
-the pupil; the relief does not change it. The spectrum of samples at the pitch dx repeats every 1/dx. Sums over samples
-are therefore correct if dx < 1/f_c (about λz/2R), and all contrasts are correct if dx <= 1/(2 f_c).
+the pupil. A relief in the pupil does not change f_c. The spectrum of samples at the pitch dx repeats every 1/dx. Sums
+over samples are therefore correct if dx < 1/f_c (about λz/2R), and all contrasts are correct if dx <= 1/(2 f_c).
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
         that arrives there; evanescent light, for example, does not. The PSF is never renormalised.
     plans: one plan per wavelength; `plan` is the least accurate one.
-    requests: parameters with which functions such as `optics.strehl_ratio` recompute the PSF on other samples, one for
-        each wavelength, or for each that a mean combines (see `mean`). Empty if the parameters are unknown.
+    requests: parameters with which functions such as `optics.strehl_ratio` recompute the PSF on other samples, one
+        entry per wavelength. A mean over wavelengths (see `mean`) keeps the entries of all of them. Empty if unknown.
     shares: weight of each request in a mean over wavelengths, (request,). None if the PSF is no such mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
         derivatives; None for means, and unless `psf` was called with field=True. The amplitude [1/m] has the carrier
@@ -98,9 +98,9 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def power(self) -> np.ndarray | Array:
-        """Fraction of the pupil's power inside the window, (wavelength,).
+        """Fraction of the pupil's power inside the window, up to dx/2 beyond the outermost samples, (wavelength,).
 
-        The window extends dx/2 beyond the outermost samples. If samples are too coarse for a sum, finer ones are found.
+        It is a sum over the samples. If they are too far apart for this sum, the PSF is recomputed on finer ones.
 
         Raises:
             AccuracyError: samples are too coarse, and finer ones cannot be computed. The message states which suffice.
@@ -166,7 +166,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def highest_cutoff(self) -> float:
-        """Highest frequency [1/m] of the intensity at any wavelength, including those that a mean combines if known."""
+        """Highest frequency [1/m] of the intensity. In a mean over wavelengths, each of them counts if it is known."""
         if self.shares is None or not self.can_recompute:
             return float(self.cutoff.max())
         shortest = min(request.beam.wavelength for request in self.requests)
@@ -245,10 +245,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return self.recompute_on(self.window, "a sum") if self.for_window and self.can_recompute else self
 
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
-        """Return a PSF whose samples can be summed: they are at most `coarsest` [m] apart, or are means over cells.
+        """Return a PSF whose samples can be summed: they are at most `coarsest` [m] apart, or are means over squares.
 
-        If the samples of this PSF meet the condition, the result is `of_all_light`, on the same samples. Otherwise the
-        square (cell) around each sample is divided into smaller ones, and the PSF is recomputed on them.
+        Suitable samples are kept, and at most their values are recomputed, see `of_all_light`. Otherwise the square
+        around each sample is divided into smaller ones, and the PSF is recomputed at their centres.
 
         Raises:
             AccuracyError: see `recompute_on`.

@@ -33,15 +33,13 @@ DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this,
 
 @dataclass(frozen=True)
 class Effort:
-    """Limits on the effort of a spot check, which compares a PSF with the direct sum at a few points.
-
-    All values are choices made by judgement.
+    """Limits (choices) on the effort of a spot check, which compares a PSF with the direct sum at a few points.
 
     points: largest number of points at which a PSF is checked.
     points_along_radius: the same for a rotationally symmetric PSF in a window around the axis.
     fewest: number of points below which the estimate is useless.
-    spare_digits: digits by which the direct sum may be more accurate than the tolerance, in the order in which they
-        are tried. The first number with which all points can be checked in time is used, or else the last number.
+    spare_digits: numbers of digits by which the direct sum exceeds the accuracy of the tolerance. They are tried in
+        this order. The first number with which all points can be checked in time is used, or else the last number.
     share: time limit of the check, relative to the time of the PSF.
     share_of_few: the same for windows with fewer than `few` samples, where `share` is too short for `fewest` points.
         Without a check, the error of the PSF may be as large as its predicted upper bound.
@@ -138,7 +136,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
-    """Return the most accurate direct sum at all points that the time limit allows, or a coarse one at fewer points."""
+    """Return the most accurate direct sum that is fast enough at all points, or else a coarse one at fewer points."""
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
     share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
@@ -156,10 +154,10 @@ def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -
 
 
 def _finer_detail(beam: Beam, problem: Problem) -> float:
-    """Return how many more cycles per pupil radius the direct sum of a spot check resolves than the PSF does.
+    """Return how much finer detail a spot check resolves than the PSF does, as a difference [cycles per pupil radius].
 
-    A PSF neglects detail of reliefs, wavefronts and masks below a tenth of its tolerance. The direct sum resolves finer
-    detail, because the comparison would otherwise not show the resulting error.
+    A PSF neglects detail of reliefs, wavefronts and masks below a tenth of its tolerance. The direct sum, with which a
+    spot check compares it, resolves finer detail. Otherwise the comparison would not show the resulting error.
     """
     fine = beam.pupil.bandwidth(beam.wavelength, FINER_DETAIL * problem.tolerance / 10)
     return problem.radius * max(fine - problem.detail, 0.0)
@@ -182,7 +180,7 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
 def exact_psf(
     beam: Beam, problem: Problem, x: np.ndarray, y: np.ndarray, bright: float, seconds: float
 ) -> tuple[np.ndarray, float] | None:
-    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error at the value `bright` [1/m²].
+    """Return the PSF at points (x, y) [m] by the direct sum, and the relative error of a value of `bright` [1/m²].
 
     The result is None if PSFs of this problem may be wrong beyond some distance from the axis (`Problem.reach`), or if
     the sum needs more time than `spot_check` may spend on a PSF whose computation takes `seconds`.
@@ -255,7 +253,8 @@ def _in_order(window: Grid) -> np.ndarray:
 def _by_radius(window: Grid) -> np.ndarray:
     """Return the flat indices of a window's samples in order of their distance from the axis.
 
-    If `_drawn` adds up the samples' probabilities in this order, its equal steps of the sum lie in all bright rings.
+    `_drawn` adds up the probabilities of the samples in this order, and draws one sample in each equal step of the sum.
+    The drawn samples are therefore spread over all bright rings.
     """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
     # Squared radii are rounded, so that rounding errors do not change the order of equal radii.
@@ -272,10 +271,11 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return two flat sums of those distributions in `_chances` that do not depend on the PSF.
+    """Return two flat arrays for `_chances`: sums of probability distributions over the samples of a window.
 
-    The first one adds the distributions of nearness to a side of the window and to a corner. The second one adds the
-    uniform distribution to both.
+    These distributions do not depend on the PSF. The first array is the sum of two distributions. One of them prefers
+    samples near a side of the window, the other samples near a corner. The second array is the first array plus the
+    uniform distribution.
 
     centre: position (x, y) of the window's centre, in samples.
     """

@@ -245,9 +245,10 @@ def _measured_error(result: PSFResult, peak: Peak) -> float:
     The result is this bound if the PSF cannot be recomputed, if its samples are means over cells, or if the direct sum
     would take too long.
 
-    The direct sum is evaluated on 3 x 3 points around the peak. The maximum of a paraboloid through points at the pitch
-    AT_A_PEAK / cutoff has the error PARABOLOID_ERROR. These points are CLOSER times as close, so their paraboloid has
-    the error PARABOLOID_ERROR / CLOSER^4.
+    The direct sum is evaluated on 3 x 3 points around the peak, and a paraboloid through them gives the maximum. If the
+    pitch of the points were AT_A_PEAK / cutoff, this maximum would have the error PARABOLOID_ERROR, which is
+    proportional to the fourth power of the pitch. The pitch of the 3 x 3 points is smaller by the factor CLOSER, so
+    their maximum has the error PARABOLOID_ERROR / CLOSER^4.
     """
     if result.holds_cells or not result.can_recompute:
         return peak.error

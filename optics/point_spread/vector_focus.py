@@ -52,18 +52,19 @@ def vector_focus(
         the x and y of these definitions are rotated with the light's direction.
     source_angle: direction (x, y) [rad] of the light, as in `optics.psf`. The window lies around the image.
     apodization: "flat" for uniform light over a flat pupil, or "aplanatic" for light along the axis of a corrected
-        objective. In the aplanatic case, the ray from the point ξ of the pupil arrives at the focus, at the distance z,
-        at an angle to the axis with the sine ξ/z, and the light is a sum of plane waves (Richards and Wolf 1959).
+        objective. A ray of an aplanatic lens that leaves the pupil at the distance ξ from the axis goes to the focus.
+        The sine of its angle to the axis is ξ/z, where z is the distance of the focus behind the pupil. The light is a
+        sum of plane waves, one for each such ray (Richards and Wolf 1959).
     dx, shape: pitch [m] and number of samples (y, x) of the window.
     tolerance: relative L2 error of the intensity over the window.
 
     Raises:
-        ValueError: an argument is invalid, the relief is pixelated, a parameter carries derivatives, or an aplanatic
-            lens has a relief, wavefront or mask, is not lit along its axis, has no focal length, or has a radius that
-            is not below the distance.
-        AccuracyError: no method meets the tolerance within the limits on memory and time, or with "flat" apodization,
-            the sine of a ray's angle to the axis exceeds 0.98 behind the pupil. The same error results if an aplanatic
-            lens has a Fresnel number below 20, because its rays then do not meet in a point.
+        ValueError: an argument is invalid, the relief is pixelated, or a parameter carries derivatives. With
+            "aplanatic" apodization, the pupil must have a focal length and no relief, wavefront or mask, its light must
+            travel along the axis, and its radius must be smaller than the sensor distance.
+        AccuracyError: no method meets the tolerance within the limits on memory and time. With "flat" apodization, the
+            sine of a ray's angle to the axis must not exceed 0.98 behind the pupil. With "aplanatic" apodization, the
+            Fresnel number must be at least 20, because otherwise the rays do not meet in a point.
         BackendError: see `optics.psf`.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")

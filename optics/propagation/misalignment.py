@@ -169,8 +169,10 @@ ALIGNED = Alignment()
 class DepthFactors:
     """Arrays that multiply fields and their spectra in a step between tilted planes.
 
-    leaving: for the field that leaves a plane, one pair for each depth between which fields are interpolated:
-        interpolation weights (y, x), and factors (fy, fx) that propagate the spectrum from this depth.
+    The field at a point of a tilted plane is interpolated between the fields at a few fixed depths along the axis.
+
+    leaving: for the field that leaves a plane, one pair of arrays for each fixed depth: interpolation weights (y, x),
+        and factors (fy, fx) that propagate the spectrum from this depth.
     arriving: the same for the field that arrives at the next plane, with factors that propagate to this depth.
     """
 
@@ -180,10 +182,12 @@ class DepthFactors:
 
 @dataclass(frozen=True)
 class Depths:
-    """Depths along the axis between which a step from plane to plane interpolates fields, because planes are tilted.
+    """A few depths along the axis, from and to which fields are propagated between tilted planes.
 
-    leaving: for the plane that the light leaves, depths [m], (node,), and one array of interpolation weights (y, x) per
-        depth, see `Alignment.weights`.
+    The field at a point of a tilted plane, whatever its depth, is interpolated between the fields at these depths.
+
+    leaving: for the plane that the light leaves, depths [m], (depth,), and one array of interpolation weights (y, x)
+        per depth, see `Alignment.weights`.
     arriving: the same for the plane at which the light arrives.
     turns: (1 - c)/λ [1/m], the number of waves per metre of depth ζ by which the phase of the carrier exp(ikcζ) of
         light (see `slowness`) falls behind that of exp(ikζ).
@@ -199,8 +203,10 @@ class Depths:
         """Return the interpolation weights, and the factors that propagate each frequency to or from each depth.
 
         At the depth ζ, the factor is exp(±2πi ζ [turns - (1 - cos θ)/λ]), where θ is the angle of the frequency's wave
-        to the axis: + for light that arrives, and - for light that leaves. The factor of light that leaves a plane
-        tilted by α also includes 1 - tan α sin θ, an approximation of the obliquity factor.
+        to the axis. The sign is + for light that arrives and - for light that leaves. `turns` is the number of waves
+        per metre by which the carrier, the part of the field that varies fast with the depth, falls behind a wave along
+        the axis. The factor of light that leaves a plane tilted by α also includes 1 - tan α sin θ, an approximation of
+        the obliquity factor.
 
         sines: sin θ of each frequency along an axis of the spectrum.
         wavelength: wavelength [m] in the medium.

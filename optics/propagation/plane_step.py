@@ -148,8 +148,9 @@ class StepSettings:
         """Return the highest frequency [1/m] of light that `propagate` carries to the next plane.
 
         `propagate` fades out frequencies at which light passes beside the plane, and the result is the frequency at
-        which this fade ends. It is infinite if both planes coincide. If they are close, it includes evanescent waves
-        that have not yet decayed.
+        which this fade ends. If the planes are so close that there is no such fade, evanescent waves reach the next
+        plane before they decay. The result is then the highest frequency of these waves. It is infinite if both planes
+        coincide.
 
         half_widths: sum of the half widths of the two planes [m].
         """

@@ -38,11 +38,13 @@ SPLINE_PART = 3.0
 
 @dataclass(frozen=True)
 class PupilSampling:
-    """Samples of a pupil, its soft aperture, and the frequencies [1/m] that they transmit (see PlaneField).
+    """Samples of a pupil, its soft aperture, and limits of the frequencies in the field behind it.
 
     soft: aperture with a softened edge. For a relief of pixels, the jumps between pixels are softened as well.
     source: the source that illuminates the pupil if no field arrives. Its position is relative to the pupil's centre.
-    path: path [m] of the source's light to the pupil's centre, minus its path to the axis.
+    band, rays, kept: frequencies [1/m] in the field behind the pupil, see `PlaneField`.
+    path: path [m] of the source's light to the centre of a decentred pupil, minus its path to the point where the
+        system's axis crosses the plane through this centre.
     """
 
     pupil: Pupil
@@ -61,17 +63,17 @@ class PupilSampling:
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
-        The band extends to the highest frequency that can reach the next plane. It is narrower if the settings remove
-        diffracted light (`StepSettings.margin`). Light behind the pupil also has higher frequencies, up to the sum of
-        those of the arriving light, of the pupil's phase and of the pupil's edge. These frequencies may be aliased, but
-        not into the band.
+        Its `band` is the highest frequency that must be sampled without aliases: the highest one that can reach the
+        next plane, or a lower one if the settings remove diffracted light (`StepSettings.margin`). Light behind the
+        pupil also has higher frequencies, up to the sum of those of the arriving light, of the pupil's phase and of the
+        pupil's edge. They may be aliased, but not to frequencies below `band`.
 
         field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. The phase of
             the source's wave at the pupil is then treated as part of the pupil's phase.
 
         Raises:
-            ValueError: the pupil has a relief of pixels, and its radius carries a derivative or the output lies in its
-                plane.
+            ValueError: the pupil has a relief of pixels, although the pupil's radius carries a derivative, or although
+                the next stop lies in the pupil's plane.
             AccuracyError: more samples are necessary than the limit allows.
         """
         pupil = stop.pupil

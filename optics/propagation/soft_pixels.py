@@ -105,8 +105,9 @@ class SoftPixels:
     def error(self, dtype: str) -> float:
         """Return the relative error of the intensity behind the softened pupil.
 
-        It has four causes: the kernel changes frequencies slightly, the convolution is a sum over nodes instead of an
-        integral, the aperture's edge cuts pixels, and numbers are rounded.
+        The pupil's transmittance is softened by convolution with a kernel. The error has four causes: the kernel
+        slightly changes the frequencies that it should pass unchanged, the convolution is a sum over nodes instead of
+        an integral, the aperture's edge cuts pixels, and numbers are rounded.
         """
         periods = max(1.0, 2 * self.edge.stopband * self.aperture.widest)
         cut = 2 * periods * self.aperture.cut_share * 10.0**-MOMENT_DIGITS
@@ -172,9 +173,10 @@ class _Filter:
         return cls(None, (from_nodes.astype(dtype), (response[:, None] * back).astype(dtype), onto.T.astype(dtype)))
 
     def forward(self, values: np.ndarray) -> np.ndarray:
-        """Return the filtered values at the samples, given values at the nodes of the filter's axis.
+        """Return the filtered values at the samples, given values at the nodes.
 
-        Both are arrays, (sample, position) and (node, position), with the positions along the other axis.
+        The filter acts along x or along y. Samples and nodes lie along this axis, and positions along the axis
+        perpendicular to it. The result is an array (sample, position), and `values` is an array (node, position).
         """
         if self.matrix is not None:
             return _product(self.matrix, values)
@@ -186,8 +188,8 @@ class _Filter:
     def adjoint(self, values: np.ndarray) -> np.ndarray:
         """Return the adjoint of the linear map `forward`, applied to values at the samples.
 
-        The values are an array (sample, position) and the result is (node, position), with the positions along the
-        other axis.
+        The filter acts along x or along y. Samples and nodes lie along this axis, and positions along the axis
+        perpendicular to it. `values` is an array (sample, position), and the result is an array (node, position).
         """
         if self.matrix is not None:
             return _product(self.matrix.T, values)

@@ -102,32 +102,35 @@ def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxia
     Light of higher frequencies is faded out. The width of the fade is chosen so that the Fourier transforms of the
     propagation can have the shortest period. The result is `EVERYTHING` if no light may be faded.
 
-    ripple: fraction of the amplitude of faded light that blur may still carry to displacements of at most `corner`.
+    ripple: the fade blurs the field, so some of the faded light lands closer than it would without the blur. This is
+        the fraction of its amplitude that may land at displacements of at most `corner`.
     """
     return _shortest(corner, wavelength, z, ripple, paraxial, square=False)
 
 
 def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
-    """Return the square band for light that moves up to `half` [m] along each axis over the distance z.
+    """Return the band of the light whose displacements along x and along y over the distance z are at most `half` [m].
 
-    It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. Light that
-    moves farther along x or y is faded out. Unless paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²)
-    instead of fx alone, so the fade along x is a function of this expression. It blurs the field over a larger distance
-    than a fade in fx: the distance is multiplied by the largest gradient of the expression. The result is `EVERYTHING`
-    if no light may be faded.
+    Light that moves farther along x or y is faded out. The round band of `kept_band` must include the displacement to
+    the corner of a square window in every direction. This square band includes it only along the diagonals, so it can
+    be smaller. Unless paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²) instead of fx alone, so the
+    fade along x is a function of this expression. The fade blurs the field over a larger distance than a fade in fx,
+    by a factor that is the largest gradient of the expression. The result is `EVERYTHING` if no light may be faded.
 
-    ripple: fraction of the amplitude of faded light that blur may still carry to displacements of at most `half`.
+    ripple: because of the blur, some of the faded light lands closer than it otherwise would. This is the fraction of
+        its amplitude that may land at displacements of at most `half`.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
 
 def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: float) -> Band:
-    """Return the band with the given limits [1/m], even if more or less light could reach the window.
+    """Return the band of light that is unchanged up to `kept` [1/m] and faded out up to `kept` + `fade`.
 
-    The result is `EVERYTHING` if light at the end of the fade, at the frequency kept + fade, is too near grazing
-    incidence.
+    These limits do not depend on which light can reach the next plane. The result is `EVERYTHING` if light at the
+    frequency kept + fade is too near grazing incidence.
 
-    ripple: fraction of the amplitude of faded light that remains farther away than the blur distance of the fade.
+    ripple: the fade blurs the field over a certain distance. This is the fraction of the amplitude of faded light that
+        the blur moves farther than this distance. A smaller fraction belongs to a larger distance.
     """
     if (kept + fade) * wavelength >= PERIOD_MAX_SINE:
         return EVERYTHING
@@ -160,7 +163,9 @@ def _walk(band: Band) -> float:
 
 
 def _gradient(sine: float) -> float:
-    """Return the largest gradient |∇F| of F(fx, fy) = fx / √(1 - λ²fy²), on which the fade of a square band depends.
+    """Return the largest gradient |∇F| of F(fx, fy) = fx / √(1 - λ²fy²).
+
+    The distance that light moves along x depends on F. The fade along x of a square band (`Band`) is a function of F.
 
     sine: largest value of λ|F| and of λ|fy|, where λ is the wavelength, and fx and fy are spatial frequencies.
     """

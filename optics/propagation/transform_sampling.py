@@ -123,10 +123,11 @@ class KeptLight:
 
 
 def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
-    """Return the band of the light that can reach the window, or the passage's limit if there is one.
+    """Return the band of frequencies of the light that can reach the window, and the reach, see `KeptLight`.
 
-    If light at the Nyquist frequency of the source lands in the window or near it, there is no higher frequency that
-    could be faded out. The band then contains all frequencies.
+    If `passage.limit` is not None, the band is this given band instead. If the band extends beyond the spectrum, which
+    ends at the Nyquist frequency of the source's samples, there is no light that could be faded out. The band is then
+    replaced by one that contains all frequencies.
     """
     wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
     # The source is extended by one sample, because the band-limited function extends beyond the outermost samples.
@@ -150,10 +151,11 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
     """Return the sampling with the shortest period of a transform for the propagation from a source to a window.
 
-    The band of its `passage` contains only light that can reach the window.
+    Its `passage` holds the same parameters of the propagation as the argument, but with the band from `kept_light`.
 
-    spare: length [m] by which the period is extended if no light can be faded. The spectrum is then truncated at the
-        Nyquist frequency, which blurs the field, and the longer period keeps the blur away from the window.
+    spare: length [m] by which the period is extended if light of all frequencies in the spectrum lands in the window or
+        near it, so that no light can be faded out. The spectrum is then truncated at the Nyquist frequency, which blurs
+        the field, and the longer period keeps the blur away from the window.
 
     Raises:
         AccuracyError: the period needs more samples than the limit.
@@ -181,11 +183,12 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 
 
 def most_spare(passage: Passage, source: Grid) -> float:
-    """Return the largest useful value of `spare` [m], the length by which `sampling` extends the period.
+    """Return the largest useful value of `spare` [m], the length by which `sampling` extends a transform's period.
 
-    A larger value would not reduce the blur that is due to the truncation of the spectrum. The result is an upper
-    bound. It assumes that the light with the largest displacement, at the spectrum's corner (√2 times the Nyquist
-    frequency), moves along an axis instead of along the diagonal.
+    A Fourier transform repeats the field every period. The truncation of the spectrum blurs the field, and a longer
+    period keeps the blur of the next repetition away from the window, but a value above the result would not help
+    further. The result is an upper bound. It assumes that the light with the largest displacement, at the spectrum's
+    corner (√2 times the Nyquist frequency), moves along an axis instead of along the diagonal.
     """
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
@@ -207,10 +210,10 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
 
 
 def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
-    """Return the power [units of Σ|u|²] of blur that comes back into the window from the next period.
+    """Return the power [units of Σ|u|²] of the blur that falls into the window from the next repetition of the field.
 
-    The blur is due to truncation of the spectrum at the Nyquist frequency. It is assumed that light of this frequency
-    comes evenly from the whole width of the source.
+    A Fourier transform repeats the field every period. The field is blurred, because its spectrum is truncated at the
+    Nyquist frequency. It is assumed that light of this frequency comes evenly from the whole width of the source.
 
     spectrum: spectrum of the field at the source. If the window's pitch is a whole multiple of the source's pitch, the
         axes are (fx, fy) in FFT order. Otherwise they are (fy, fx), with frequency 0 in the centre.
@@ -242,11 +245,12 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 
 @lru_cache(maxsize=8)
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
-    """Return the fraction of the power |U|² at the Nyquist frequency f_N along an axis that comes back into the window.
+    """Return the power of the blur that falls into the window, divided by the power |U|² at the Nyquist frequency f_N.
 
-    U = Σ u e^{-2πi...} is the sum over samples of the source, and the power that comes back is a sum of |b|² over
-    samples of the blur b. Equation (2) of the module gives the power ∫|b|² dx, divided by |S|² = dx² |U|². This is then
-    multiplied by dx², and divided by dx for the sum over samples along the axis. By Parseval's theorem, the factor
+    Truncation of the spectrum at f_N along an axis causes this blur b. A Fourier transform repeats the field every
+    period, and the blur comes from the next repetition. U = Σ u e^{-2πi...} is the sum over samples of the source, and
+    the power of the blur is a sum of |b|² over samples. Equation (2) of the module gives ∫|b|² dx / |S|², with |S|² =
+    dx² |U|². It is multiplied by dx², and divided by dx for the sum along the axis. By Parseval's theorem, the factor
     1/period gives the sum along the other axis. A factor of 2 stands for the two ends ±f_N of the spectrum. The last
     factor is the fraction of the light that does not miss the window along the other axis.
 

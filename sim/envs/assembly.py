@@ -208,8 +208,9 @@ def _require_eyes(eyes: Any) -> None:
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
     """Raise a ValueError if an argument of `make_vec_env` is given that a user task defines itself.
 
-    Also raise it if the `mode` of the task (in an encounter, of an animal's task) is neither the default mode nor the
-    mode that was passed to `make_vec_env`.
+    Also raise it if the task has a wrong `mode`: neither the default mode nor the mode that was passed to
+    `make_vec_env`. If the task is an encounter of several animals, each animal has its own task, and all of these are
+    checked.
 
     given: all arguments of `make_vec_env`
     """

@@ -76,11 +76,12 @@ class EyesOfKind:
     def _launch_in_time(
         self, receptors: ReceptorsInTime, poses: Poses, worlds: np.ndarray | None, fresh: bool
     ) -> PendingFrame:
-        """Launch the rendering of the frame at the end of an action, to which the receptors then respond.
+        """Launch the rendering of the frame at the end of an action. The result is the receptors' response to it.
 
-        The receptors first respond to the frames at earlier moments of the action, which are rendered here. There are
-        no earlier frames if these worlds begin an episode (`fresh`). If only some worlds are rendered, and they do not
-        begin an episode, the new frame replaces the frame that was last rendered in these worlds.
+        Before that, this method renders the frames at earlier moments of the action, and the receptors respond to each
+        of them in turn. There are no earlier frames if these worlds begin an episode (`fresh`). If only some worlds are
+        rendered, and they do not begin an episode, the new frame replaces the frame that was last rendered in these
+        worlds.
         """
         light = self._simulation.light(self._wavelengths)
         first, chosen = fresh or worlds is not None, self._everyone if worlds is None else worlds

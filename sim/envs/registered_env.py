@@ -25,10 +25,9 @@ ENDLESS = -1  # Gymnasium's value for episodes without truncation
 class RegisteredEnv(EyesEnv):
     """An `EyesEnv` whose episodes are truncated by Gymnasium's wrapper `TimeLimit`.
 
-    Further errors are those of `EyesEnv`.
-
     Raises:
         ValueError: an argument is invalid, or `episode_steps` was given, which Gymnasium calls `max_episode_steps`.
+            All other errors of `EyesEnv` can occur as well.
     """
 
     def __init__(self, task: str | Task | type[Task], *args: Any, **options: Any) -> None:
@@ -39,11 +38,11 @@ class RegisteredVectorEnv(EyesVectorEnv):
     """An `EyesVectorEnv` that truncates its episodes after `max_episode_steps` actions.
 
     Episodes are truncated earlier if the world has a smaller limit, the `episode_steps` of a `sim.Course` (a drawing of
-    walls and starting positions) or of a `sim.LayoutFamily` (random layouts). Further errors are those of
-    `EyesVectorEnv`.
+    walls and starting positions) or of a `sim.LayoutFamily` (random layouts).
 
     Raises:
         ValueError: an argument is invalid, or `episode_steps` was given, which Gymnasium calls `max_episode_steps`.
+            All other errors of `EyesVectorEnv` can occur as well.
     """
 
     def __init__(
@@ -59,8 +58,8 @@ def _begun(task: str | Task | type[Task]) -> str | Task:
 def _steps(asked: int, options: dict[str, Any]) -> int:
     """Return the number of actions after which an episode is truncated.
 
-    It is the requested number, but at most the `episode_steps` of the course or family of layouts in the options. If
-    `asked` is -1, no number is requested.
+    It is the requested number `asked`, or none if `asked` is -1. The options may contain a course (a drawing of walls)
+    or a family of random layouts. If this has a limit `episode_steps`, the result does not exceed it.
 
     Raises:
         ValueError: `options` contains `episode_steps`, the number is out of range, or the course is unknown.

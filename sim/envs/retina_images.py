@@ -49,7 +49,8 @@ def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
 def _palette(eye: Eye) -> np.ndarray:
     """Return the linear sRGB colour in which each signal of an eye is shown if the receptor sees white.
 
-    The colours are (channel, row, column, 3). Signals of less light are shown in darker shades of them.
+    If the receptor receives less light than from white, the colour is darker in proportion to the signal. The result is
+    an array (channel, row, column, 3).
     """
     height, width = eye.resolution
     if eye.mosaic is not None:

@@ -95,9 +95,9 @@ def _within(n: int, per_receptor: float) -> int:
 def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
     """Return how many rectangles to add to the visual field before the first receptor of a row or a column.
 
-    These rectangles form a rim, because receptive fields extend beyond the outermost receptors. The result is the
-    smallest number for which at most the fraction `beyond` of the light that the receptors in the line receive comes
-    from beyond the rim.
+    These rectangles form a rim, because receptive fields extend beyond the outermost receptors. Some of the light that
+    the receptors of the row or column receive comes from outside the rim. The result is the smallest number for which
+    this is at most the fraction `beyond` of their light.
 
     profile: fraction of the power of a receptor's field in each of its cells along the line, (cell,)
     line: number of receptors in the line, and rectangles per receptor

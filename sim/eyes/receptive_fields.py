@@ -181,9 +181,9 @@ def kernels_of(eye: optics.Eye, cells: int, depth: DepthLayers) -> np.ndarray:
 def cells_for(eye: optics.Eye) -> int:
     """Return the number of cells along the side of an eye's average receptor.
 
-    Cells are the equal parts of this receptor's area for which receptive fields are tabulated. The number is that of
-    `cells_per_receptor`. A narrow waveguide, or receptors much smaller than the average, require a larger number, which
-    is at most 64.
+    Cells are the equal parts of this receptor's area for which receptive fields are tabulated. The usual number is the
+    result of `cells_per_receptor`. Eyes with narrow waveguides, or with receptors much smaller than the average, need
+    more cells, but have at most 64.
     """
     fewest = cells_per_receptor(eye.resolution)
     if eye.lattice is not None:
@@ -271,8 +271,8 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
     """Return the mean of these receptors' fields, as the probability of each cell of the visual field, (y, x).
 
-    The mean is also taken over planes, which are the field in each band of each depth layer. Every plane has the same
-    share, whatever its power.
+    The field is given as several planes, one for each band of each depth layer, and the mean is also taken over these.
+    Every plane has the same weight in the mean, whatever its power.
 
     field: power in each cell of the field, which is the same for all receptors, (plane, y, x)
     resolution: rows and columns of receptors

@@ -79,7 +79,7 @@ class BoxSampling:
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the rectangles of some receptors (numbered row by row), each divided as in the sensor of `areas`."""
+        """Return the rectangles into which `areas` divides each receptor, for some receptors (numbered row by row)."""
         count = max(1, round(per_receptor))
         plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
         return Trial(plane, unused, self._means(len(receptors), count), extent)
@@ -119,7 +119,10 @@ class BoxSampling:
         return np.broadcast_to(weights, (self.eye.bands, *weights.shape))
 
     def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the directions (ray, 3) of some receptors' rays, and points (ray, 2) that determine reflections."""
+        """Return the directions of some receptors' rays, (ray, 3), and a point of the unit square per ray, (ray, 2).
+
+        The point determines the direction in which the ray is continued from the surface that it hits.
+        """
         height, width = self.eye.resolution
         shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
         corners = self._corners()[receptors]
@@ -166,7 +169,7 @@ class FieldSampling:
                 rays += max(1, rays // 4)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of some receptors (numbered row by row), as in the sensor with this number of rays.
+        """Return rays drawn for the eye, and their weights in the signals of some receptors (numbered row by row).
 
         Raises:
             NoRaysError: one of these receptors has no ray.
@@ -247,7 +250,7 @@ def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
-    """Return zeros (area, 2) in place of the points that determine how rays are reflected, which areas do not need."""
+    """Return zeros (area, 2) instead of points that determine reflections of rays. Rectangular samples use no rays."""
     return np.zeros((len(plane), 2), np.float32)
 
 
@@ -266,9 +269,7 @@ def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
 
 
 def eye_sampling(eye: WorldEye, depth: DepthLayers = ONE_PSF) -> WorldSampling:
-    """Return the sampling of an eye.
-
-    It is `OmmatidialSampling` for a compound eye, `BoxSampling` for a perfect lens, and otherwise `FieldSampling`.
+    """Return `OmmatidialSampling` for a compound eye, `BoxSampling` for a perfect lens, and otherwise `FieldSampling`.
 
     Raises:
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.

@@ -53,9 +53,11 @@ class VariedFields(ReceptiveFields):
         return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the power per cell of some receptors' fields at the points of rays, (plane, receptor, ray).
+        """Return the weight of light along each ray in some receptors' signals, as an array (plane, receptor, ray).
 
-        A plane is a band of a depth layer.
+        The weight is the PSF, averaged over the receptor's rectangle. It applies to light from one cell of the visual
+        field, a small part of an average receptor's area. A plane is a band of a depth layer, a distance for which the
+        eye has a PSF.
 
         draw: rays that `draw` has returned
         receptors: indices of the receptors, counted row by row
@@ -127,9 +129,10 @@ def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 def _mixture(field: np.ndarray, lattice: ReceptorLattice, cells: int, receptors: np.ndarray) -> np.ndarray:
     """Return the mean of these receptors' fields, as the probability of each cell of the visual field, (y, x).
 
-    The mean is also taken over planes, which are the PSF in each band of each depth layer. It is computed at the
-    middles of cells, from which a ray may be up to half a cell away. The mean is therefore averaged over neighbouring
-    cells. Otherwise a ray just beyond the rim of the fields, where the mean is almost 0, could get a huge weight.
+    The mean is also taken over the PSFs of all bands and depth layers, the distances for which the eye has a PSF. It is
+    computed at the middles of cells, from which a ray may be up to half a cell away. The mean is therefore averaged
+    over neighbouring cells. Otherwise a ray just beyond the rim of the fields, where the mean is almost 0, could get a
+    huge weight.
 
     field: power of the PSF, rotated by 180°, in each cell, (plane, y, x)
     lattice: rectangle of each receptor

@@ -253,8 +253,9 @@ def _is_sun(lamp: Emitter) -> bool:
 def _is_textured_glow(light: MitsubaObject) -> bool:
     """Return whether a light is a surface that glows with a texture.
 
-    The tables from which Mitsuba samples such a light are not available to a recording of the kernel. A sky is not a
-    surface, and its tables are available.
+    Dr.Jit records a kernel so that it can run again for later images. A kernel that samples such a light cannot be
+    recorded, because Mitsuba does not expose the tables from which it samples the texture. A sky is not a surface, and
+    its tables are available.
     """
     kinds = int(mi.EmitterFlags.Surface) | int(mi.EmitterFlags.SpatiallyVarying)
     return int(light.flags()) & kinds == kinds

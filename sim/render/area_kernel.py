@@ -149,9 +149,10 @@ class AreaKernel(RayKernel):
         return dr.gather(mi.UInt32, faces, first + sides.x), dr.gather(mi.UInt32, faces, first + sides.y)
 
     def _faces(self, frame: Frame, inputs: AreaInputs, borders: BorderInputs) -> Array:
-        """Return the index of the wall's face that a horizontal ray towards each border between columns of areas hits.
+        """Return the index of the wall's face that is visible at each border between columns of areas.
 
-        Areas are the rectangles of an eye's visual field. The result is a flat array (world, eye, border).
+        Areas are the rectangles of an eye's visual field. A face is visible at a border if a horizontal ray from the
+        eye towards this border hits it first. The result is a flat array (world, eye, border).
         """
         lane = Lane.from_index(borders.lanes, borders.counts)
         ray = self.eyes.ray(frame.eyes, borders.along, lane, borders.counts.samples.number).ray

@@ -102,10 +102,11 @@ class EdgeRays:
         return found[:, 1:-1, 1:-1].ravel()
 
     def _render_all(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
-        """Return the first sums of light over four rays per receptor, and the spread of the four signals.
+        """Return the sums of light over the first four rays of each receptor, and the spread of their four signals.
 
-        There is one array of sums for each component of light. The spread is the difference between the largest and the
-        smallest signal of the four rays, in the type of receptor for which it is largest.
+        These rays test whether a receptor sees an edge. There is one array of sums for each component of the light's
+        spectrum. The spread is the difference between the largest and the smallest signal of the four rays, in the type
+        of receptor for which it is largest.
         """
         components = self._kernel.layers(scenes, frame, inputs)
         signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]

@@ -96,8 +96,9 @@ class EyeRays(Protocol):
 
         The kernel calls this method, so all arguments and the result are Dr.Jit variables on the device.
 
-        rows: buffer of the eyes, see `array`
+        rows: buffer with the poses of all eyes or of their bodies, in rows of four floats; `array` returns it
         along: directions of the samples
+        lane: the world, the eye and the sample of this ray
         samples: number of samples of an eye
         """
 

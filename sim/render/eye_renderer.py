@@ -256,7 +256,7 @@ class EyeRenderer:
         return recorded + (0 if labels is None else labels.recordings)
 
     def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
-        """Start the kernels that sum the light over each receptor's rays; if `frozen` is given, start only it."""
+        """Start the kernels that sum light over receptors' rays, or, if given, the kernel `frozen` in their place."""
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 

@@ -30,9 +30,10 @@ class Level:
 
     stage, level: names of the stage and of its chosen level, for example "light" and "bounce"
     why: reason for this choice
-    predicted_error: error of a signal that this level causes (root mean square); None if it is unknown. If the bands
-        are as given for the eyes, it is an upper bound, which may exceed the tolerance: the largest error over measured
-        reflectances, white and black surfaces in the medium, and types of receptors
+    predicted_error: error of a signal that this level causes (root mean square); None if it is unknown. In the stage
+        "bands", if the number of bands is the eyes' own and was not chosen, the error is an upper bound, which may
+        exceed the tolerance. This bound is the largest error over all types of receptors and over several surfaces:
+        measured reflectances and, in a medium, white and black
     """
 
     stage: str
@@ -46,9 +47,10 @@ class Fidelity:
     """Accuracy with which a world is rendered for given eyes. `print` shows it as a table.
 
     rays_per_receptor: average number of samples (rays or areas) per receptor, above 0 and at most 10⁷. With
-        samples="edges", it is the number for receptors that see an edge. If the eye has a pupil, it may be below 1,
-        since receptors share rays and may share areas.
-    bands: number of spectral bands, 1 to 4096, used instead of the eye's own; an eye allows at most 64
+        samples="edges", it is the number for receptors that see an edge. If the eye has a pupil, rays_per_receptor may
+        be below 1, since receptors share rays and may share areas.
+    bands: number of spectral bands, 1 to 4096, used instead of the eye's own. An eye in a world has at most 64 bands,
+        so a larger number cannot be rendered.
     depth: distances for which the eye has a PSF
     light: "direct": light of lamps after one reflection; "bounce": also after two reflections; "all": after any number
         of reflections, with samples="areas" only

@@ -29,10 +29,10 @@ class Samples:
     """The samples with which a view is rendered: their kind and number, with the predicted error.
 
     kind: "rays", "areas" or "edges" (adaptive edge sampling: more rays for receptors that see an edge)
-    light: the choice of the reflections that are followed, with the error due to the others
+    light: record of how many reflections of light are followed, with the error due to further reflections
     number: number of samples per receptor
-    level: the choice of the samples, with their error
-    enough: True if the error is at most the allowed one
+    level: record of the chosen kind and number, as text for reports, with their error and the reason for them
+    enough: True if the error due to the samples is at most the allowed one
     """
 
     kind: str
@@ -103,7 +103,10 @@ class Stages(Protocol):
     shares: Shares | None
 
     def bands(self) -> Level:
-        """Return a record of the eye's spectral bands, which are not changed, with their error if it is known."""
+        """Return a record of the number of spectral bands, with the error that it causes, if this is known.
+
+        There is no choice in this stage: the number is that of the eye.
+        """
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
         """Return the depth layers, and a record of their choice with the reason (None if there was no choice).
@@ -112,7 +115,7 @@ class Stages(Protocol):
         """
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
-        """Return a record of the choice of light: the reflections that are followed."""
+        """Return a record of how many reflections of light are followed, with the reason and the predicted error."""
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """Return the kind and number of samples."""

@@ -78,10 +78,10 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
     """Return the smallest number of depth layers that is accurate enough, and a record of this choice.
 
     Depth layers are distances for which the eye has a PSF. A perfect lens needs only a single PSF, for light from
-    infinity. Other eyes also have this PSF if an upper bound of its error is allowed. Otherwise, the errors of several
-    numbers of layers are computed in random views, and the smallest number whose error is allowed is chosen. If none is
-    accurate enough, the result is the largest number. If the PSFs of the layers cannot be computed, the result is one
-    PSF for the mean depth.
+    infinity. Other eyes, too, get only this PSF if it is accurate enough, that is, if an upper bound of the error that
+    it causes is at most `allowed`. Otherwise, the errors of several numbers of layers are computed in random views, and
+    the smallest number whose error is allowed is chosen. If none is accurate enough, the result is the largest number.
+    If the PSFs of the layers cannot be computed, the result is one PSF for the mean depth.
 
     The upper bound is derived as follows. Consider light that passes the pupil at the position p. On the retina, light
     from a point at the distance z is displaced by (Δx, Δy) = f p/z relative to light from infinity, with the focal
@@ -110,11 +110,12 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
 
 
 def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
-    """Return the choice of light: "direct" if a second reflection adds little, otherwise "bounce" (two reflections).
+    """Return a record of how many reflections of light are followed, with the error due to further reflections.
 
-    In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
-    further reflection to the previous one is assumed to be the ratio of the second reflection to direct light, but at
-    most 1/2. If the tracer cannot follow a second reflection, the result is direct light with an unknown error.
+    The choice is "direct" (one reflection) if light that is reflected twice adds at most `allowed`, otherwise "bounce"
+    (two). After "bounce", the further reflections are assumed to be a geometric series: each is weaker than the one
+    before by the same factor. This factor is the second reflection divided by direct light, but at most 1/2. If the
+    tracer cannot follow a second reflection, the result is direct light with an unknown error.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

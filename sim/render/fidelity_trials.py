@@ -129,11 +129,11 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether shared areas, under one per receptor, are so small that neighbours still differ in signal."""
+        """Return whether areas that several receptors share are small enough for neighbours to differ in signal."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:
-        """Return the number of areas that are rendered per receptor, also around the field if the eye has a pupil."""
+        """Return the number of rendered areas, including those around the receptors, divided by that of receptors."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
@@ -199,8 +199,9 @@ class FidelityTrials:
     ) -> np.ndarray:
         """Return signals (view, channel, receptor) in as many of the views as the number of rays allows.
 
-        trial, depth, light: samples and weights, depth layers that share the light, and reflections that are followed
-        views: views of the signals; None: the views of the trials
+        trial: samples (rays or areas), with their weights in the signals
+        depth, light: layers among which light is divided by its distance, and reflections that are followed
+        views: places and directions of the eyes; None: those of random views
         most: largest number of rays in all views together, unless fewer than 12 views would remain
         """
         rays = len(trial.directions)
@@ -282,8 +283,7 @@ def _in_fours(trial: Trial) -> np.ndarray:
 def _summed(weights: np.ndarray, layers: np.ndarray) -> np.ndarray:
     """Return sums over layer, component and ray, (view, channel, receptor); `np.einsum` takes up to twice as long.
 
-    weights: (channel, layer, component, receptor, ray)
-    layers: (layer, component, view, ray)
+    weights: (channel, layer, component, receptor, ray); layers: (layer, component, view, ray)
     """
     (channels, receptors), views = (weights.shape[0], weights.shape[3]), layers.shape[2]
     of_receptors = np.moveaxis(weights, 3, 1).reshape(channels * receptors, -1)

@@ -35,9 +35,10 @@ class Population:
     counted: np.ndarray
 
     def rms(self, error: np.ndarray) -> float:
-        """Return the root mean square of the errors of signals over the receptors that count in each view.
+        """Return the root mean square of errors of signals, over the receptors that are marked in each view.
 
-        It is 0 if no receptor counts in any view.
+        The field `counted` marks them: near objects, for example, only the receptors that see an object. The result is
+        0 if no receptor is marked in any view.
 
         error: error of each signal, array (view, channel, receptor)
         """

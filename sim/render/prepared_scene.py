@@ -49,7 +49,8 @@ class PreparedScene:
     groups: visible geom groups
     varied: names of geoms whose size, colour or material may differ between worlds, see `sim.ModelRenderer`
     tracer: "mitsuba", "closed_form" or "auto", see `sim.BatchedRenderer`
-    stand: the body that carries the eyes, if all eyes stand upright on one body; None: derived from the mounts
+    stand: the body that carries all eyes and moves only in a horizontal plane, with their places on it. None: it is
+        derived from the mounts, if there is such a body
     medium: water or air that fills the world; under water, an `optics.Eye` is immersed, but the refractive index in
         front of the facets of a compound eye does not change. None: clear air
 
@@ -144,7 +145,10 @@ class PreparedScene:
         return self.tracers.areas(light)
 
     def area_sensor(self, sampling: EyeSampling, per_receptor: float) -> Sensor:
-        """Return a sensor whose samples are areas (rectangles of the visual field), this number per receptor."""
+        """Return a sensor whose samples are areas, rectangles of the visual field in which light is averaged.
+
+        per_receptor: number of areas per receptor; below 1 if receptors share areas
+        """
         return sampling.areas(per_receptor, in_rows=self._in_rows)
 
     def area_trial(self, sampling: EyeSampling, per_receptor: float, receptors: np.ndarray) -> Trial:
@@ -169,9 +173,10 @@ class PreparedScene:
 
     @property
     def _in_rows(self) -> bool:
-        """True if the field of a receptor is divided into rows of areas as well as columns.
+        """True if a receptor's field is divided into rows and columns of areas, false if into columns only.
 
-        The mean light of walls and floor has a closed form in columns of any height, but outlines of spheres need rows.
+        Areas are rectangles in which light is averaged. In columns of any height, the mean light of walls and floor has
+        a closed form. The outlines of spheres need rows as well.
         """
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0

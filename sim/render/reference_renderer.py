@@ -118,8 +118,8 @@ class ReferenceRenderer:
     def radiance(self, state: WorldState) -> np.ndarray:
         """Return the spectral radiance in each cell of the image of each eye, (env, eye, cell, band).
 
-        Axes and units are those of the batched renderer's radiance, where a ray takes the place of a cell. The cells
-        of an image are listed row by row.
+        The unit is that of the batched renderer's `radiance`, and so are the axes, except that the third one lists
+        cells instead of rays. The cells of an image are listed row by row.
         """
         pictures = self.pictures(state)
         return np.moveaxis(pictures.reshape(*pictures.shape[:3], -1), 2, 3)

@@ -120,8 +120,8 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
     A seam is the border between two faces of the texture's cube, extended to a plane through the cube's centre.
 
     pieces: values at the corners of each triangle, (triangle, corner, value), interpolated where a triangle is cut
-    side: values at the corners of a linear function that is positive on one side of the seam, negative on the other
-        and 0 on the seam, (triangle, corner)
+    side: for each corner, the value of a linear function of position that is positive on one side of the seam, negative
+        on the other and 0 on the seam, (triangle, corner)
     """
     side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
     crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)
@@ -162,10 +162,11 @@ def _halved(pieces: np.ndarray) -> np.ndarray:
 
 
 def _bend(pieces: np.ndarray) -> np.ndarray:
-    """Return the approximate error of texture coordinates that are interpolated linearly in a triangle, (triangle,).
+    """Return the approximate error if a cube's texture coordinates are interpolated linearly in triangles, (triangle,).
 
-    The exact coordinates are not linear, because the position on a face of the cube is a ratio. The unit is the width
-    of a face.
+    The coordinates are the position on a face of the cube that surrounds the object. The position is found by dividing
+    a direction by its component towards the face, so it is not a linear function of the point on the triangle. The unit
+    is the width of a face.
     """
     face = _face_of(pieces)
     major = np.take_along_axis(pieces[..., 3:6], _MAJOR[face][:, None, None], 2)[..., 0] * _MAJOR_SIGN[face][:, None]

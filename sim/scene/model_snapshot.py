@@ -60,8 +60,9 @@ class ModelSnapshot:
     def _that_count(self) -> dict[str, list[int]]:
         """Return the ids of the materials, lights and height fields whose values must be those of the model.
 
-        The ids are ordered by the field of `Poses` that contains these values in the rendered worlds. Elements that do
-        not affect images are omitted, for example materials that no geom has.
+        The result is a dictionary. A key is the name of a field of `Poses`, for example "mat_rgba", which holds one
+        kind of value in the rendered worlds. The entry lists the ids of the elements whose values must not change.
+        Elements that do not affect images are omitted, for example materials that no geom has.
         """
         model, either = self._model, [*self._geoms, *self._hidden]
         more = {material for materials in self._drawn.values() for material in materials}

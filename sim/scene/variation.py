@@ -135,11 +135,12 @@ class Variation:
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Return the lights' factors at all combinations of the ends of the ranges that concern light.
+        """Return the factors by which the lights are multiplied, at all combinations of range limits.
 
-        All factors are 1 if light does not vary. The largest of them is the largest factor that the ranges permit in
-        any band. In one given band, however, values inside the ranges may give a larger factor than their ends, by up
-        to a third if the range extends from warm to cold light. The array has the shape (combination, band).
+        Only the ranges "light" and "color_temperature" are used, each at its low and its high limit. All factors are 1
+        if light does not vary. The largest of the factors is the largest that the ranges permit in any band. In one
+        given band, however, values inside the ranges may give a larger factor than their limits, by up to a third if
+        the range extends from warm to cold light. The array has the shape (combination, band).
 
         wavelengths: centres of the bands [m], (band,)
         """

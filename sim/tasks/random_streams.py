@@ -52,8 +52,9 @@ class StreamsByPurpose:
 
     seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
     n: number of worlds
-    kinds: a sequence of one number, the number of kinds of eyes of the only agent
-    motion: attribute, random numbers for objects that move at random
+    kinds: number of kinds of eyes, in a sequence with one number, since there is only one agent
+
+    Attribute `motion`: random numbers for objects that move at random.
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
@@ -171,8 +172,8 @@ def _roots(seed: Any, n: int) -> tuple[Any, list[tuple[Any, int]]]:
     A world's random streams are seeded with its entropy and its index (the first number of a SeedSequence's spawn key).
 
     seed: one seed, or a tuple with a seed for each world. With one seed, all worlds have the same entropy, and their
-        indices differ. With a tuple, each world has its own seed as entropy and the index 0, so its streams are those
-        of the first world of a batch with one seed, if this seed is the world's.
+        indices differ. With a tuple, each world has its own seed as entropy and the index 0. A world with the seed s in
+        a tuple therefore has the streams of the first world of a batch with the single seed s.
     n: number of worlds
     """
     if isinstance(seed, tuple):

@@ -37,7 +37,8 @@ class TaskSettings:
         dictionaries, such as {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of
         "eyes".
     fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
-        from a few scenes of the task's episodes. Several kinds of eyes have one fidelity or a dictionary.
+        from a few scenes of the task's episodes. If an animal has several kinds of eyes, give one fidelity for all of
+        them, or a dictionary with a fidelity for each kind.
     substeps: physics steps per action, 1 to 10⁹
     episode_steps: number of actions after which an episode is truncated, 1 to 10⁹
     spectra: spectra of materials and lights, by name, which replace their colours
@@ -58,11 +59,11 @@ class TaskSettings:
         Otherwise all worlds share one model.
     auxiliary: any of "depth", "ids" and "flow", which an observation then contains for each receptor in addition to its
         signal. They describe the surface seen at the centre of the receptor: its depth along the eye's axis [m], the id
-        of its geom, and its motion on the retina since the last observation [receptors]; see docs/tasks.md. Evolving
-        eyes have no auxiliary entries.
+        of its geom, and its motion on the retina since the last observation [receptors]; see docs/tasks.md. Runs of
+        `evolve`, in which eyes evolve, have no auxiliary entries.
     camera: name of the camera for images of the task; None: a camera that shows the whole model
     actuators: names of the actuators that an action drives; None: all actuators
-    name: name of the animal, if there are several; None: the name of the class
+    name: name of the animal, if a world contains several animals; None: the name of the class
     failure_reward: reward of a step after which a world cannot continue, for example because a method of the task
         fails; it is listed as the reward's term "failure". If rewards are negative costs, the default of 0 is better
         than any normal episode. In this case, set a value below the return of an episode.

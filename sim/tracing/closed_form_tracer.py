@@ -174,7 +174,7 @@ class ClosedForm:
     def _hit(self, ray: Array, centres: list[Array], tables: ClosedFormTables) -> _Hit:
         """Return the hit of each ray with the nearest surface: a wall, the floor or a sphere.
 
-        centres: centres of the spheres that rays can hit; bodies without a centre here, at the list's end, are ignored
+        centres: centres of the scene's spheres; if there are fewer centres than spheres, rays ignore the last spheres
         """
         t, face, normal = self.footprints.hit(ray, tables.cells)
         on_floor, t_floor = self._floor_hit(ray)

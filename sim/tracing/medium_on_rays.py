@@ -62,10 +62,11 @@ class MediumOnRays:
     def reflected_contrasts(
         self, reflectance: Sequence[Array], light: Sequence[Array], distances: Sequence[Array]
     ) -> tuple[list[Array], list[Array]]:
-        """Return the contrasts of a surface with the veiling light, and factors of 1 in place of its reflectances.
+        """Return a surface's contrast with the veiling light per component, and the factor 1 for each component.
 
-        A caller without a medium multiplies the light by the reflectances. With a medium, it multiplies the contrasts
-        by the factors of 1, one per component, because the contrasts already include the reflectances.
+        The contrast is the surface's radiance (reflectance times light) minus the veiling light, times the transmission
+        of the medium. Without a medium, a caller multiplies the light on the surface by the reflectances. With a
+        medium, it uses the contrasts in place of the light, and the factors 1 in place of the reflectances.
 
         light: light on the surface, per component
         distances: distances from the eye [m], over which the transmission is averaged

@@ -60,7 +60,7 @@ class MeshAtlas:
         """Return the distance [m] from the point o to a mesh in the direction d; infinite for a miss.
 
         o, d: origin [m] and direction (a unit vector) of the ray, in the mesh's frame
-        cell: centre of the cell in which the mesh lies in the scene, see `cells`
+        cell: centre of the mesh's cell, a cube that contains only this mesh in the scene of all meshes, see `cells`
         reach: largest distance of the mesh's surface from its origin [m]
         """
         ray, start = _within(o, d, cell, reach)
@@ -83,8 +83,8 @@ class MeshAtlas:
 def _within(o: Array, d: Array, cell: Array, reach: Array) -> tuple[Array, Array]:
     """Return the part of a ray that lies inside the ball around one mesh, and the distance to the start of this part.
 
-    The ball has the radius 1.1 in the atlas's scene, in which the mesh has the radius 1. The distance is in radii of
-    the mesh. The returned ray is in the coordinates of the scene.
+    The returned ray is in the coordinates of the scene of all meshes (`MeshAtlas`). In this scene, the mesh is scaled
+    to the radius 1, and the ball has the radius 1.1. The distance is in radii of the mesh.
 
     o, d, cell, reach: see `MeshAtlas.hit`
     """

@@ -109,8 +109,8 @@ class ModelScene:
     def warn_of_missing(self, light: str = DIRECT) -> None:
         """Warn (`sim.MirrorWarning`) of features of the model that are not rendered, such as gloss and mirrors.
 
-        Also warn of measured lights for which the eye has too few bands, and of geoms of different groups in the same
-        place.
+        Also warn of geoms of different groups in the same place, and of lights with a measured spectrum that the eye's
+        bands represent inaccurately, because there are too few bands.
 
         light: number of reflections after which light is rendered: "direct": 1, "bounce": 1 or 2, "all": any number.
             With "direct", the light of the sky and of glowing materials on surfaces is also missing

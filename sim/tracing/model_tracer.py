@@ -2,7 +2,7 @@
 
 Direct light comes from lamps only. With bounced light (`sim.tracing.lighting`), a bounce ray leaves every visible
 surface. It collects light that a second surface reflects or emits, or light of the sky. If there is a sky or a glowing
-geom, another ray leaves the second surface and collects their light. All light is after at most two reflections.
+geom, another ray leaves the second surface and collects their light. Light is thus reflected at most twice.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ class Scenes:
 
 @dataclass(frozen=True)
 class Tables:
-    """Arrays that are the same in all worlds. A "mover" is a moving geom with one of the materials that it may have.
+    """Arrays that are the same in all worlds. A moving geom is one "mover" for each material that it may have.
 
     bsdfs, painted: each mover's BSDF, and its geom's index among geoms whose colour differs between worlds (`Paint`)
     ends: index of the first mover of each kind of geom, such as spheres, followed by the number of movers
-    sky, glows: Mitsuba's emitter for the sky, and BSDFs that contain the light of glowing geoms; None if there are none
+    sky, glows: emitter for the sky (None: no sky); BSDFs whose reflectance is a glowing geom's radiance (None: no glow)
     glowing: for each mover, its index in `glows`, or len(glows) if it does not glow; None if no geom glows
     """
 
@@ -65,7 +65,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """All that a ray can meet in its world: the static scene, moving geoms, lights and colours, with fixed tables."""
+    """All that a ray can meet in its world. Static geoms (`still`) and `tables` are the same in all worlds."""
 
     still: MitsubaObject
     movers: MoverRows
@@ -75,7 +75,7 @@ class Surroundings:
 
 
 class RowBuffers:
-    """Buffers that kernels read, for places of moving geoms and lights and for colours in `n_envs` worlds."""
+    """Buffers that kernels read: places of moving geoms, places of lights, and colours of geoms in `n_envs` worlds."""
 
     def __init__(self, scene: ModelScene, n_envs: int) -> None:
         self._scene = scene
@@ -84,7 +84,7 @@ class RowBuffers:
         self._movers, self._lights, self._paint = (shared.values.reshape(n_envs, -1) for shared in self._shared)
 
     def fill(self, poses: Poses) -> None:
-        """Write the places and colours in all worlds into the buffers, for these poses of geoms and lights."""
+        """Write the places of moving geoms, places of lights, and colours of geoms in all worlds into the buffers."""
         scene = self._scene
         self._movers[:] = scene.movers.rows(poses)
         if len(scene.paint):
@@ -100,7 +100,7 @@ class RowBuffers:
 
 @dataclass(frozen=True)
 class _SurfaceHit:
-    """First hits of rays. A "mover" is a moving geom with one of the materials that it may have.
+    """First hits of rays. A moving geom is one "mover" for each material that it may have.
 
     si, bsdf: Mitsuba's interaction between ray and surface, which is the argument of the BSDF, and the BSDF
     colors, glow: factors that multiply reflectance and emission, one spectrum for every 4 bands
@@ -155,7 +155,7 @@ class ModelTracer:
         return whole_numbers([*of_movers, len(number)]), mi.BSDFPtr(list(scene.glows.values()))
 
     def buffers(self, n_envs: int) -> RowBuffers:
-        """Return buffers for places of moving geoms and lights and for colours in `n_envs` worlds."""
+        """Return buffers for places of moving geoms, places of lights, and colours of geoms in `n_envs` worlds."""
         return RowBuffers(self._scene, n_envs)
 
     def around(self, scenes: Scenes, rows: Rows, tables: Tables, world: Array) -> Surroundings:

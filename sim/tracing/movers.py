@@ -49,10 +49,10 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """Frame and size of one moving geom.
+    """Frame and size of one moving geom. For a mesh, `size` is the middle of its cube in the `MeshAtlas` instead.
 
     axes, origin: the frame's three axes (Vector3f each) and its origin (Vector3f), in the world's frame
-    size, reach: half sizes (mesh: its place in the scene of all meshes); largest distance from origin to surface [m]
+    size, reach: half of the size along each axis, and largest distance from the origin to the geom's surface [m]
     """
 
     axes: tuple[Array, Array, Array]
@@ -71,7 +71,7 @@ class _Frame:
 
 @dataclass(frozen=True)
 class MoverRows(WorldRows):
-    """Places and sizes of moving geoms in one world (`Movers.rows`); ends: index of the first geom of each kind."""
+    """Places and sizes of moving geoms in one world. Geoms of kind i have the indices ends[i] to ends[i + 1] - 1."""
 
     ends: Array
 
@@ -119,7 +119,7 @@ class Movers:
 
     @property
     def apart(self) -> bool:
-        """True if a separate kernel, outside all branches, intersects moving geoms: on a GPU, if any is a mesh."""
+        """True if a separate kernel intersects rays with moving geoms. It does so on a GPU if any of them is a mesh."""
         return self.atlas.scene is not None and on_gpu()
 
     @property
@@ -148,7 +148,7 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return which movers have another material than their geom in a world, (world or 1, mover); None: fixed."""
+        """Return True if a mover's geom has another material in a world, (world or 1, mover); None if all are fixed."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -285,7 +285,7 @@ def _frame(there: MoverRows, k: Array) -> _Frame:
 
 
 def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
-    """Return whether a ray hits the sphere, around one or all moving geoms, whose centre and radius a row contains."""
+    """Return whether a ray hits a sphere around one or all moving geoms. This row contains its centre and radius."""
     x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)

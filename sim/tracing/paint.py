@@ -26,9 +26,11 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class PaintRows(WorldRows):
-    """Reflectances in one world of the geoms whose colour differs between worlds, in rows of four floats.
+    """Reflectances, in one world, of "painted" geoms. These are the geoms whose colour differs between worlds.
 
-    painted: index of each moving geom among these geoms, see `Paint`
+    The reflectances are stored in rows of four floats.
+
+    painted: index of each moving geom among the painted geoms, see `Paint`
     """
 
     painted: Array

@@ -75,7 +75,9 @@ class Tracer(Protocol):
 
 
 class Tracers:
-    """The tracers of a scene by level of light (`lighting.LEVELS`), for rays and for areas.
+    """The tracers of a scene. They compute light along rays, or averages over areas, rectangles of the visual field.
+
+    There is one of each for every level of light, which limits the number of reflections (`lighting.LEVELS`).
 
     scene, places: the scene, and the positions of the eyes in it
     name: "closed_form" (formulas for upright walls, a floor and spheres), "mitsuba" (any scene), or "auto": the closed

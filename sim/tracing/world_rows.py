@@ -13,7 +13,9 @@ from sim.scene.device_arrays import three
 
 @dataclass(frozen=True)
 class WorldRows:
-    """Values of one ray's world, such as positions and colours, in rows of four floats that kernels read.
+    """Values that differ between worlds, such as positions and colours of geoms, in rows of four floats.
+
+    A kernel traces rays of many worlds at once. Each ray belongs to one world and reads the rows of this world.
 
     fours: the rows of all worlds, one after another, in a flat array of floats
     first: index of the first row of the ray's world

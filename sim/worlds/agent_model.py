@@ -32,8 +32,8 @@ class AgentModel:
     def from_spec(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentModel:
         """Extract the body "agent" of a spec that has been compiled into `whole`.
 
-        Equal models share one result, so do not change it. They share it because the walls are removed from a copy of
-        the spec, which takes half a second for hundreds of walls.
+        The result is kept, and calls with an equal `whole` return the same model, so do not change it. It is kept
+        because extraction is slow: removing hundreds of walls from a copy of the spec takes half a second.
         """
         whole_hash = model_hash(whole)
         return cls(_KEPT.get(whole_hash, lambda: _alone(spec.copy())), whole_hash)

@@ -1,8 +1,8 @@
 """A renderer by area sampling for worlds of upright walls, a floor and spheres: in closed form, without noise.
 
-Each area is divided among floor, walls, sky and spheres. The part of a surface that is visible in an area is a patch.
-The surface's texture is averaged over the patch, and each light is multiplied by the fraction of the patch that it
-reaches. Colours and components are those of `sim.tracing.closed_form_tracer`, which traces rays.
+The parts of floor, walls, sky and spheres that are visible in an area are its patches. A surface's texture is averaged
+over its patch, and each light is multiplied by the fraction of the patch that it reaches. Colours and the components of
+spectra (bands, or a few spectra that add up to all light) are those of the ray tracer `sim.tracing.closed_form_tracer`.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class AreaTracer:
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
-        """Return the rows with the numbers `place` of a table of the light on bodies whose centres are `bodies`."""
+        """Return the table rows with the indices `place`: light at places on the bodies with the centres `bodies`."""
         assert self._reflected
         assert inputs.reflected
         reflected = partial(self._reflected.on_body, tables=inputs.reflected)
@@ -287,8 +287,8 @@ def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
     """Return eight numbers per face, in a flat array, from which the kernel finds the texture at a point (x, y, z).
 
-    Four are the factors of x, y, z and 1 whose sum is the texel's column. The texture's first texel, its number of
-    columns and two zeros follow.
+    The first four, multiplied by x, y, z and 1 and added, give the column of the texture at this point. The index of
+    the texture's first texel, its number of columns and two zeros follow.
     """
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows

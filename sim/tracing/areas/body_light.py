@@ -46,9 +46,10 @@ class BodyLight:
         return cls(illumination, lit, around, [a - b for a, b in zip(left, free, strict=True)])
 
     def on(self, normal: Array) -> list[Array]:
-        """Return the irradiance where the body's surface has this normal, one array per component of the spectrum.
+        """Return the irradiance where the body's surface has this normal, one array per component of the light.
 
-        The components are a few spectra, or the bands, of which all light in the world is a sum.
+        All light in the world is a sum of the components. The components are either a few spectra that are sufficient
+        for this, or the spectral bands of the eye.
         """
         light = self.illumination.arriving(normal, self.visibility)
         if not self.around:

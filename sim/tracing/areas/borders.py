@@ -35,7 +35,10 @@ class Borders:
 
     @property
     def shared(self) -> bool:
-        """True if there are fewer borders than areas, so that finding the walls once per border saves work."""
+        """True if there are fewer borders than areas (rectangles of the visual field), because areas share borders.
+
+        In this case, it saves work to find the wall at each border once, for all areas that share the border.
+        """
         return len(self.x) < len(self.sides)
 
     @property

@@ -5,8 +5,9 @@ its right border. If these are different faces, a corner or an edge lies between
 visible is computed from the ends of the faces.
 
 A column is a vertical line in the area. Its position a runs from -1/2 at the left border to 1/2 at the right border.
-In column a, the eye at the height z sees a point of a face at the horizontal position pupil + t level, where the vector
-level = `Area.level(a)` is the horizontal part of the ray's direction. The foot of the face is visible at the slope
+A ray of column a leaves the pupil with the horizontal direction `Area.level(a)` and hits a face at the distance t. This
+distance is measured along the eye's axis, so the horizontal position of the hit is p + t · `Area.level(a)`, where p is
+the horizontal position of the pupil. If the pupil is at the height z, the foot of the face is visible at the slope
 (floor - z)/t, and its top at the slope (top - z)/t. The inverse distance 1/t is linear in a, so there are closed forms
 for the fractions of the area that floor, wall and sky fill.
 """
@@ -65,22 +66,30 @@ class Piece:
 
     @property
     def middle(self) -> Array:
-        """Position a of the column in the middle between `start` and `end`."""
+        """Middle between the columns `start` and `end`, as a position in the area from -1/2 (left) to 1/2 (right)."""
         return (self.start + self.end) / 2
 
     def inverse_distance_at(self, a: Array) -> Array:
-        """Return the inverse distance 1/t [1/m] at which this face is visible in the column at the position a.
+        """Return the inverse distance 1/t [1/m] of the wall's face in one column, a vertical line in the area.
 
-        The visible point lies at the horizontal position pupil + t `Area.level(a)`.
+        With the pupil's horizontal position p, the visible point has the horizontal position p + t · `Area.level(a)`.
+
+        a: position of the column, from -1/2 (left border of the area) to 1/2 (right border)
         """
         return dr.maximum(dr.fma(self.inverse_distance[1], a, self.inverse_distance[0]), LEAST_NEARNESS)
 
     def place(self, area: Area, a: Array) -> Array:
-        """Return the horizontal position (Point2f) at which the face is visible in the column at the position a."""
+        """Return the point in plan (Point2f) where one column, a vertical line in the area, meets the wall's face.
+
+        a: position of the column, from -1/2 (left border of the area) to 1/2 (right border)
+        """
         return area.origin.xy + area.level(a) / self.inverse_distance_at(a)
 
     def patch(self, area: Area, floor: float, top: float) -> Patch:
-        """Return the part of the face that is visible in the area; floor, top: heights of floor and wall top [m]."""
+        """Return the part of the wall's face that is visible in an area, a rectangle of the visual field.
+
+        floor, top: heights of the floor and of the wall's top [m]
+        """
         near = self.inverse_distance_at(self.middle)
         bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
         low = dr.maximum((floor - area.origin.z) * near, bottom)
@@ -194,9 +203,10 @@ class Columns:
 
 
 def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
-    """Return the inverse distance 1/t of a face in the middle column of an area, and its change across the area [1/m].
+    """Return the inverse distance 1/t of a wall's face in the middle of an area, and its change across the area [1/m].
 
-    The face is extended to an infinite line in plan, so that every column hits it.
+    An area is a rectangle of the visual field. The change is the value at its right border minus that at its left
+    border. The face is extended to an infinite line in plan, so that it is hit everywhere in the area.
     """
     side = face.right - face.left
     scale = dr.rcp(_cross(face.left - area.origin.xy, side))

@@ -45,13 +45,17 @@ class IlluminatedBodies:
 
     @property
     def nodes_per_body_set(self) -> int:
-        """Number of rows that the bodies of one world occupy in the table: ten per body, one for each place on it."""
+        """Number of rows of one world in the table of light on bodies.
+
+        Each body has ten rows. They contain the light at nine places on the body's sides, and on the whole body.
+        """
         return PLACES * len(self._radii)
 
     def table(self, place: Array, bodies: list[Array], walls_around: Array | None, reflected: Reflected) -> list[Array]:
-        """Return rows of the table: the fraction of each light that reaches a place on a body, then four harmonics.
+        """Return rows of the table of light on bodies. A row contains the light at one place on a body.
 
-        The fractions are in groups of four. There are four harmonics per component.
+        A row starts with the fraction of each light that reaches the place, in groups of four. Four spherical harmonics
+        of the reflected light around the body follow for each component of the light.
 
         A body has nine places on its sides, in a grid of three by three, and a tenth place that stands for the whole
         body. Walls block the light at all ten places. Other bodies block it only at the nine places on the sides.

@@ -162,9 +162,9 @@ class _Outline:
     high: Array
 
     def edge(self, share: Array) -> _Edge:
-        """Return the edge of a strip at the fraction `share`, from 0 to 1, of the way across the visible part.
+        """Return an edge between strips of a sphere's visible part; `share`: 0 at the first edge, 1 at the last edge.
 
-        The ellipse's parameter is linear in `share`. If the outline is no ellipse, the position across the area is.
+        If the outline is an ellipse, its parameter is linear in `share`. Otherwise, the edge's position is linear.
         """
         angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
@@ -172,9 +172,9 @@ class _Outline:
         return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
 
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
-        """Return length and middle of the ellipse's average chord between two edges of a strip, clipped to the area.
+        """Return length and middle of the ellipse's average chord in a strip, without any part outside the area.
 
-        This length times the strip's width is exactly the area of the ellipse in the strip, unless it is clipped.
+        If no part is outside, length times the strip's width is exactly the size of the ellipse in the strip.
         """
         double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
         mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
@@ -253,12 +253,12 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 
 
 def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
-    """Return length and middle of the interval in [-1/2, 1/2] of those x whose ray along start + x side hits a sphere.
+    """Return length and middle of the part of a line on the tangent plane that a sphere covers, relative to the line.
 
-    The ray at x hits the sphere if the quadratic q2 x² + 2 q1 x + q0 is positive and the sphere is ahead of the eye.
+    The sphere covers position x, from -1/2 to 1/2, if q2 x² + 2 q1 x + q0 is positive and the sphere is ahead.
 
     way, tangent: vector from the eye to the sphere's centre, and squared length of the tangents from the eye to it
-    start, side: direction from the eye to the middle of a line across the area, and the line's whole length as a vector
+    start, side: vectors from the eye to the line's middle, and along the whole line; x is at the point start + x · side
     """
     a, b = dr.dot(way, start), dr.dot(way, side)
     q2 = b * b - dr.squared_norm(side) * tangent
