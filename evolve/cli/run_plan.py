@@ -67,16 +67,20 @@ class RunPlan:
 
     @property
     def animals(self) -> dict[str, Phenotype]:
-        """Two animals that represent all others: one with the start values, and one in the middle of all ranges."""
+        """Two animals that represent all others, "start" and "middle".
+
+        The genes of "start" have their start values. The genes of "middle" are in the middle of their ranges.
+        """
         genotype = Genotype(self.config.genome)
         middle = np.full(genotype.dimension, 0.5)
         return {"start": develop(genotype.start, self.config), "middle": develop(middle, self.config)}
 
     @property
     def hours(self) -> dict[str, float]:
-        """Predicted wall time of the run [h] for each animal with a measured pace, by its name.
+        """Predicted wall time of the run [h], by the name of the animal from whose measured speed it follows.
 
-        The prediction assumes that all candidates take the same time as this animal and complete their training.
+        The prediction assumes that all candidates take the same time as this animal, and that they complete their
+        training.
         """
         search, learning = self.config.search, self.config.learning
         if search.steady_state:
@@ -111,7 +115,10 @@ class RunPlan:
         return shutil.disk_usage(existing).free
 
     def _rung_lines(self) -> list[str]:
-        """Return a line with the number of candidates and steps of each rung; no line if there is only one rung."""
+        """Return a list of one line with the candidates and steps of all rungs; [] if there is only one rung.
+
+        A rung is a stage of training, after which only the better candidates continue.
+        """
         search = self.config.search
         ends = zip(sizes(search), budgets(search, self.config.learning), strict=True)
         rungs = ", ".join(f"{size} candidates for {steps:,} steps" for size, steps in ends)
@@ -196,8 +203,8 @@ def steps_each(config: RunConfig) -> str:
 def _gene_lines(config: RunConfig) -> list[str]:
     """Return lines that list the open genes, which are the genes that the search varies.
 
-    Each cluster (morphological, optical, neural or spectral genes) has its own line. Genes of a cluster that the search
-    varies only from a later generation on have a separate line, which states this generation.
+    Each cluster (morphological, optical, neural or spectral genes) has its own line. If the search varies some genes of
+    a cluster only from a later generation on, these genes have a separate line, which states the generation.
     """
     genes = Genotype(config.genome).open_genes
     lines = []

@@ -42,7 +42,7 @@ class CostsConfig:
 def receptor_count(animal: Phenotype, eye: EyeConfig) -> int:
     """Return the number of receptors in all eyes of an animal, each receptor type counted separately.
 
-    Without motion detectors, this is also the number of signals in a frame.
+    Without motion detectors, this is also the number of signals that the eyes deliver at a time.
     """
     rows, columns = animal.resolution
     types = eye.receptors if animal.lambda_max_nm is None else animal.lambda_max_nm

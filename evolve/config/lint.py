@@ -71,7 +71,10 @@ def _most_light(config: RunConfig) -> float:
 
 
 def _doublings(bands: int) -> list[int]:
-    """Return `bands`, and its repeated doublings as long as they are below 64, the reference's number of bands."""
+    """Return `bands`, and all numbers below 64 that follow from it by repeated doubling.
+
+    Errors are computed relative to a reference with 64 bands.
+    """
     return [bands * 2**k for k in range(6) if k == 0 or bands * 2**k < 64]
 
 
@@ -80,8 +83,8 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
 
     A set is a name such as "rgb", or the peak wavelengths of the types [nm]. If genes determine these peaks, each gene
     that the search varies takes values over its range in turn, while the others keep their start values. Other
-    combinations may cause larger errors. In the preset `ultraviolet`, whose peaks lie far apart, the largest error over
-    all combinations is a third larger than the largest error over the combinations in the result.
+    combinations may cause larger errors. In the preset `ultraviolet`, whose peaks lie far apart, a test of all
+    combinations would find an error that is a third larger.
     """
     if config.eye.receptors != INHERITED:
         return [config.eye.receptors]
@@ -121,7 +124,7 @@ def _idle_glass(uses: Mapping[str, GeneConfig], relief: list[str]) -> list[str]:
     """Return warnings about open genes (genes that the search varies) of a pupil's relief that have no effect.
 
     If the refractive index is fixed at 1, the genes of the heights and of dispersion have no effect. If the relief is
-    fixed and flat, the genes of its material, refractive index and dispersion, have no effect.
+    fixed and flat, the two genes of its material (refractive index and dispersion) have no effect.
 
     relief: names of the genes of the heights
     """

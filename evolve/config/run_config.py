@@ -144,7 +144,7 @@ class RunConfig:
             )
 
     def _check_world(self) -> None:
-        """Check the settings of layouts, and that they are changed only for tasks that have them."""
+        """Check the settings of layouts. Those that the task lacks must have their defaults."""
         self._check_settings((*OF_MAZES, *OF_COURSES, *OF_LAYOUTS, PATH_WIDTH))
         check_layouts(self.world)
 
@@ -166,7 +166,9 @@ class RunConfig:
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_clusters(self) -> None:
-        """Check that at least one gene is open, and that the run uses all open genes.
+        """Check that the search varies at least one gene, and no optical or spectral genes that have no effect.
+
+        Optical genes need optics, and spectral genes need receptor types that are inherited.
 
         Raises:
             ConfigError: one of these conditions is not met.
@@ -269,7 +271,9 @@ class RunConfig:
         return self.card.name
 
     def with_code(self, named: str) -> RunConfig:
-        """Return this configuration with the code of its task, named as "FILE.py:CLASS".
+        """Return a copy of this configuration that contains the code of the user task.
+
+        named: file and class of the task, "FILE.py:CLASS"
 
         Raises:
             ConfigError: the run has no user task, the class has another name, or the file cannot be read or has

@@ -104,9 +104,9 @@ class WorldConfig:
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return the height of walls, the medium, and the set `name` of layouts, as arguments of `sim.build_world`.
+        """Return arguments of `sim.build_world`: the height of walls, the medium and a set of layouts.
 
-        name: "training", "selection" or "test"
+        name: name of the set of layouts: "training", "selection" or "test"
         """
         layouts = None
         if self.layouts == FAMILY:

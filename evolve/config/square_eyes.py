@@ -16,11 +16,11 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """Return a source of settings in which, for square eyes, genes of height and width are replaced by "resolution".
+    """Return settings adapted to square eyes, which have one gene for height and width, `resolution`.
 
     If the source has equal settings for the genes `resolution_height` and `resolution_width`, these become settings of
-    the gene `resolution`, which square eyes have instead. Unequal settings are kept, and later cause an error, which
-    `no_such_side` explains. If eyes are not square, the source is returned unchanged.
+    the gene `resolution`. Unequal settings are kept, and later cause an error, which `no_such_side` explains. If eyes
+    are not square, the source is returned unchanged.
 
     A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes, the task's
     default settings of the two genes are removed. If a preset sets only the width, this becomes its setting of

@@ -52,8 +52,8 @@ class Phenotype:
     resolution: numbers of receptors or ommatidia along the height and along the width of an eye
     relative_aperture: pupil diameter / retina width
     relief: N x N heights as fractions of `eye.relief_height`, in [0, 1], row-major (y, x). For N = 4 they are control
-        points of a bicubic B-spline patch; for larger N they are heights at cell centres that a cubic spline
-        interpolates
+        points of a bicubic B-spline patch; for larger N the relief is divided into N x N cells, and a cubic spline
+        interpolates the heights at their centres
     refractive_index: index of the relief's material at 588 nm
     memory_frames: number of frames that the brain sees
     neurons: number of neurons in each hidden layer of actor and critic
@@ -68,11 +68,11 @@ class Phenotype:
     vertical_fov_deg: an eye's vertical field of view [deg]; None: receptors are square, or the eyes are compound eyes
     time_constant_ms: time constant of the receptors [ms]; None: they have no memory
     facet_diameter_um, rhabdom_length_um: width of the facets and length of the rhabdoms of compound eyes [µm]
-    f_number: focal length of a facet in air / its width
+    f_number: focal length that a facet has in air, divided by the facet's width
     acute_zone: density of ommatidia in the middle of a compound eye / mean density
 
-    If eyes have a perfect lens or are compound eyes, `relative_aperture`, `relief` and `refractive_index` are None. The
-    last four fields are None for camera eyes.
+    If eyes have a perfect lens or are compound eyes, `relative_aperture`, `relief` and `refractive_index` are None. For
+    camera eyes, `facet_diameter_um`, `f_number`, `rhabdom_length_um` and `acute_zone` are None.
 
     Methods raise a ValueError if a field is outside the range that `optics` or `sim` allows.
     """
@@ -101,7 +101,7 @@ class Phenotype:
     acute_zone: float | None = None
 
     def ommatidium(self, eye: EyeConfig) -> optics.Ommatidium | None:
-        """Return the ommatidium of compound eyes, whose facet is a lens with a curved front; None for camera eyes.
+        """Return an ommatidium of compound eyes: a facet lens with a curved front, and a rhabdom; None for camera eyes.
 
         eye: settings of the eyes of a run; the other methods have the same argument
         """
@@ -236,15 +236,16 @@ class Phenotype:
 
 
 def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
-    """Return the phenotype of a genome with the settings of a run. Overlaps of eyes and receptors are repaired.
+    """Return the phenotype that develops from a genome in a run with these settings.
 
+    If eyes would overlap each other, or receptors each other, gene values are changed as little as possible (repaired).
     Every genome with the right number of finite coordinates has a phenotype.
 
-    genome: coordinates of the open genes in [0, 1], (gene,); coordinates outside are clipped
+    genome: coordinate of each gene that the search varies, (gene,); coordinates are clipped to [0, 1]
     config: settings of the run, such as a `RunConfig`
 
     Raises:
-        ValueError: the genome does not contain one finite number for each open gene, or is in half precision.
+        ValueError: the genome does not contain one finite number for each of these genes, or is in half precision.
     """
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics and not config.eye.compound

@@ -27,13 +27,19 @@ WIDTHS = 8, 16  # choice: number of units at each place, in the first and the se
 
 
 class SharedAdaptation(AdaptedLinear):
-    """AdaptedLinear with the same variance at all places, so that noise at dark places is not amplified."""
+    """AdaptedLinear whose normalisation uses the same variance of signals for all neighbourhoods of ommatidia.
+
+    Noise in dark parts of the view is therefore not amplified.
+    """
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
-        """Update the running means and variance of the signals with further signals, (neighbourhood, input, sample).
+        """Update the running means and the running variance with further signals.
 
         Each input of each neighbourhood has its own mean. All inputs have the same variance.
+
+        x: signals (neighbourhood, input, sample); a neighbourhood is an ommatidium and its six neighbours, and its
+            inputs are the signals of all their channels
         """
         super().adapt(x)
         self.variance.copy_(self.variance.mean(dim=0, keepdim=True).expand_as(self.variance))
@@ -82,7 +88,7 @@ class HexagonalLayers(nn.Module):
 
 
 def neighbourhoods(directions: np.ndarray) -> np.ndarray:
-    """Return the indices of the directions in each neighbourhood, (place, 7), with the centre first.
+    """Return the indices of the directions in each neighbourhood, the centre first, (neighbourhood, 7).
 
     The six neighbours are in counter-clockwise order, as the animal sees them, beginning on the right. Every direction
     is in at least one neighbourhood. If there are fewer than seven directions, all belong to a single neighbourhood,

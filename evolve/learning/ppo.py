@@ -60,9 +60,11 @@ class Training:
 
 
 class AdaptingPPO(PPO):
-    """PPO with normalised signals and rewards. Training ends with an error if its numbers are not finite.
+    """PPO with normalised signals and rewards.
 
-    Rewards are divided by their unit, which follows the spread of the discounted returns. At the start of training,
+    Training ends with an error if rewards, the loss or weights are not finite.
+
+    Rewards are divided by a number that follows the spread of the discounted returns. At the start of training,
     agents often touch walls, and the costs of contact are about a hundred times larger than all later rewards. Without
     normalisation, these costs would dominate the critic.
     """
@@ -215,7 +217,8 @@ def train(
     it, at the earliest.
 
     seed: seed of initial weights, exploration and mini-batches, and of the evaluation worlds
-    progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
+    progress: function that is called with (steps trained, steps planned) after every rollout; None: training is not
+        reported
     begun: checkpoint from which to continue; its steps count towards `total_steps`
 
     Raises:

@@ -1,4 +1,4 @@
-"""Rollout buffer for a learner with memory, which stores each frame once.
+"""Rollout buffer that stores each frame once, for a learner with memory.
 
 The observations of an agent with memory are stacks of the last frames. The buffer of stable-baselines3 (SB3) stores
 these stacks, and thus `memory` copies of each frame, and PPO encodes every copy. For 64 worlds x 64 steps of 2 x 15 x
@@ -96,7 +96,9 @@ class FrameRolloutBuffer(RolloutBuffer):
         return self.frames[:, self.memory - 1 :]
 
     def get(self, batch_size: int | None = None) -> Iterator[DictRolloutBufferSamples]:
-        """Yield mini-batches of whole segments in random order; every sample of the rollout occurs once.
+        """Yield mini-batches in random order; every sample of the rollout occurs once.
+
+        A mini-batch consists of whole segments (sequences of consecutive steps of one world).
 
         batch_size: approximate number of samples in a mini-batch; None: all
         """

@@ -25,14 +25,15 @@ __all__ = ["executed_task"]
 def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | BatchTask:
     """Execute the code of a user task, and return the task. Later changes of the file have no effect.
 
-    encoded_textures: True if colour textures contain display colours, unless the model requests linear light. False:
-        MuJoCo's compiler decides which textures contain linear light
+    encoded_textures: True to treat colour textures as display colours, except textures for which the model requests
+        linear light. False: MuJoCo's compiler decides which textures contain linear light
 
     Raises:
         ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
-            requires arguments, its model cannot be compiled, or one of its settings is invalid. Or `encoded_textures`
-            is False, and the task's model is already compiled and has textures that the compiler decided to treat as
-            linear. The message is one line; it names file and line of an error in the user's code.
+            requires arguments, its model cannot be compiled, or one of its settings is invalid. With
+            `encoded_textures=False`, it is also an error if the task's model is already compiled and has textures that
+            the compiler decided to treat as linear. The message is one line; it names file and line of an error
+            in the user's code.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)
@@ -52,9 +53,10 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
 
 
 def _resolve_textures(task: Task | BatchTask) -> None:
-    """Set `colorspace="linear"` for colour textures of a task's model that MuJoCo would otherwise decide to be linear.
+    """Set `colorspace="linear"` for those colour textures of a task's model that MuJoCo would treat as linear light.
 
-    MuJoCo's compiler decides this only for textures whose colour space is "auto". All other textures are unchanged.
+    MuJoCo's compiler decides this by itself only for textures whose colour space is "auto". All other textures are
+    unchanged.
 
     Raises:
         ValueError: the model has such textures but is already compiled, or it cannot be compiled.

@@ -1,6 +1,7 @@
-"""Checks before a run starts: random layouts, settings of a user task that would have no effect, and a short trial.
+"""Checks before a run starts.
 
-A fault that these checks find would affect every animal of the run.
+The checks draw the random layouts, search a user task for settings that would have no effect, and try the task for a
+few steps. A fault that these checks find would affect every animal of the run.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ def check_settings(config: RunConfig) -> None:
             it defines `auxiliary` (additional signals of receptors, such as depth), which evolving eyes do not have.
 
     Raises:
-        ConfigError: the task has several mounts and does not define `place`, the user has not named the task's code
-            (for example by `--task`), so that it must not be executed, or its module cannot be executed.
+        ConfigError: the task has several mounts and does not define `place`, its module cannot be executed, or the user
+            has not named its file. Code that the user has not named, for example by `--task`, is never executed.
     """
     if (code := config.choice.named_code) is None:
         return
@@ -84,10 +85,10 @@ def _unused(task: TaskSettings, config: RunConfig) -> Iterator[str]:
 
 
 def check_layouts(config: RunConfig) -> None:
-    """Check a run's random layouts by drawing all of them. Runs with fixed layouts pass.
+    """Check a run's random layouts by generating all of them. Runs with fixed layouts pass.
 
     Raises:
-        ConfigError: two layouts have the same walls, or no navigation course of the configured size can be drawn.
+        ConfigError: two layouts have the same walls, or no navigation course of the configured size can be generated.
     """
     if config.world.layouts != FAMILY:
         return
@@ -104,8 +105,8 @@ def try_task(config: RunConfig) -> None:
     Each gene of the animal has its start value.
 
     Raises:
-        ConfigError: the user has not named the task's code, or the task's module, model, eyes or methods fail; the
-            message is one line.
+        ConfigError: the task's module, model, eyes or methods fail, or the user has not named the task's file, for
+            example by `--task`, so that its code must not be executed. The message is one line.
     """
     if config.choice.named_code is None:
         return

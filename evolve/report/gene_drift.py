@@ -90,7 +90,10 @@ class Drift:
         return {"generations": [first, last], "searches": self.searches, "random": self.random, "moved": moved}
 
     def lines(self) -> list[str]:
-        """Return the lines of a table, with notes, that compares the runs with searches that have random fitness."""
+        """Return the comparison as the lines of a table, followed by two notes.
+
+        A row compares the values of one quantity in the runs and in the searches with random fitness.
+        """
         rows = [("", "run" if self.of == 1 else f"mean of {self.of} runs", "null model", "95 % of its searches", "p")]
         for one in self.moved:
             numbers = (f"{one.mean:.4g}", f"{one.median:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{one.p:.2g}")
@@ -112,8 +115,9 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
 
     The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical acuity
     unless `eye.vertical_fov` is "receptors", and the number of receptor positions in all eyes. Quantities that do not
-    vary between the searches, or that a run lacks, are omitted. Means are over the last generations that all runs have
-    completed. The searches are those of `evolve.search.null_model`.
+    vary between the searches, or that a run lacks, are omitted. Means are over the last 3 generations that all runs
+    have completed, or over fewer if a gene began to vary in the last 2 of them. The searches are those of
+    `evolve.search.null_model`.
 
     searches: number of searches
     done: function that is called with the completed fraction of the searches

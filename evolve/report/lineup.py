@@ -22,7 +22,8 @@ def lineup(run: Run) -> Html:
     The script lineup.js shows the card of the selected generation. If no candidate has succeeded, the result is empty.
 
     Raises:
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without naming its user task (argument `task`), or the task's module cannot be
+            executed.
     """
     best = _thinned(champions(run.candidates))
     if not best:
@@ -41,9 +42,9 @@ def lineup(run: Run) -> Html:
 
 
 def _heading(generation: int) -> str:
-    """Return the heading of the first animal, the best of the first generation in which a candidate succeeded.
+    """Return the title above the best animal of the first generation in which a candidate succeeded.
 
-    generation: number of this generation. It is above 0 if all candidates of generation 0 have failed. The heading then
+    generation: number of this generation. It is above 0 if all candidates of generation 0 have failed. The title then
         adds "the first to succeed".
     """
     return f"Generation {generation}’s best{', the first to succeed' if generation else ''}"

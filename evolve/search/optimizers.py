@@ -102,7 +102,7 @@ class Mutation:
 class Named:
     """Any optimizer of nevergrad, by its name in nevergrad's registry.
 
-    The setting `search.sigma` is the standard deviation of nevergrad's mutations, which many optimizers use.
+    The setting `search.sigma` is the standard deviation of nevergrad's mutations. Many optimizers use these mutations.
 
     Raises:
         ConfigError: the name is unknown, or the optimizer cannot be used here.
@@ -207,11 +207,11 @@ def _array(space: Space, sigma: float) -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Suppress a warning of pycma, and all warnings of nevergrad, which have no consequences here.
+    """Suppress a warning of pycma and all warnings of nevergrad. All of them are harmless here.
 
     In small populations, pycma adds mirrored samples, which it calls injected solutions. nevergrad reflects them at the
-    bounds. pycma then no longer recognises them, and warns. This is harmless, because pycma receives the samples that
-    were evaluated.
+    bounds. pycma then no longer recognises them, and warns. This is harmless, because the reflected samples are
+    evaluated, and pycma receives them together with their fitness.
 
     nevergrad warns, for example, that some optimizers learn only from complete populations.
     """

@@ -60,11 +60,13 @@ class Scheduler:
 
     @property
     def encrypted(self) -> bool:
-        """True if connections to this address are encrypted."""
+        """True if connections to the scheduler are encrypted, so that its address begins with "tls://"."""
         return self.address.startswith("tls://")
 
     def _require_certificates(self) -> None:
-        """Check the certificates in advance, because Dask would report errors in them only later, in long messages.
+        """Check the PEM files of this object (certificates and private key) before Dask uses them.
+
+        Dask would report invalid files only later, in long messages.
 
         Raises:
             ConfigError: a file is missing or invalid.

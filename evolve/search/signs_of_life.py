@@ -67,7 +67,7 @@ class SignsOfLife:
 
     @property
     def silence_s(self) -> float:
-        """Time [s] since the last answer of the scheduler, or since the last heartbeat of any worker if this is longer.
+        """The longer of two times [s]: since the scheduler's last answer, and since the last heartbeat of any worker.
 
         Heartbeats of workers that neither accept nor evaluate candidates do not count.
         """
@@ -80,14 +80,21 @@ class SignsOfLife:
 
     @property
     def lost_workers(self) -> tuple[str, ...]:
-        """Addresses of workers that have been silent for at least `patience_s`; () if all workers are silent."""
+        """Addresses of workers that have been silent for at least `patience_s`.
+
+        The result is () if every worker that accepts or evaluates candidates is silent, because then `exhausted` is
+        True.
+        """
         if self._workers_s >= self.patience_s:
             return ()
         return tuple(address for address, silence in self._silent_s.items() if silence >= self.patience_s)
 
     @property
     def missing(self) -> str:
-        """Description of the sign of life that has been missing for the longest time, for messages."""
+        """Part of a message: the sign of life that has been missing for the longest time.
+
+        Signs of life are answers of the scheduler and heartbeats of workers.
+        """
         if self._scheduler_s >= self._workers_s:
             return SCHEDULER
         if not self._silent_s:
@@ -98,7 +105,7 @@ class SignsOfLife:
 
 
 def _usable(worker: Mapping[str, Any]) -> bool:
-    """Return whether a worker accepts candidates, or evaluates one."""
+    """Return whether a worker accepts new candidates or is evaluating a candidate."""
     return worker["status"] == "running" or bool(worker.get("metrics", {}).get("executing"))
 
 

@@ -40,7 +40,7 @@ class Chain:
         return body[:-1] + FIELD + self._next(body) + b'"}\n'
 
     def after(self, line: bytes) -> Chain:
-        """Return the state after one more line. The line may end with a line feed.
+        """Return the state of the checksums after one more line. The line may end with a line feed.
 
         Raises:
             ValueError: the checksum of the line does not match, or is missing although earlier lines have checksums.

@@ -32,7 +32,7 @@ def digest(path: Path) -> str | None:
 
 
 def list_checksums(folder: Path, files: Iterable[Path]) -> None:
-    """Add the checksums of EXR files to the list of their folder. Entries of other files are kept.
+    """Add the checksums of EXR files to the file SHA256SUMS in their folder. Entries of other files are kept.
 
     Raises:
         OSError: a file cannot be read, or the list cannot be written.

@@ -65,7 +65,7 @@ def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
 
 
 def total_episode_failures(*parts: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
-    """Sum the episode failures of several parts of a training run, and return the `most_frequent` of them."""
+    """Sum the episode failures over several parts of a training run, and shorten the sums with `most_frequent`."""
     counts: Counter[str] = Counter()
     for part in parts:
         counts.update(dict(part))

@@ -1,8 +1,8 @@
-"""The record of a run, candidates.jsonl: one line per evaluated candidate and rung, in the order of completion.
+"""The record of a run, candidates.jsonl: one line for each evaluation of a candidate, in order of completion.
 
-When a record is read, the values of every line are checked, and its checksum if it has one (`evolve.store.chain`).
-Candidates are appended. Only the repair of a run removes lines: an unfinished last line, or a damaged line and all
-lines after it.
+A candidate is evaluated after each part (rung) of its training. When a record is read, the values of every line are
+checked. If a line has a checksum (`evolve.store.chain`), this is also checked. Candidates are appended. Only the repair
+of a run removes lines: an unfinished last line, or a damaged line and all lines after it.
 """
 
 from __future__ import annotations
@@ -120,8 +120,8 @@ class Record:
         """Append a candidate, and synchronise the file with the disk.
 
         Raises:
-            RunError: the candidate is already on record or cannot be restored from it, another process has changed the
-                record, or the record cannot be written; earlier lines remain intact.
+            RunError: the record contains the candidate already, its line could not be read back, another process has
+                changed the record, or the record cannot be written. Earlier lines remain intact.
         """
         if (candidate.id, candidate.rung) in self.lines:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
@@ -190,7 +190,11 @@ def _require_readable(candidate: Candidate, path: Path) -> None:
 
 
 def _furthest(lines: Lines) -> tuple[Candidate, ...]:
-    """Return each candidate as recorded after the last rung that it has reached, in the order of ids."""
+    """Return the latest record of each candidate, in the order of ids.
+
+    A record has a line for each rung (part of training) that a candidate has completed; the line of the last rung
+    counts.
+    """
     furthest = {candidate_id: lines[candidate_id, rung] for candidate_id, rung in sorted(lines)}
     return tuple(furthest.values())
 
@@ -198,8 +202,8 @@ def _furthest(lines: Lines) -> tuple[Candidate, ...]:
 def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
     """Return the candidates of a run's record, in the order of ids, after `new` has been appended to the record.
 
-    A record has a line for each rung of training that a candidate has reached. The line of the last rung counts. The
-    result equals that of `_furthest` for the longer record. It is found without a pass over all lines.
+    A record has a line for each rung of training that a candidate has reached. The line of the last rung counts.
+    `_furthest` would return the same candidates, but would read all lines again.
 
     candidates: result of `_furthest` before `new` is appended
     """

@@ -81,10 +81,10 @@ def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
 
     Its receptors are those that `optics.receptors_of("honeybee")` returns.
 
-    Source: Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1. The diameters of
-    rhabdoms follow from the article's acceptance angles, which are diameter / focal length. The mean interommatidial
-    angle of 2.1° is an estimate for all four species. It assumes that the 5432 facets of *Apis mellifera* cover a
-    hemisphere.
+    Source: Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1. The article
+    computes acceptance angles as the rhabdom's diameter divided by the focal length. The diameters are derived from
+    these angles. The mean interommatidial angle of 2.1° is an estimate for all four species. It assumes that the 5432
+    facets of *Apis mellifera* cover a hemisphere.
 
     species: "mellifera", "cerana", "florea" or "dorsata".
     rings: rings of ommatidia around the central one.
@@ -100,9 +100,9 @@ def fruit_fly(rings: int = 15) -> AppositionEye:
 
     Its receptors are those that `optics.receptors_of("fruit_fly")` returns.
 
-    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. Typical values, for which no source has
-    been read, are the facet's diameter of 16 µm, the rhabdomere's diameter of 1.9 µm and length of 80 µm, and the
-    interommatidial angle of 5°.
+    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. The facet's diameter of 16 µm, the
+    rhabdomere's diameter of 1.9 µm and length of 80 µm, and the interommatidial angle of 5° are typical values. No
+    source was consulted for them.
 
     rings: rings of ommatidia around the central one. 15 rings have 721 ommatidia.
 
@@ -173,8 +173,8 @@ def cirolana() -> Eye:
 
     Source of the facet's diameter of 150 µm and of this angle: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981.
     The rhabdom has too many modes to be modelled as a waveguide, and the focus of the lens lies below the rhabdom's
-    tip. The eye is therefore modelled as a lens in front of a single square receptor of 45°. No source has been read
-    for the focal length of 100 µm, which does not affect the acceptance angle.
+    tip. The eye is therefore modelled as a lens in front of a single square receptor of 45°. No source was
+    consulted for the focal length of 100 µm, which does not affect the acceptance angle.
     """
     focal = 100e-6
     pupil = Pupil(75e-6, thin_lens_focal_length=focal, medium_n=CRUSTACEAN_N)

@@ -169,8 +169,8 @@ class Aperture(ABC):
     def with_edge(self, passband: float, stopband: float, ripple: float) -> SoftAperture:
         """Return the aperture after a low-pass filter that falls between two frequencies [cycles per pupil radius].
 
-        Frequencies below `passband` stay unchanged and those above `stopband` vanish, to within `ripple`. `soften`
-        chooses the stopband itself.
+        Frequencies below `passband` stay unchanged and those above `stopband` vanish, to within `ripple`. The method
+        `soften` is given no stopband: it chooses the one that needs the fewest samples.
         """
         return _with_edge(self, SoftEdge(passband, stopband, ripple))
 

@@ -1,4 +1,4 @@
-"""Converging and diverging waves behind disks and rings, convolved with the kernel of a soft edge.
+"""Converging and diverging waves behind disks and rings. The waves are convolved with the kernel of a soft edge.
 
 A curved wave contains all directions from the direction at its centre to the direction at its rim. Each direction
 corresponds to a spatial frequency, and the convolution acts as a low-pass filter. It removes light in directions beyond
@@ -31,7 +31,7 @@ def curved_ring(edge: SoftEdge, inner: float, curvature: float, levels: int) -> 
 
     The wave e^{iπ c r²} passes the opening between the radii `inner` and 1, and is convolved with the kernel of the
     soft edge. The result is 1 where the kernel changes nothing. The values of r² lie in the middle of equal steps from
-    0 to (1 + reach)².
+    0 to (1 + reach)², where `reach` is the radius beyond which the kernel is 0.
 
     curvature: c, the local frequency of the wave at the rim in cycles per radius.
     """

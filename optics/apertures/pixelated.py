@@ -5,10 +5,10 @@ derivative of a spline with respect to one of its samples. This derivative bends
 is a different polynomial in every cell between knots. For such an integrand, "pixels" means these cells.
 
 Pixels that lie wholly inside have Gauss-Legendre nodes. Pixels that the opening's edge cuts can be treated in two ways.
-`PixelatedAperture.nodes` divides them into panels at the points where the edge enters and leaves them (see `strips`).
-If the nodes must lie on rows and columns, cut pixels have the same nodes as whole pixels, and
-`PixelatedAperture.weights` returns weights that integrate the interpolating polynomial over the open part of each
-pixel.
+`PixelatedAperture.nodes` divides a cut pixel into panels, which are horizontal bands, at the heights at which the edge
+enters or leaves the pixel (see `strips`). If the nodes must lie on rows and columns, cut pixels have the same nodes as
+whole pixels, and `PixelatedAperture.weights` returns weights that integrate the interpolating polynomial over the open
+part of each pixel.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class PixelatedAperture(Aperture):
 
     borders: ascending borders between pixels, from -1 to 1, the same along x and along y. None: all pixels are squares
         of the same size.
-    fixed: number of quadrature nodes along a side of a pixel. None: the number follows from the highest spatial
-        frequency and the accuracy that a call of `nodes` requests by `cycles` and `digits`.
+    fixed: number of quadrature nodes along a side of a pixel. None: each call of `nodes` chooses the number according
+        to its arguments `cycles`, the highest spatial frequency, and `digits`, the accuracy.
     """
 
     opening: Aperture
@@ -115,15 +115,20 @@ class PixelatedAperture(Aperture):
         return float(self._widths.max())
 
     def rows(self, across: int) -> np.ndarray:
-        """Return the ascending positions of the rows (and of the columns) of nodes in pupil radii, (count · across,).
+        """Return the positions [pupil radii] of the rows of nodes, in ascending order, array (count · across,).
 
-        across: number of nodes along a pixel.
+        The columns have the same positions.
+
+        across: number of nodes along a side of a pixel.
         """
         u, _ = gauss_legendre(across)
         return (self._centres[:, None] + (u - 0.5) * self._widths[:, None]).ravel()
 
     def weights(self, across: int) -> np.ndarray:
-        """Return the weights of the nodes [squared pupil radii], (row, column)."""
+        """Return the quadrature weight [squared pupil radii] of each node, array (row, column).
+
+        across: number of nodes along a side of a pixel.
+        """
         return _weights(self, across)
 
     @cached_property
@@ -185,10 +190,11 @@ class PixelatedAperture(Aperture):
     def _pieces(
         self, at: np.ndarray, cycles: float, digits: float, degree: int = 0
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield x, y and weights of the quadrature nodes in a pixel that the opening's edge cuts, panel by panel.
+        """Yield x, y and weights of the quadrature nodes in one of the pixels through which the opening's edge runs.
 
-        Nodes lie only in the part of the pixel that is within the opening. This part is divided into panels by
-        horizontal lines at the heights at which the edge enters, leaves or turns.
+        Nodes lie only in the part of the pixel that is within the opening. This part is divided into panels, which are
+        horizontal bands, at the heights at which the edge enters or leaves the pixel, and at the heights of the
+        corners, tops and bottoms of the edge.
 
         at: (row, column) of the pixel.
         cycles, digits, degree: see `strips`.

@@ -1,17 +1,17 @@
-"""Transmittance at any point of a polygon convolved with the soft edge's kernel.
+"""Transmittance of a polygon with a soft edge, at any point. The polygon is convolved with the kernel of the edge.
 
 Consider the triangle of a point and an edge. The integral of the kernel g over this triangle is
 
     ∫ G(r) dθ,   G(r) = ∫₀^r g(r') r' dr',
 
 where θ runs over the angle that the edge subtends, and r is the distance from the point to the edge in the direction θ.
-The polygon's transmittance is the sum over its edges. Angles, and hence these contributions, are negative if the point
-lies on the outer side of an edge. Let d be the signed distance of an edge from the point, and t the position along the
-edge from the foot of the perpendicular. Then
+The polygon's transmittance is the sum of these integrals over its edges. If the point lies on the outer side of an
+edge, the angle θ, and therefore the edge's integral, counts as negative. Let d be the signed distance of an edge from
+the point, and t the position along the edge from the foot of the perpendicular. Then
 
     G dθ = d H(r) dt,   r² = d² + t²,
 
-where H = G/r² is smooth. Beyond the kernel's reach G = 1/2π, so the contribution depends only on the angle.
+where H = G/r² is smooth. Beyond the kernel's reach G = 1/2π, so the integral depends only on the angle.
 """
 
 from __future__ import annotations
@@ -77,17 +77,19 @@ def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, 
 
 
 class _Line:
-    """Contribution W(d, s) of a piece of a straight edge to the soft-edged transmittance at a point.
+    """Contribution of a piece of a straight edge to the transmittance of a soft-edged opening at a point.
 
-    The piece begins at the foot of the perpendicular from the point to the edge, and ends at a distance s along the
-    edge. d is the signed length of the perpendicular, positive if the point lies on the inner side.
+    The contribution W(d, s) depends on two lengths. The piece begins at the foot of the perpendicular from the point to
+    the edge, and ends at a distance s along the edge. d is the signed length of the perpendicular, positive if the
+    point lies on the inner side.
 
-    The kernel that softens the edge covers a disc around the point. If the piece ends within this disc, its
-    contribution is the integral ∫ d H(r) dt, where t runs from 0 to s, r² = d² + t², and H is the function that
-    `radial_table` tabulates. If the piece ends outside the disc, its contribution is that of an infinite half-line,
-    minus α/(2π), where α is the angle that the rest of the half-line subtends at the point. The half-line contributes
-    half of T(d) - 1/2, where T is the transmittance of a soft-edged half-plane. T depends only on d and is tabulated.
-    If the edge misses the disc, the piece contributes the angle that it subtends, divided by 2π.
+    The kernel that softens the edge covers a disc around the point. If the line of the edge misses this disc, W is the
+    angle that the piece subtends at the point, divided by 2π. Otherwise, W depends on the end of the piece. If the
+    piece ends within the disc, W is the integral ∫ d H(r) dt, where t runs from 0 to s, r² = d² + t², and H is the
+    function that `radial_table` tabulates. If it ends outside the disc, consider the infinite half-line that begins at
+    the foot and contains the piece. The half-line contributes half of T(d) - 1/2, where T is the transmittance of a
+    soft-edged half-plane. T depends only on d and is tabulated. W is smaller by α/(2π), where α is the angle at the
+    point that the part of the half-line beyond the piece subtends.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:

@@ -1,7 +1,8 @@
 """Quadrature over the part of a rectangle that an outline encloses.
 
-The rectangle is divided into panels at the heights at which the edge enters, leaves or turns. Within a panel, nodes lie
-on horizontal chords that end exactly at the edge, so the quadrature converges spectrally.
+The rectangle is divided into panels, which are horizontal bands, at the heights at which the outline enters or leaves
+the rectangle, and at the heights of the corners, tops and bottoms of the outline. Within a panel, nodes lie on
+horizontal chords that end exactly at the edge, so the quadrature converges spectrally.
 """
 
 from __future__ import annotations
@@ -60,12 +61,12 @@ def strips(
 
 
 def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Return the heights between which a rectangle is cut into horizontal panels, with some heights added.
+    """Return the heights of the borders of the panels, the horizontal bands into which a rectangle is divided.
 
-    The added heights make the panels thinner towards the top and the bottom of a circle. There, the length of a
-    horizontal chord changes like a square root of the height, which polynomials do not approximate.
+    Borders are added to the given ones, to make the panels thinner towards the top and the bottom of a circle. There,
+    the length of a horizontal chord changes like a square root of the height, which polynomials do not approximate.
 
-    ends: ascending heights of the borders of the given panels.
+    ends: ascending heights of the given borders.
     tangent: heights of the tops and bottoms of the circles to which arcs of the outline belong.
     """
     more = []

@@ -1,4 +1,4 @@
-"""A wave that converges on a point of an image plane, read from the objects of other programs."""
+"""A wave that converges on a point of an image plane. Its samples come from objects of other optics programs."""
 
 from __future__ import annotations
 
@@ -27,19 +27,20 @@ ON_Z = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class ConvergingWave:
-    """Samples of a wave that converges on a point of the image plane, read from an object of another optics program.
+    """Samples of a wave that converges on a point of the image plane.
 
-    The wavefront is compared with the reference sphere, whose centre is this point.
+    The samples were read from an object of another optics program. The wavefront is compared with the reference sphere,
+    whose centre is this point.
 
-    sines: components along the image plane's axes x and y of the unit vectors from the point to the samples, array
-        (axis, sample).
+    sines: directions from the point to the samples, as the components of unit vectors along the axes x and y of the
+        image plane, array (axis, sample).
     ahead: distance [m] by which the wavefront is ahead of the sphere, times the refractive index, array (sample,).
-    rim: rim of the pupil, in the unit of `sines`.
-    on_plane: rim [m] of the pupil on its plane, which lies `distance` in front of the image.
+    rim: rim of the pupil as seen from the point, in the same coordinates as `sines`.
+    on_plane: rim [m] of the pupil on the pupil's plane, which lies `distance` in front of the image.
     distance: radius of the sphere [m].
     wavelength: vacuum wavelength [m].
     position: the point (x, y) [m] on the image plane; None if the other program's object does not contain it.
-    height: distance [m] from the origin of that object's coordinates to the image plane, perpendicular to the plane and
+    height: distance [m] from the origin of the object's coordinates to the image plane, perpendicular to the plane and
         positive in the direction of the light; None if the object does not contain it.
     """
 
@@ -64,10 +65,11 @@ class ConvergingWave:
 
         shift: distance [m] by which the image plane is moved along the light.
         medium_n: refractive index behind the pupil.
-        position: the point (x, y) [m] on the image plane. None: the point on the ray through the pupil's centre.
+        position: the new point (x, y) [m] on the image plane. None: the point at which the ray from the pupil's centre
+            to the old point crosses the moved plane.
 
         Raises:
-            ValueError: a position is given, and the present one is unknown.
+            ValueError: a position is given although the position of the old point is unknown.
         """
         if position is not None and self.position is None:
             raise ValueError("the position of the image is unknown: this object does not contain it")
@@ -85,9 +87,12 @@ class ConvergingWave:
         return replace(self, position=position, height=height, **moved)
 
     def _seen_from(self, to: np.ndarray, sines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return sines (2, n) of the directions from another point to points of the sphere, and their distances [m].
+        """Return the directions and the distances [m] from another point to points of the reference sphere.
 
-        to: the other point (x, y, z) [m] relative to the centre, with z along the light, (3, 1).
+        The directions are components of unit vectors along x and y, array (axis, point).
+
+        to: the other point (x, y, z) [m] relative to the sphere's centre, with z along the light, (3, 1).
+        sines: the directions from the sphere's centre to the points, array (axis, point).
         """
         away = self.distance * np.stack([*sines, -np.sqrt(1 - np.sum(sines**2, axis=0))]) - to
         apart = np.linalg.norm(away, axis=0)
@@ -103,7 +108,7 @@ def is_of_samples(system: Any) -> bool:
 
 
 def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave:
-    """Convert an object of another optics program, which contains rays in a pupil, to a wave.
+    """Convert the rays in a pupil, which an object of another optics program contains, to a converging wave.
 
     system: the object, such as optiland's WavefrontData. Its attributes are pupil_x, pupil_y, pupil_z and radius [mm],
         and opd [waves].
@@ -144,7 +149,7 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
 
 
 def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWave:
-    """Convert an object of another optics program, which contains samples on a grid in a pupil, to a wave.
+    """Convert the samples on a grid in a pupil, which an object of another program contains, to a converging wave.
 
     system: the object, such as prysm's Wavefront. Its attributes are data (complex), dx [mm] and wavelength [µm]. The
         samples in `data` lie on a plane that is parallel to the image plane.

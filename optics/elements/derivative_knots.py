@@ -1,10 +1,10 @@
-"""Inputs of a PSF that carry derivatives, and the cells in which these derivatives are polynomials.
+"""Inputs of a PSF that carry derivatives, and cells of the pupil in which these derivatives are smooth.
 
 The derivative of the light behind the pupil with respect to one sample of a map is proportional to a cardinal spline
-times the light (for a mask, the light without it). This spline is a different cubic polynomial in every cell between
-two knots, whatever the values of the map are. Derivatives with respect to samples of a flat map therefore have the same
-detail as derivatives for a rough map. Samples of the pupil that resolve only the light give wrong derivatives.
-Quadrature nodes in each cell are used instead.
+times the light. If the map is a mask, this is the light that would pass the pupil without the mask. The spline is a
+different cubic polynomial in every cell between two knots, whatever the values of the map are. Even if a map is flat,
+derivatives with respect to its samples therefore contain the fine detail of these splines. Samples of the pupil that
+resolve only the light give wrong derivatives. Quadrature nodes in each cell are used instead.
 """
 
 from __future__ import annotations
@@ -31,19 +31,18 @@ APART = 1e-9  # rounding: borders that are closer, in pupil radii, are the same
 
 @dataclass(frozen=True)
 class DerivativeKnots:
-    """Cells of the pupil's square in which derivatives with respect to the samples of maps are smooth.
+    """Rectangular cells of the square around the pupil. In each cell, derivatives by the samples of maps are smooth.
 
-    A map is a relief, wavefront or mask that is given by samples and interpolated by cubic splines. The splines are
-    different polynomials on both sides of a knot, a row or column of samples. The knots of all maps that carry
-    derivatives divide the square into rectangular cells.
+    A map is a relief, wavefront or mask that is given by samples and interpolated by cubic splines. Each row and each
+    column of samples is a knot, at which a spline changes from one polynomial to another. The knots of all maps that
+    carry derivatives divide the square into the cells.
 
     borders: ascending borders of the cells, the same along x and along y, in units of the pupil's radius, from -1 to 1.
-        They include the borders between the pixels of a relief of pixels.
-    splines: number of cubic splines, 1 or 2, in a derivative of the light, which is the product of these splines and
-        the light that leaves the rest of the pupil. It is 2 if the mask and also the relief or wavefront carry
-        derivatives.
-    maps: names, rows and columns of the maps that carry derivatives, such as "height: 32 x 32".
-    names: names of these maps, as arguments of `Pupil`.
+        If the relief consists of pixels, the borders between them are included.
+    splines: number of cubic splines, 1 or 2, by which the light from the rest of the pupil is multiplied in a
+        derivative. The number is 2 if the mask carries derivatives and the relief, the wavefront or both do as well.
+    maps: text with the name, rows and columns of each map that carries derivatives, such as "height: 32 x 32".
+    names: names of these maps, which are names of arguments of `Pupil`.
     """
 
     borders: tuple[float, ...]
@@ -63,13 +62,15 @@ class DerivativeKnots:
 
 
 def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
-    """Return the cells of the pupil between the knots of the maps that carry derivatives; None without such maps.
+    """Return the cells into which knots of maps divide the pupil; None if no map carries derivatives.
 
-    A map is a relief, wavefront or mask that is given by samples. The derivative of the light with respect to a sample
-    is a cubic spline, which is a single polynomial only in each cell between two knots. The derivative with respect to
-    the relief's refractive index is proportional to the height, so a relief counts if its index carries a derivative.
+    A map is a relief, wavefront or mask that is given by samples. Its knots are the rows and columns of samples. The
+    derivative of the light with respect to a sample is proportional to a cubic spline, which is a single polynomial
+    only in each cell between two knots. Only knots of maps that carry derivatives are used. This includes a relief
+    whose refractive index carries a derivative, because that derivative is proportional to the height.
 
-    wavelength: vacuum wavelength [m], at which the relief counts only if its index differs from its surroundings.
+    wavelength: vacuum wavelength [m]. A relief is ignored if its index at this wavelength equals that of the medium
+        around it and carries no derivative.
     """
     maps = dict(_maps(pupil, wavelength))
     if not maps:
@@ -104,7 +105,10 @@ def carries_derivatives(beam: Beam) -> bool:
 
 
 def _maps(pupil: Pupil, wavelength: float) -> Iterator[tuple[str, tuple[tuple[int, int], np.ndarray]]]:
-    """Yield names, shapes and knots, in units of the pupil's radius, of the maps whose derivatives are requested."""
+    """Yield the name, shape (rows, columns) and knots of each map whose derivatives are requested.
+
+    The knots are positions in units of the pupil's radius.
+    """
     relief, wavefront, mask = pupil.height, pupil.wavefront, pupil.mask
     bent = isinstance(relief, HeightMap) and pupil.bends(wavelength)
     if bent and (carries_derivative(relief.samples) or _index_carries(pupil)):

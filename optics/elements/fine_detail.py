@@ -14,11 +14,11 @@ CUBIC = 4  # coefficients of a cubic polynomial along an axis; slopes alone desc
 
 
 def band_of(samples: np.ndarray, level: float) -> float:
-    """Return the frequency above which a map over a square varies by less than `level`, as a root mean square.
+    """Return the frequency above which a map's variation has a root mean square of less than `level`.
 
-    The unit is one cycle per half the side of the square. The result is at least 1. Interpolation by cubic splines
-    repeats a component of frequency f around multiples of the sampling rate. A copy at the frequency F is weaker by the
-    factor (f/F)⁴.
+    The map is sampled over a square. The unit is one cycle per half the side of the square. The result is at least 1.
+    Interpolation by cubic splines repeats a component of frequency f around multiples of the sampling rate. A copy at
+    the frequency F is weaker by the factor (f/F)⁴.
 
     samples: values of the map, array (row, column).
     """
@@ -39,9 +39,9 @@ def band_of(samples: np.ndarray, level: float) -> float:
 def power_beyond(samples: np.ndarray) -> np.ndarray:
     """Return, for each frequency, the power (mean square) of a map's components at this frequency and above.
 
-    The map is sampled over a square. Entry k of the result is the total power of all components with at least k/4
-    cycles over half the side of the square, along x or along y. The result has one entry for each sample along the axis
-    with more samples.
+    The map is sampled over a square. Half the side of the square is the unit of length. Entry k of the result is the
+    total power of all components with a frequency along x, along y or both of at least k/4 cycles per unit of length.
+    The result has one entry for each sample along the axis with more samples.
 
     The best-fitting bicubic polynomial is subtracted first, because a polynomial bends light and does not scatter it.
     The cosine transform continues the samples by their mirror images, without jumps. The ends of the samples therefore
@@ -63,9 +63,9 @@ def power_beyond(samples: np.ndarray) -> np.ndarray:
 
 
 def reach_of(beyond: np.ndarray, level: float) -> float:
-    """Return the frequency above which a map over a square varies by at most `level`, as a root mean square.
+    """Return the frequency above which a map's variation has a root mean square of at most `level`.
 
-    The unit is one cycle per half the side of the square.
+    The map is sampled over a square. The unit is one cycle per half the side of the square.
 
     beyond: result of `power_beyond` for the map.
     """

@@ -43,7 +43,7 @@ class StackSlopes(ReadOnlyArrays):
 
     @cached_property
     def steepest(self) -> np.ndarray:
-        """Largest magnitude of each beam's gradient at the points (`x`, `y`), array (beam,)."""
+        """Largest gradient of each beam's optical path at the points (`x`, `y`), as a magnitude, array (beam,)."""
         found: np.ndarray = np.sqrt((np.square(self.along_x) + np.square(self.along_y)).max(axis=1))
         return read_only(found)
 
@@ -147,7 +147,7 @@ class LightStack:
 
     @cached_property
     def smooth_points(self) -> int | None:
-        """Number of Chebyshev points along a diameter from which the optical paths can be interpolated.
+        """Number of Chebyshev points along a pupil's diameter that is enough to interpolate the optical paths.
 
         None if light is oblique, or if a relief or wavefront is not a polynomial (for example, a map of samples).
         """
@@ -186,7 +186,10 @@ class LightStack:
         return np.asarray((coefficients @ powers.reshape(len(powers), coefficients.shape[2], -1))[:, 0])
 
     def _other_path(self, place: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the part of the path [m] of one beam that is neither a polynomial nor a wave centred on the axis."""
+        """Return the part of one beam's optical path [m] that neither polynomials nor `geometry` describe.
+
+        It is due to oblique light, and to the relief and the wavefront unless both are polynomials.
+        """
         beam, total = self.beams[place], np.zeros(np.broadcast_shapes(x.shape, y.shape))
         pupil = beam.pupil
         if self._tilted[place]:
@@ -199,7 +202,7 @@ class LightStack:
         return total
 
     def amplitude(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the amplitudes that masks transmit at points (x, y) [m], (beam, y, x)."""
+        """Return the amplitude transmittances of the pupils' masks at points (x, y) [m], array (beam, y, x)."""
         found = np.ones(x.shape)
         for place, (beam, radius) in enumerate(zip(self.beams, self.radius, strict=True)):
             if beam.pupil.mask is not None:
@@ -260,9 +263,9 @@ class LightStack:
         return StackSlopes(RIM, x, y, along_x, along_y)
 
     def _smooth_slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the slopes along x and along y, at `disk_points`, of two parts of the path, arrays (beam, point).
+        """Return the slopes along x and along y of the optical path, at `disk_points`, arrays (beam, point).
 
-        These parts are the reliefs and wavefronts that are polynomials, and the spherical waves of ideal lenses and of
+        Only reliefs and wavefronts that are polynomials are included, and the spherical waves of ideal lenses and of
         sources on the axis.
         """
         coefficients = self._polynomials[0]

@@ -55,7 +55,7 @@ class PixelRelief(Relief):
         return 0.0 if self._level else math.inf
 
     def detail(self, level: float) -> float:
-        """Return 0, because `scatter` accounts for all detail."""
+        """Return 0, because `scatter` already includes all light that the pixels scatter."""
         return 0.0
 
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
@@ -103,7 +103,11 @@ class PixelRelief(Relief):
 def _reach(power: np.ndarray, share: float) -> float:
     """Return the frequency [cycles per radius] beyond which at most the fraction `share` of the power lies.
 
-    Infinity: the frequency lies beyond REPETITIONS repetitions of the spectrum.
+    The power spectrum is that of the samples, repeated periodically and multiplied by sinc², the power spectrum of one
+    pixel. It is computed up to its 32nd repetition (REPETITIONS) on either side. The result is infinity if more than
+    `share` of the power lies beyond this range.
+
+    power: power spectrum of the samples, from a discrete Fourier transform.
     """
     n = len(power)
     order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)

@@ -20,7 +20,7 @@ MOST = 1025  # choice, limited by memory: largest number of points along a side 
 
 
 class HasPath(Protocol):
-    """Interface of a pupil whose slopes are computed from its optical path."""
+    """Interface of a pupil for `all_slopes`, which computes the gradient of the optical path."""
 
     @property
     def radius(self) -> float: ...

@@ -1,4 +1,6 @@
-"""Field of polarised light just behind a pupil, computed for its rays and expressed as masks of the pupil.
+"""Field of polarised light just behind a pupil, from the rays that leave the pupil.
+
+A component of the field is used as the amplitude transmittance of a mask in the pupil.
 
 A ray is perpendicular to the wavefront, so its direction is s = ∇L/n, where L is the path from the source through the
 pupil, and n the refractive index behind it. The electric field is rotated together with the ray, along the shortest
@@ -105,13 +107,12 @@ class RayField(Mask):
         return found if own is None else found * own.amplitude(x, y, radius)
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return the spatial frequency [1/m] above which the mask's amplitude varies by less than `level`.
+        """Return f [1/m] so that components of this mask's amplitude above the spatial frequency f are below `level`.
 
-        It is the sum of up to three such frequencies. The first is twice the frequency above which the optical path
-        through the pupil varies little. It is doubled because the field depends on products of the path's slopes. The
-        second is the frequency of the pupil's own mask. With a lens, the third is that of the directions of the rays.
-        These directions, as functions of the distance from the axis, have singularities at the imaginary distances
-        ±i f, where f is the focal length.
+        It is the sum of up to three such frequencies. The first is that of the optical path through the pupil, doubled
+        because the field depends on products of the path's slopes. The second is that of the mask in `beam.pupil`, if
+        there is one. With a lens, the third is that of the ray directions as functions of the distance from the axis:
+        these functions have singularities at the imaginary distances ±i f₀, where f₀ is the focal length.
         """
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)

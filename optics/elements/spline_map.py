@@ -31,9 +31,9 @@ FEW = 128  # choice: number of samples up to which a product with `spline_matrix
 
 
 def is_open_grid(x: Array, y: Array) -> bool:
-    """Return True if x is a row (1, column) and y a column (row, 1), both of NumPy.
+    """Return True if x and y are NumPy arrays, x a row of the shape (1, column) and y a column of the shape (row, 1).
 
-    They describe the points of a rectangular grid. A spline's values at these points are a product of matrices.
+    Such arrays describe the points of a rectangular grid. A spline's values at these points are a product of matrices.
     """
     return library(x) is np and x.ndim == y.ndim == 2 and len(x) == 1 and y.shape[1] == 1
 
@@ -52,7 +52,10 @@ def spline_cell(position: Array, n: int) -> tuple[Array, list[Array]]:
 
 
 def spline_basis(at: np.ndarray, n: int) -> np.ndarray:
-    """Return the B-splines of all coefficients at positions along an axis of n samples, (position, coefficient)."""
+    """Return the values of all B-splines at positions along an axis of n samples, (position, coefficient).
+
+    There is one B-spline for each spline coefficient.
+    """
     return _basis(np.asarray(at, np.float64).tobytes(), n)
 
 

@@ -32,7 +32,10 @@ class Mask(ABC):
 
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return the spatial frequency [1/m] above which the mask's amplitude varies by less than `level`."""
+        """Return f [1/m] so that components of the mask's amplitude above the spatial frequency f are below `level`.
+
+        radius: radius of the pupil [m].
+        """
 
     def detail(self, light: float, radius: float) -> float:
         """Return the frequency [1/m] along x and y beyond which the mask scatters at most a given amount of light.
@@ -68,7 +71,7 @@ class GaussianMask(Mask):
 
     At r = w the intensity is 1/e².
 
-    waist: w [m]; a number of Dr.Jit or PyTorch may carry a derivative.
+    waist: w [m]. It may carry a derivative, as a Dr.Jit number or a PyTorch tensor.
 
     Raises:
         ValueError: waist is not positive.
@@ -148,9 +151,9 @@ class MaskMap(Mask):
             )
 
     def _most(self) -> float:
-        """Return the largest magnitude of the amplitude that the spline reaches.
+        """Return the largest magnitude of the spline through the samples.
 
-        It is searched within the largest circle in the square that the samples cover.
+        Only points within the circle that is inscribed in the square of the samples are considered.
         """
         n = FINER * self._map.knots
         at = (np.arange(n) + 0.5) * 2 / n - 1

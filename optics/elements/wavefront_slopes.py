@@ -38,11 +38,13 @@ def derivative(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) -> np.ndarray:
-    """Return |∇L + n (ξ - x) / D| for points ξ of the pupil and x of a plane, D = |ξ - x| apart, (target, point).
+    """Return |∇L + n (p - t) / D| for points p of the pupil and target points t of a plane behind it, (target, point).
 
-    points: x, y, ∂L/∂x and ∂L/∂y of points of the pupil, where L is the optical path to the point.
+    L is the optical path from the source to p, n the refractive index behind the pupil, and D the distance from p to t.
+
+    points: rows x, y, ∂L/∂x and ∂L/∂y for the points p.
     to: x and y of the target points.
-    bend: refractive index n behind the pupil, and distance z [m] of the targets' plane.
+    bend: refractive index n, and distance [m] of the plane from the pupil.
     """
     x, y, px, py = points
     dx, dy = x - to[0], y - to[1]
@@ -87,7 +89,7 @@ class Slopes(ReadOnlyArrays):
         return math.sqrt(self._squared[self.distance_from_axis <= self.radius].max())
 
     def spread(self, margin: float, towards: tuple[Grid, float, float] | None = None) -> np.ndarray:
-        """Return slopes at points that are evenly spread over the pupil's disk, in descending order.
+        """Return slopes, sorted in descending order, at points that are evenly spread over the pupil's disk.
 
         A slope is the magnitude of the gradient of an optical path across the pupil. The points extend beyond the
         disk's rim by a margin [radii], but not beyond the square around the disk. The slopes are sorted into groups of
@@ -146,8 +148,8 @@ class Slopes(ReadOnlyArrays):
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the coordinates x and y [m] at which rays from the pupil's disk hit a plane at `distance` [m].
 
-        There is one ray for each sample of the grid in the disk. Coordinates of an evanescent ray are infinite, or NaN
-        if its slope along this axis is 0.
+        There is one ray for each sample of the grid in the disk. For an evanescent ray, x is infinite, or NaN if
+        the slope along x is 0, and the same holds for y.
 
         medium_n: refractive index behind the pupil.
         """

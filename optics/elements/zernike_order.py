@@ -62,9 +62,9 @@ def fringe_mode(j: int) -> Mode:
 
 
 def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
-    """Return Zernike coefficients by mode, {(n, m): coefficient}, given the coefficients by number.
+    """Return Zernike coefficients by mode, {(n, m): coefficient}, from coefficients by number.
 
-    A published numbering, such as that of Noll, assigns the number to each polynomial.
+    The number of a polynomial is its place in a published order, such as Noll's.
 
     given: {number: coefficient}, or a sequence of coefficients, the first of which has the number 1.
     mode: function that converts a number to a mode (n, m), such as `noll_mode`.
@@ -82,7 +82,9 @@ def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
 
 
 def modes_of_vector(given: Any) -> dict[Mode, float]:
-    """Return coefficients by mode from a vector ordered by the index of OSA, without derivatives.
+    """Return coefficients by mode, {(n, m): coefficient}, from a vector in the order of the OSA index.
+
+    Derivatives that the vector carries are dropped.
 
     Raises:
         ValueError: the argument is not a vector of 1 to 496 finite numbers.

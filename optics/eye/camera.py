@@ -84,7 +84,9 @@ def camera_image(
     sensor_distance: Scalar | None = None,
     tolerance: float = 1e-2,
 ) -> np.ndarray | Array:
-    """Return the image (channel, y, x) of a scene behind a pupil on a sensor, or the signals of an eye.
+    """Return the image (channel, y, x) that a camera or an eye forms of a scene.
+
+    A camera is a pupil with a sensor behind it. The image of an eye consists of the signals of its receptors.
 
     Light is blurred by the PSF of its distance and wavelength, and near surfaces hide far ones (see `Eye.see`). The
     blurred light is integrated over pixels and weighted by the filters. Electrons are counted with shot noise, up to
@@ -105,10 +107,10 @@ def camera_image(
         focuses an infinitely distant point, or 240 µm without a lens.
     tolerance: relative error of the PSF, see `Eye`.
 
-    Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons as float32. There is one channel with a
-    mosaic, and otherwise one for each type. If the pupil or `depth` carries derivatives, which requires bits=None, the
-    result is a Dr.Jit tensor of electrons. For an eye, the result is that of `Eye.see`. For PyTorch, see
-    `optics.torch.camera_image`.
+    Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons as float32. The image has one channel if
+    the sensor has a mosaic, and otherwise one channel for each type of filter. If the pupil or `depth` carries
+    derivatives, which requires bits=None, the result is a Dr.Jit tensor of electrons. For an eye, the result is that of
+    `Eye.see`. For PyTorch, see `optics.torch.camera_image`.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.

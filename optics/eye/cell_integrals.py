@@ -49,8 +49,8 @@ class Tiles:
 
     count: number of cells.
     size: side of a cell along the row [m].
-    from_cell: True if the light comes from all over a cell of the scene, whose geometric image is as large as a cell of
-        the retina. False if the light comes from a single point.
+    from_cell: True if the source of the light is an area of the scene. The geometric image of this area is as large as
+        a cell of the retina. False if the source is a single point.
     """
 
     count: int
@@ -64,10 +64,12 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
 
     The integrand is the spline through the samples. The row of cells is centred on the middle sample.
 
-    If tiles.from_cell is True, light comes from all points of a cell of the scene. The integrals are then averaged over
-    these points, which makes them PSF ⊗ cell ⊗ cell. The spline's coefficients c solve C c = s, where s are the samples
-    and C contains the B-splines at them. The integrals are Q c, where Q contains the B-splines' integrals over cells.
-    The matrix is therefore Q C⁻¹.
+    If tiles.from_cell is True, the source of the light is an area of the scene whose geometric image is as large as a
+    cell. The integrals are then averaged over the points of this area. The PSF is thus convolved twice with the width
+    of a cell.
+
+    The spline's coefficients c solve C c = s, where s are the samples and C contains the B-splines at them. The
+    integrals are Q c, where Q contains the B-splines' integrals over cells. The matrix is therefore Q C⁻¹.
 
     samples: number of samples.
     pitch: distance [m] between neighbouring samples.
@@ -100,7 +102,7 @@ def _over_samples(integrals: np.ndarray, degree: int) -> np.ndarray:
     """Return the matrix Q C⁻¹, which maps the samples of a function to the function's integrals over cells.
 
     Cells are the equal rectangles into which the retina is divided. The function is the spline through the samples, a
-    sum of B-splines. C contains the values of the B-splines at the samples. The shape is (cell, sample).
+    sum of B-splines. C contains the values of the B-splines at the samples. The shape of Q C⁻¹ is (cell, sample).
 
     integrals: Q, the integrals of the B-splines over the cells, array (cell, B-spline).
     """
@@ -131,7 +133,7 @@ def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
 
 
 def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np.ndarray:
-    """Return single or double integrals of B-splines from the first knot to each place, (place, B-spline).
+    """Return single or double integrals of B-splines from the first knot to each position, (position, B-spline).
 
     The integral of B_j is the sum of the B-splines of the next degree with index j or higher, times the width of B_j
     divided by its degree plus 1 (de Boor, A Practical Guide to Splines, ch. X).
@@ -146,7 +148,7 @@ def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np
 
 
 def _bsplines(knots: np.ndarray, degree: int, at: np.ndarray) -> Any:
-    """Return a sparse matrix (place, B-spline) of B-spline values."""
+    """Return the values of all B-splines at the positions `at`, as a sparse matrix (position, B-spline)."""
     from scipy.interpolate import BSpline
 
     return BSpline.design_matrix(at, knots, degree)

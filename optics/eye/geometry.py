@@ -62,7 +62,7 @@ def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
 def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
     """Raise a ValueError for a pupil that is not a Pupil, or is wider than `full_aperture` [m]; None is valid.
 
-    width: width [m] of the retina, which replaces `full_aperture` if that is None.
+    width: width [m] of the retina. If `full_aperture` is None, the pupil must not be wider than this width.
     """
     if full_aperture is not None:
         positive("full_aperture", full_aperture)

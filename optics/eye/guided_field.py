@@ -2,7 +2,7 @@
 
 A point source is imaged at the position v [m] relative to a waveguide. Of the source's light on the pupil, the
 waveguide accepts and absorbs the fraction E(v). If a receptor occupies the area A of the retina, its kernel is E(v)/A,
-integrated over cells. These are the equal rectangles into which every receptor's area is divided. For comparison, the
+integrated over each of the cells, the equal rectangles into which every receptor's area is divided. For comparison, the
 signal of a receptor that absorbs all light is the mean of the image over the area A. The waveguide stands where the ray
 through the pupil's centre hits the retina, and points at that centre. For a source imaged at u and a receptor at r, the
 kernel is a function of r - u = -v. It is therefore E rotated by 180°.
@@ -46,7 +46,7 @@ class Guide:
 
     focal: focal length f [m]. A receptor at the distance x from the axis sees an angle with the tangent x/f.
     cells: number of cells along a receptor's side. Cells are the equal rectangles into which a receptor's area on the
-        retina is divided. The scene is divided into cells whose geometric images are these rectangles.
+        retina is divided. A cell of the scene is the part of the scene whose geometric image is one of them.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
     """
 
@@ -75,7 +75,10 @@ def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, receptor: tupl
 
 
 def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
-    """Return the fraction of light that a receptor accepts from each cell around its direction: Dr.Jit (band, ky, kx).
+    """Return the fraction of light that a receptor accepts from each cell of the scene, Dr.Jit (band, ky, kx).
+
+    Cells of the scene are parts of it whose geometric images are equal rectangles. They lie around the receptor's
+    direction.
 
     ky and kx are even if `guide.cells` is even. Rows run from the top of the visual field to the bottom, columns from
     left to right.
@@ -100,13 +103,13 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """Return E, the fraction of a source's light that a waveguide accepts and absorbs, integrated over cells.
+    """Return integrals over cells of the scene of E, the fraction of a source's light that a waveguide absorbs.
 
     E depends on the source's direction. The cells, equal rectangles in the scene, form a window of directions around
-    that of the receptor. The window is widened until it contains the integral of E over all directions, except for a
-    fraction of at most the tolerance. Its half width is at most the half side of `spot` plus the radius of the
-    waveguide's modes. Directions are measured as tangents of angles, so each integral is in units of a squared tangent.
-    The result is an array (row, column), with one integral for each cell.
+    the receptor's direction. The window is widened until the integral of E outside it is at most the fraction
+    `retina.tolerance` of the integral over all directions. The half width of the window is at most `spot.half` plus the
+    radius of the waveguide's modes. Directions are measured as tangents of angles, so each integral is in units of a
+    squared tangent. The result is an array (row, column), with one integral for each cell.
 
     pitch: distance [m] between samples of the PSF on the retina.
     """
@@ -132,7 +135,7 @@ class _Cells:
 
     count: number of cells.
     side: side of a cell along the row.
-    pitch: distance between samples that resolves a receptor's field.
+    pitch: distance between samples of a receptor's field, small enough to resolve the field.
     """
 
     count: int
@@ -143,8 +146,9 @@ class _Cells:
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return quadrature nodes in every cell of the row, (cell, node), and the weights of the nodes, (node,).
 
-        At these directions, a receptor's field is evaluated, to integrate it over each cell. A node is the tangent of
-        an angle, minus the tangent of the direction of the row's middle. The weights sum to a cell's side.
+        Cells are the equal rectangles into which the scene is divided. A node is a direction at which a receptor's
+        field is evaluated, so that the field can be integrated over each cell. It is given as the tangent of an angle,
+        minus the tangent of the direction of the row's middle. The weights sum to a cell's side.
 
         from_cell: False for a single point in the centre of each cell.
         """
@@ -159,13 +163,17 @@ class _Cells:
     def step(self) -> float:
         """Distance between samples of a receptor's field, as a difference of the sines of two directions.
 
-        It is less than `pitch`, because splines interpolate the samples twice.
+        It is less than `pitch`, to limit the error of the splines that interpolate the samples.
         """
         return self.pitch * samples_per_cycle(self.tolerance) / samples_per_cycle(self.tolerance / FINER)
 
 
 def _radius(waveguide: Waveguide, beam: Beam) -> float:
-    """Return the radius [m] that contains the field of the best confined mode; ValueError if there is no mode."""
+    """Return the radius [m] that contains the field of the mode with the strongest confinement.
+
+    Raises:
+        ValueError: there is no mode.
+    """
     modes = waveguide.modes(beam.wavelength)
     if not modes:
         raise ValueError(f"waveguide: has no guided mode at {beam.wavelength:g} m; must be wider, or of a higher index")
@@ -202,7 +210,9 @@ def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cell
 
 
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
-    """Return a grid of sines that covers the sines x and y, with the margin that a spline needs.
+    """Return a grid that contains all points x, y, with the margin that a spline needs.
+
+    x, y: sines of the angles of directions, relative to the sines of the source's direction.
 
     Raises:
         AccuracyError: the grid needs more samples than the limit.

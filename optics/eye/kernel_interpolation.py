@@ -28,7 +28,7 @@ Place = tuple[float, ...]
 
 
 class NodeError(AccuracyError):
-    """The largest number of nodes leaves an interpolation error above the tolerance."""
+    """The interpolation error is above the tolerance even with the largest number of nodes that is tried."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,11 @@ def nodes(count: int) -> np.ndarray:
 def checks(counts: tuple[int, ...]) -> list[Place]:
     """Return the places at which the interpolation error is measured, for these numbers of nodes along each axis.
 
-    A single node lies in the middle of the range. The error is then measured at both ends of a range along one axis. In
-    a field with two axes, it is measured at the corners and at the middles of the sides. With more nodes, it is
-    measured halfway between nodes, along every axis with several nodes. If there are many such points, only a few are
-    used. Along one axis, these are evenly spaced. On two axes, they are the points next to all four corners and a few
-    between them, because the error of a pupil without symmetry may be largest at any corner.
+    If there is a single node, it lies in the middle. The error is then measured at both ends of the axis or, if there
+    are two axes, at the corners of the field and at the middles of its sides. With more nodes, it is measured halfway
+    between nodes, along every axis with several nodes. If there are many such points, only a few are used. If there is
+    one axis, these are evenly spaced. If there are two, they are the points next to all four corners and a few between
+    them, because the error of a pupil without symmetry may be largest at any corner.
     """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
@@ -80,7 +80,7 @@ def checks(counts: tuple[int, ...]) -> list[Place]:
 
 
 def _place(axes: Sequence[np.ndarray], shares: Iterable[float]) -> Place:
-    """Return a place whose coordinate along each axis is selected from the list of positions along this axis.
+    """Return a point: its coordinate along each axis is selected from the list of positions along this axis.
 
     axes: list of positions for each axis.
     shares: for each axis, where in the list the coordinate is found, from 0 for the first position to 1 for the last.
@@ -101,10 +101,10 @@ class NodeChoice:
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
     samples_per_receptor: number of kernel samples along a side of the area over which a receptor averages light. Errors
-        of signals are averaged over this area. With 1, there is no average.
-    white: function that returns the signal of a white surface with these kernels, divided by its signal with kernels
-        that lose no light. It is less than 1 behind masks and with waveguides. Errors are divided by it. With
-        waveguides, a call of this function takes long, because it computes a kernel.
+        of signals are averaged over this area. If the number is 1, errors are not averaged.
+    white: function that returns the signal of a white surface, as a fraction of its signal if kernels lost no light.
+        This fraction is less than 1 behind masks and with waveguides. Errors are divided by it. With waveguides, a call
+        of this function takes long, because it computes a kernel.
     known: kernels that have been computed, by place.
     """
 
@@ -137,7 +137,10 @@ class NodeChoice:
         )
 
     def error(self, counts: tuple[int, ...]) -> float:
-        """Return the largest measured interpolation error with these nodes, relative to the signal of white."""
+        """Return the largest measured interpolation error, relative to the signal of a white surface.
+
+        counts: number of nodes along each axis.
+        """
         coarse = _places(nodes(n) for n in counts)
         worst = 0.0
         for place in checks(counts):

@@ -50,7 +50,7 @@ class Fovea:
     def __call__(self, right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
         """Return the number of receptors per area of the flat retina, up to a constant factor.
 
-        right_deg, up_deg: angles [degrees] from the eye's axis of the directions that the receptors see.
+        right_deg, up_deg: directions that the receptors see, as angles [degrees] from the eye's axis.
         """
         right, up = self.center_deg
         return _per_length(right_deg, right, self.e2_deg) * _per_length(up_deg, up, self.e2_deg)
@@ -138,8 +138,8 @@ def density_on(
     """Return the relative density (row, column) on equal cells of the retina, from the top left of the visual field.
 
     resolution: number of receptors (height, width).
-    halves: half height and half width of the field on the plane at distance 1.
-    middle: tangents (right, down) of the direction of the field's middle.
+    halves: half height and half width of the field on the plane at distance 1 in front of the eye.
+    middle: position (right, down) of the field's middle on this plane, the tangents of its angles from the axis.
 
     Raises:
         ValueError: the values of a function are not positive and finite, or do not have the shape of its arguments.

@@ -1,4 +1,4 @@
-"""The retina, a plane that is divided into cells, and the limit on the computing time of a PSF on it."""
+"""The retina, a plane that is divided into cells, and errors about PSFs that need too many cells or too much time."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class Retina:
     def across_pupil(self, direction: tuple[float, float]) -> tuple[float, float]:
         """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.
 
-        Light from the right travels to the left of the eye's owner, which is +x. Light from below travels up, to +y.
-        Both signs are reversed if the pupil is turned.
+        Light from the right travels to the left, as seen by the eye's owner. This is the direction +x. Light from below
+        travels up, in the direction +y. Both signs are reversed if the pupil is turned.
 
         direction: tangents (right, down) of the source's direction in the visual field.
         """

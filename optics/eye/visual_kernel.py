@@ -1,4 +1,4 @@
-"""Receptive fields behind a pupil: integrals of the PSF over all cells of the retina that light of a source reaches."""
+"""Receptive fields behind a pupil: integrals of a source's PSF over each cell of the retina that its light reaches."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class _WindowNeeds:
 
     half_window: half side [m] of the window around the geometric image.
     pitch: pitch [m] that resolves the PSF.
-    band: frequency [1/m] beyond which light behind the pupil may be omitted, within the tolerance.
-    half_of_rays: half side [m] of a window for the rays alone, see `_half_side`.
+    band: highest frequency [1/m] of light behind the pupil that must be included to meet the tolerance.
+    half_of_rays: half side [m] of a window that is sufficient without diffraction, see `_half_side`.
     """
 
     half_window: float
@@ -60,7 +60,7 @@ class Spot:
     half: half the side [m] of the square around it that contains the light.
     pitch: sampling pitch [m] that resolves the PSF.
     needs: window and sampling that each wavelength requires.
-    on_retina: True if the square is limited to the light that may land on the retina, see `spot_of`.
+    on_retina: True if the square's size was limited. Light outside the square then counts as blocked, see `spot_of`.
     """
 
     centre: tuple[float, float]
@@ -71,11 +71,11 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """Half the side [m] of a square that contains the rays, without diffraction (`_half_side`); at most `half`."""
+        """The smaller of `half` and half the side [m] of a square that would be sufficient without diffraction."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:
-        """Return a grid that covers the square around the geometric image, and `beside` more samples on each side."""
+        """Return a grid that covers the square around the geometric image and a margin of `beside` samples."""
         side = 2 * (math.ceil(self.half / pitch) + beside) + 1
         return Grid((side, side), pitch, self.centre)
 
@@ -84,17 +84,17 @@ class Spot:
 
 
 def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
-    """Return the PSF of a point at distance z [m], integrated over the retina's cells: Dr.Jit (band, ky, kx), both odd.
+    """Return the PSF of a point at distance z [m], integrated over cells of the retina around the geometric image.
 
-    The cells lie around the geometric image. Their rows ascend with y and their columns with x. The image on the retina
-    is inverted, so that this is also the order of the visual field, from top to bottom and from left to right.
+    The result is a Dr.Jit tensor (band, row, column) with odd numbers of rows and columns. The rows ascend with y and
+    the columns with x. As the image is inverted, this is from top to bottom and left to right of the visual field.
 
     direction: tangents (right, down) of the source's direction in the visual field.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
 
     Raises:
         ValueError: the retina's distance carries derivatives, and the source is off the axis.
-        AccuracyError: no method reaches the tolerance within the limits, or the light covers too many cells.
+        AccuracyError: the limits on memory and time are too low for the tolerance, or the light covers too many cells.
     """
     import drjit as dr
 
@@ -128,14 +128,14 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float]) -> PSFResult:
-    """Return the PSF of a point at distance z [m]. It lacks at most `retina.tolerance` of the light of any wavelength.
+    """Return the PSF of a point at distance z [m], with at least 1 - `retina.tolerance` of each wavelength's light.
 
-    Light of a steep relief may count as blocked if it lands farther from the image than a side of the retina.
+    Light from a steep relief may count as blocked if it misses the geometric image by more than a side of the retina.
 
     direction: tangents (right, down) of the point's direction in the visual field.
 
     Raises:
-        AccuracyError: no method reaches the tolerance within the limits, or the light covers too many cells.
+        AccuracyError: the limits on memory and time are too low for the tolerance, or the light covers too many cells.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     return _on_spot(lambda spot: _spread(beams, spot, retina), beams, retina)
@@ -144,7 +144,7 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
     """Return the result of `compute` for the square that the light reaches or, if `compute` fails, a smaller square.
 
-    Two smaller ones are tried for steep reliefs: half the side is at most the retina's longer, then its shorter side.
+    Two smaller squares are tried for steep reliefs, with half sides up to the retina's longer or shorter side.
 
     Raises:
         AccuracyError: `compute` fails for every square. The error is the one for the first square.
@@ -167,13 +167,13 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
 
 
 def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
-    """Return the square around the geometric image that the light reaches.
+    """Return the square, centred on the geometric image, that contains the light.
 
-    most: largest half side [m]. If it equals the retina's longer side, the square still contains the light that arrives
-        at any receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
+    most: largest half side [m]. The retina's longer side is enough for the light from any point of the visual field to
+        any receptor. Light outside the square counts as blocked by the rim of the eye.
 
     Raises:
-        CellsError: too many cells, into which receptors are divided, would be necessary along the square's side.
+        CellsError: the square would be too many cells wide. Cells are the rectangles into which receptors are divided.
     """
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)
@@ -202,7 +202,7 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
 
 
 def _pitch_for_cells(pitch: float, retina: Retina) -> float:
-    """Return the largest pitch [m] for integrals over cells, given the `pitch` that the PSF itself requires."""
+    """Return the largest pitch [m] for integrals of the PSF over cells, given the `pitch` that resolves the PSF."""
     each = samples_per_cycle(retina.tolerance)
     return pitch * each / samples_per_cycle(retina.tolerance, min(retina.cell) / (pitch * each))
 
@@ -261,7 +261,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], fraction: float) -> float:
     """Return the half side [m] of the square about `centre` that contains this fraction of the rays' hit points.
 
-    behind: distance [m] and refractive index behind the pupil. Without dispersion, wavelengths share a cached result.
+    behind: distance [m] and refractive index behind the pupil.
     """
     x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
@@ -269,11 +269,11 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
 
 
 def _beyond_edge(pupil: Pupil, fraction: float) -> float:
-    """Return the change δ [1/m] of frequency beyond which an aperture's hard edge diffracts this fraction of the light.
+    """Return δ [1/m]: an aperture's hard edge changes the frequency of this fraction of the light by more than δ.
 
-    Diffraction changes the frequency of light by δ. The squared spectrum of a straight edge, integrated over changes
-    above δ, is 1/(2π²δ) per length. An aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ), a disk
-    1/(π²Rδ) (Airy pattern, Born & Wolf, §8.5.2). Behind a mask that is brighter along the edge, the fraction is larger.
+    The squared spectrum of a straight edge, integrated over changes above δ, is 1/(2π²δ) per length. For an aperture of
+    perimeter P and area A, the fraction is thus P/(2π²Aδ), and for a disk 1/(π²Rδ) (Airy pattern, Born & Wolf, §8.5.2).
+    Behind a mask that is brighter along the edge, the fraction is larger.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * fraction)
@@ -283,7 +283,7 @@ def _beyond_edge(pupil: Pupil, fraction: float) -> float:
 def _rim(pupil: Pupil) -> float:
     """Return the mean intensity behind the mask along the aperture's edge, divided by its mean over the aperture.
 
-    It is 1 without a mask. Values below 1 are replaced by 1: a steep rise of intensity near a dark edge also diffracts.
+    It is 1 without a mask. Values below 1 are replaced by 1: behind a dark edge, the rise of intensity diffracts light.
     """
     import drjit as dr
 
@@ -296,5 +296,5 @@ def _rim(pupil: Pupil) -> float:
 
 
 def _cells_within(half: float, cell: float) -> int:
-    """Return the odd number of cells that cover ±half around the image, with one cell centred on it."""
+    """Return the odd number of cells that cover the distance `half` on both sides of the middle of the middle cell."""
     return 2 * math.ceil(max(half / cell - 0.5, 0) - 1e-6) + 1

@@ -1,17 +1,17 @@
 """Methods that evaluate one diffraction integral, the first Rayleigh-Sommerfeld integral, exactly or approximately.
 
-Every method except the textbook's takes a `Problem` and returns `Sampling`s. A sampling predicts its time and error and
-computes the PSF on request. `optics.point_spread.planner` chooses between them. The window is the part of the sensor
-plane in which the PSF is computed.
+Every method except `textbook` takes a `Problem` and returns `Sampling`s. A sampling predicts its time and error and
+computes the PSF on request. `optics.point_spread.planner` chooses between the samplings of all methods. The window is
+the part of the sensor plane in which the PSF is computed.
 
-textbook             the angular spectrum in plain NumPy: start here
-carrier              the phase of a spherical wave, which methods remove from fields and restore
+textbook             the angular spectrum in plain NumPy, without optimisations, for readers to start with
+carrier              the phase of a spherical wave, removed from fields before interpolation and restored afterwards
 problem              Problem: the parameters of a computation
 pupil_edge           the soft edge of a pupil
 diffraction_kernel   the kernel of the integral, with its near field
 method_sampling      Sampling: the interface of all methods
-rayleigh_sommerfeld  the direct sum: the reference
-angular_spectrum     the angular spectrum on grids, propagated as a whole or with its paraxial part split off
+rayleigh_sommerfeld  the direct sum of the integral, the reference for all other methods
+angular_spectrum     the angular spectrum on grids, propagated in one step or in two: non-paraxial part, paraxial part
 spectrum_sampling    the grids between which the angular spectrum transforms fields, and the Fourier sums that do this
 row_blocks           blocks of rows of a large pupil, whose spectra are summed
 derivative_cells     nodes between the knots of spline maps, for derivatives with respect to the maps' samples
@@ -23,8 +23,8 @@ low_rank             one matrix product, with a Fourier kernel times a factor th
 slow_factor          the slow factor of `low_rank`, and the points of the window between which it is interpolated
 axis_kernel          the diffraction kernel along one axis of the window
 remaining_factor     the slow factor, divided by its values along both axes
-window_sampling      `low_rank` at coarse tolerances, for one PSF, with as few samples as its light needs
-window_plan          samples of several pupils at coarse tolerances: as few as the light in the window needs
+window_sampling      `low_rank` at coarse tolerances, for one PSF, with only the samples that the PSF requires
+window_plan          samples of several pupils at coarse tolerances, only as many as the light in the window requires
 window_geometry      the part of a `window_plan` that does not depend on reliefs and wavefronts
 window_edges         soft edges of pupils of a `window_plan`, and their sampling density; smoothed waves of wide pupils
 window_bands         spatial frequencies of the light and of the soft edges of `window_edges`

@@ -32,15 +32,20 @@ class HasDirections(Protocol):
 
     @property
     def elsewhere(self) -> float | np.ndarray:
-        """Sine along one axis for which the slow factor along the other axis is evaluated.
+        """A fixed sine, which selects the points of the pupil for which the slow factor is evaluated.
 
-        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Along x, it is evaluated for points
-        of the pupil with this sine along y. Along y, it is evaluated for points with this sine along x. The sine of the
-        pupil's centre is subtracted.
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The sines of a point are the x and y
+        components of the unit vector from the window's middle to the point. Along x, the slow factor is evaluated for
+        points whose sine along y is the fixed one. Along y, it is evaluated for points whose sine along x is the fixed
+        one. The value of this property is the fixed sine minus the sine of the pupil's centre.
         """
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupils at these sines, which are relative to the pupils' centres."""
+        """Return the points (x, y) [m] of the pupils that have the sines s along x and t along y.
+
+        Sines are the x and y components of the unit vector from the window's middle to a point. The sines of the
+        pupil's centre are subtracted from s and t.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +54,7 @@ class AxisFactor:
 
     The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window. The
     sines of a point of the pupil are the components of its direction along x and y, as seen from the middle of the
-    window. Points with different sines along `axis` have the same sine along the other axis. It is the sine of the
+    window. The points have different sines along `axis`. Along the other axis, the sine of each is the sine of the
     pupil's centre plus `samples.elsewhere`. The points, and the factor at the middle of the window, are computed once.
 
     sines: sines of the points along the axis, minus the sine of the pupil's centre. The array has as many dimensions as
@@ -62,9 +67,9 @@ class AxisFactor:
     sines: np.ndarray
 
     def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return amplitude and phase [waves] at positions [m] along the axis, relative to the middle of the window.
+        """Return amplitude and phase [waves] of the slow factor, relative to its value at the middle of the window.
 
-        The positions must have the dtype of the sines.
+        places: positions [m] along the axis, relative to the middle of the window, with the dtype of the field `sines`.
         """
         points, directions, middle = self.pupil
         none = np.zeros((1,) * self.sines.ndim, self.sines.dtype)
@@ -75,10 +80,11 @@ class AxisFactor:
 
     @cached_property
     def pupil(self) -> tuple[Pair, Pair, Pair]:
-        """Points of the pupil, their directions, and amplitude and phase of the slow factor in the window's middle.
+        """Points of the pupil, their directions, and the slow factor of each point.
 
-        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Points are (x, y) [m], directions
-        are sines along x and y relative to the pupil's centre, and the phase is in waves.
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Its amplitude and phase are those at
+        the middle of the window. Points are (x, y) [m], directions are sines along x and y relative to the pupil's
+        centre, and the phase is in waves.
         """
         kind, elsewhere = self.sines.dtype, self.samples.elsewhere
         none = np.zeros((1,) * self.sines.ndim, kind)
@@ -93,10 +99,11 @@ class AxisFactor:
 def axis_factor(path: Path, samples: HasDirections, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return the complex factor that `AxisFactor` describes, at positions [m] relative to the middle of the window.
 
-    Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
-    that kernel.
+    Like the Fourier kernel along this axis, the factor depends on two numbers only, the position and the sine of a
+    point of the pupil. It can therefore be included in that kernel. Sines are components of the unit vector from the
+    middle of the window to the point.
 
-    sines, places: sines and positions along the axis, which broadcast.
+    sines, places: sines, minus the sine of the pupil's centre, and positions along the axis, which broadcast.
     """
     sines = sines.reshape((1,) * (places.ndim - sines.ndim) + sines.shape)
     return np.asarray(turned(*AxisFactor(path, samples, axis, sines).at(places), "float64"))
@@ -116,8 +123,8 @@ def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, d
 def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
     """Return the diffraction kernel along x (0) or y (1) at all columns or rows of the window, see `axis_kernel`.
 
-    If amplitude and phase are smooth, they are interpolated from a few sines and positions. The result is a complex
-    array (pupil, column or row, sample).
+    If amplitude and phase of the kernel are smooth, they are computed for only a few directions of points of the pupil
+    and a few positions, and interpolated. The result is a complex array (pupil, column or row, sample).
     """
     at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
     if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
@@ -132,7 +139,9 @@ def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.n
 
 @dataclass(eq=False)
 class AxisRows:
-    """Rows of the `axis_kernel` for positions of the window. For a single pupil, each row is computed only once.
+    """Rows of the matrix `axis_kernel`, one for each position along an axis of the window.
+
+    For a single pupil, each row is computed only once.
 
     path, samples, axis, dtype: see `axis_kernel`.
     """
@@ -148,7 +157,10 @@ class AxisRows:
         self._rows = np.empty((count, self.samples.at.shape[1]), np.result_type(self.dtype, np.complex64))
 
     def at(self, places: np.ndarray) -> np.ndarray:
-        """Return the kernel at positions of the window with the indices `places`, (stack, place, sample)."""
+        """Return the kernel at some positions along the axis, an array (pupil, position, sample).
+
+        places: indices of these positions among the window's columns or rows.
+        """
         if len(self.samples.at) > 1:
             return self._computed(places)
         known = self._known[places]
@@ -167,7 +179,13 @@ class AxisRows:
 def _whole(
     path: Path, samples: SineStack, axis: int, sines: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return amplitude and phase [waves] of `axis_kernel`, (stack, place, sine)."""
+    """Return amplitude and phase [waves] of the diffraction kernel along an axis, arrays (pupil, position, sine).
+
+    The kernel is relative to its value at the middle of the window, see `axis_kernel`.
+
+    sines: sines of points of the pupil along the axis, minus the sine of the pupil's centre, (pupil, sine).
+    places: positions [m] along the axis, relative to the middle of the window, (pupil, position).
+    """
     sines, places = sines[:, None, :], places[:, :, None]
     size, waves = AxisFactor(path, samples, axis, sines).at(places)
     wavelength, _ = path.numbers(3)

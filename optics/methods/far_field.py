@@ -1,8 +1,8 @@
-"""The Rayleigh-Sommerfeld integral by Fourier transforms of the light in the pupil, as functions of direction.
+"""The Rayleigh-Sommerfeld integral by Fourier transforms of the light in the pupil, from points to directions.
 
-The kernel of the integral is a Fourier kernel times a factor that varies slowly over the window. One transform, with
-the factor of one point of the window (a node), is computed for each of a few nodes. The results are interpolated
-between the nodes.
+The window is the part of the sensor plane in which the PSF is computed. The kernel of the integral is a Fourier kernel
+times a factor that varies slowly over the window. With the value of this factor at one point of the window, the
+integral is a Fourier transform. It is computed for a few such points, the nodes, and interpolated between them.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ POINTS = 150  # choice: points of the pupil at which the slow factors of nodes a
 class FarFieldSampling:
     """Samples of the pupil and of direction cosines, and nodes over the window.
 
-    The pitch of the direction cosines is the wavelength, divided by period x pitch of the pupil. The nodes are
-    Chebyshev points in the angle atan(x/z), because the kernel as a function of x has poles at ±iz, with z the distance
-    of the window.
+    The pitch of the direction cosines is λ/(period · pitch), with the wavelength λ and the pitch of the pupil grid. The
+    nodes are Chebyshev points in the angle atan(x/z), because the kernel as a function of x has poles at ±iz, with z
+    the distance of the window.
     """
 
     edge: PupilEdge
@@ -69,10 +69,11 @@ class FarFieldSampling:
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, for an estimate of their size.
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
 
-        The power of all rounding errors is a fraction of the power of the light, see `Sampling.plane`. The width is
-        one period of the Fourier transform of the pupil's samples.
+        The power of all rounding errors is a fraction of the power of the light. Their size in the window is estimated
+        from this power and the width, see `Sampling.plane`. The width is one period of the Fourier transform of the
+        pupil's samples.
         """
         return problem.wavelength * problem.distance / self.pupil.dx
 
@@ -151,17 +152,18 @@ def _nodes(problem: Problem, count: int) -> WindowNodes:
 
 
 def _step(error: float) -> float:
-    """Return the phase step [rad] between samples of a unit wave for this error of eight-point Lagrange interpolation.
+    """Return the difference of phase [rad] between samples of a wave at which interpolation has this error.
 
-    The step is at most 1.5.
+    The wave has the amplitude 1 and is interpolated by eight-point Lagrange polynomials. The difference is at most 1.5.
     """
     return min(1.5, (error / LAGRANGE_8) ** 0.125)
 
 
 def _nodes_needed(problem: Problem, error: float) -> int | None:
-    """Return the number of Chebyshev nodes along an axis that interpolate the kernel's slow factor; None if too many.
+    """Return how many Chebyshev nodes along an axis are sufficient to interpolate the slow factor.
 
-    Interpolation is tested for points on the rim of the aperture.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The result is None if the largest number
+    that is tried is not sufficient. Interpolation is tested for points on the rim of the aperture.
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
@@ -180,7 +182,7 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
 
 @lru_cache(maxsize=len(CHEBYSHEV_NODES))
 def _between(n: int) -> np.ndarray:
-    """Return interpolation weights of n Chebyshev points at the test positions, (point, position)."""
+    """Return weights that interpolate from n Chebyshev points to TRIED evenly spaced positions, (point, position)."""
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(n))
 
 

@@ -71,10 +71,11 @@ class HankelSampling:
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, for an estimate of their size.
+        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
 
-        The power of all rounding errors is a fraction of the power of the light, see `Sampling.plane`. The width is
-        twice the sum of the pupil's radius and of the largest radius at which the image is computed.
+        The power of all rounding errors is a fraction of the power of the light. Their size in the window follows from
+        this power and the width, see `Sampling.plane`. The width is twice the sum of the pupil's radius and of the
+        largest radius at which the image is computed.
         """
         return 2 * (self.line.radius + problem.radius)
 
@@ -161,7 +162,10 @@ def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -
 
 
 def _transform(field: Field, at: Array, to: Array, types: Precision, exactly: bool) -> Field:
-    """Return Σ_j u_j J₀(2π at_j to_k) for every k, where u is the field. `exactly` selects J₀ with all digits."""
+    """Return Σ_j u_j J₀(2π at_j to_k) for every k, where u is the field.
+
+    exactly: True to compute J₀ in float64 with an error of 1e-15 instead of 1e-12.
+    """
     import drjit as dr
 
     n, m = dr.width(at), dr.width(to)

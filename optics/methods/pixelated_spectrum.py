@@ -67,12 +67,12 @@ class PixelSpectrum(SpectrumSampling):
 
 
 def whole_pixel_spectrum(problem: Problem) -> list[PixelSpectrum]:
-    """Return samplings that meet the problem's tolerance if the angular spectrum is propagated in one step."""
+    """Return samplings that propagate the angular spectrum in one step and meet the problem's tolerance."""
     return _samplings(problem, "angular_spectrum")
 
 
 def split_pixel_spectrum(problem: Problem) -> list[PixelSpectrum]:
-    """Return samplings that meet the problem's tolerance if the angular spectrum is propagated in two steps.
+    """Return samplings that propagate the angular spectrum in two steps and meet the problem's tolerance.
 
     The first step leaves out the paraxial part of the phase. The second step, Fresnel's integral, adds this part.
     """
@@ -93,8 +93,8 @@ def _samplings(problem: Problem, method: str) -> list[PixelSpectrum]:
 def _nodes(problem: Problem, taper: Taper) -> PixelSamples | None:
     """Return quadrature nodes in each pixel. They are dense enough for the pupil's phase and for the angular spectrum.
 
-    The nodes resolve all frequencies of the spectrum below the end of the taper, which fades it out. The result is None
-    if pixels would need too many nodes.
+    The taper is a function of frequency that fades the spectrum out. The nodes resolve all frequencies below the end of
+    the taper. The result is None if pixels would need too many nodes.
     """
     if problem.knots is not None:
         return cell_samples(problem, taper.end)

@@ -1,10 +1,11 @@
 """The remaining factor of the diffraction kernel, after the parts that depend on x alone or on y alone are removed.
 
 The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `slow_factor`). It has
-two axis factors. The one along x consists of its values on the x axis of the window, for light from points of the pupil
-that differ from each other only in their sine along x. The one along y is its counterpart (see `AxisFactor`). The
-remaining factor is the slow factor divided by both axis factors. All are relative to their values at the middle of the
-window. The remaining factor varies even more slowly over the window than the slow factor.
+two axis factors (see `AxisFactor`). The axis factor along x is the slow factor on the x axis of the window, for light
+from points of the pupil that all have the same sine along y. The axis factor along y is the slow factor on the y axis,
+for light from points that all have the same sine along x. The remaining factor is the slow factor divided by both axis
+factors. All are relative to their values at the middle of the window. The remaining factor varies even more slowly over
+the window than the slow factor.
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ __all__ = ["RemainingFactor"]
 
 @dataclass(frozen=True, eq=False)
 class RemainingFactor:
-    """Slow factor divided by its values along x and along y, for light from some points of pupils to a window.
+    """The diffraction kernel divided by a Fourier kernel and by two factors, of which one depends on x and one on y.
 
-    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. Parts that do not
-    depend on the position in the window are computed once.
+    The kernel describes light from some points of pupils to a window. The slow factor is the factor by which it differs
+    from a Fourier kernel. The two factors are the slow factor along x and along y (see `AxisFactor`). Intermediate
+    results that do not depend on the position in the window are computed once.
 
     directions: x and y components (s, t) of the unit vectors from the middle of the window to the points, minus those
         of the unit vector to the pupil's centre.
@@ -41,9 +43,10 @@ class RemainingFactor:
     dtype: str = "float64"
 
     def at(self, window: Pair) -> np.ndarray:
-        """Return the remaining factor for light that arrives at positions of the window, complex.
+        """Return the complex remaining factor for light that arrives at positions of the window.
 
-        It is the slow factor (kernel over Fourier kernel), divided by its axis factors, its values along x and along y.
+        The slow factor is the diffraction kernel divided by a Fourier kernel. The remaining factor is the slow factor
+        divided by two axis factors, the slow factor along x and the slow factor along y (see `AxisFactor`).
 
         window: positions (u, v) [m] relative to the middle of the window. They have as many dimensions as the
             attribute `directions`, with which they broadcast.
@@ -58,7 +61,9 @@ class RemainingFactor:
         return values.astype(self._kind, copy=False)
 
     def divided(self, window: Pair, along: Sequence[Pair | np.ndarray]) -> np.ndarray:
-        """Return the remaining factor: the slow factor (kernel over Fourier kernel), divided by given axis factors.
+        """Return the slow factor divided by given axis factors, which are the slow factor along x and along y.
+
+        The slow factor is the diffraction kernel divided by a Fourier kernel.
 
         window: positions (u, v) [m] relative to the middle of the window, as `rounded` returns them.
         along: amplitude and phase [waves] of the axis factors at u and at v, as `AxisFactor.at` returns them.
@@ -75,8 +80,9 @@ class RemainingFactor:
     def _paired(self, window: Pair) -> np.ndarray:
         """Return the remaining factor for pairs of one point of the pupil and one position (u, v) in the window.
 
-        It is the slow factor (the kernel divided by a Fourier kernel), divided by its axis factors. The slow factor is
-        evaluated at (u, v), (u, 0) and (0, v) together. The last two values are the axis factors.
+        The slow factor is the diffraction kernel divided by a Fourier kernel. It is evaluated at (u, v), (u, 0) and
+        (0, v) together. The values at (u, 0) and (0, v) are called axis factors. The remaining factor is the value at
+        (u, v) divided by both axis factors.
 
         window: positions u and v [m], arrays of the same shape as the attribute `directions`.
         """
@@ -89,12 +95,14 @@ class RemainingFactor:
 
     @cached_property
     def _three(self) -> tuple[Pair, Pair, Pair]:
-        """Points of the pupil, their directions, and amplitude and phase of the slow factor at the window's middle.
+        """Points of the pupil, their sines, and amplitude and phase of the slow factor at the window's middle.
 
-        The slow factor is the kernel divided by a Fourier kernel. Axis 1 of the arrays counts the values for this
-        factor itself, and for the slow factor along the x axis and along the y axis of the window (`AxisFactor`). For
-        the x axis, all points of the pupil have one fixed sine along y. For the y axis, they have one along x. The sine
-        is that of the direction from the window's middle. The shapes are (pupil, 3, ...).
+        The slow factor is the diffraction kernel divided by a Fourier kernel. The sines of a point are the x and y
+        components of the unit vector from the window's middle to the point, minus those of the pupil's centre.
+
+        Each array has the shape (pupil, 3, ...). Its axis 1 counts three cases: the points of this factor, the points
+        of the `AxisFactor` along x, whose sines along y are all the same, and the points of the `AxisFactor` along y,
+        whose sines along x are all the same.
         """
         _, points, directions = self._pupil
         own, shape = (points, directions, self._middle), directions[0].shape
@@ -107,7 +115,10 @@ class RemainingFactor:
 
     @cached_property
     def along(self) -> tuple[AxisFactor, AxisFactor]:
-        """Axis factors: the slow factor along x and along y, relative to the middle of the window."""
+        """The diffraction kernel divided by a Fourier kernel, along x and along y.
+
+        Both factors are relative to their values at the middle of the window.
+        """
         path, _, (s, t) = self._pupil
         return AxisFactor(path, self.samples, 0, s), AxisFactor(path, self.samples, 1, t)
 
@@ -118,9 +129,10 @@ class RemainingFactor:
 
     @cached_property
     def _pupil(self) -> tuple[Path, Pair, Pair]:
-        """The attribute `path`, points (x, y) [m] of the pupil, and the `directions` (s, t) of these points.
+        """Three values: the attribute `path`, points (x, y) [m] of the pupil, and the attribute `directions` (s, t).
 
-        Their numbers are rounded to the type in which path lengths are computed, see `rounded`.
+        The points are those that lie in these directions. The numbers in all three values are rounded to the type in
+        which path lengths are computed (see `rounded`).
         """
         points = self.samples.points_at(*self.directions)
         if self._kind == "float64":
@@ -132,7 +144,7 @@ class RemainingFactor:
     def _middle(self) -> Pair:
         """Amplitude and phase [waves] of the slow factor at the middle of the window.
 
-        It is the factor by which the diffraction kernel differs from a Fourier kernel.
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel.
         """
         path, points, directions = self._pupil
         none = np.zeros((1,) * directions[0].ndim, self._kind)

@@ -1,5 +1,6 @@
-"""Heights of reliefs and aberrations of wavefronts at samples of the pupil, from arrays that many pupils share.
+"""Heights of reliefs and aberrations of wavefronts at samples of the pupil.
 
+They are computed from weights that are stored, because they are the same for many pupils.
 An aberration is the length [m] by which a wavefront is ahead of the wavefront without aberrations.
 Polynomials are interpolated from a few points across the pupil. A relief or wavefront can also be a map, a table of
 values that cubic splines interpolate. Its values at the samples are the product of a sparse matrix and the coefficients
@@ -77,7 +78,9 @@ def sampled_wavefront(pupil: Pupil, samples: WindowSamples, convert: Convert) ->
 
 
 def _of_map(surface: HeightMap | WavefrontMap, radius: float, samples: WindowSamples, convert: Convert) -> Array:
-    """Return the height or length [m] that a map has at each sample of the pupil, array (row, column) of samples.
+    """Return the value [m] of a map at each sample of the pupil, interpolated by splines, array (row, column).
+
+    It is the height of a relief, or the length by which a wavefront is ahead of the wavefront without aberrations.
 
     radius: half the side of the map [m].
     """
@@ -94,8 +97,8 @@ def _interpolated(
 ) -> Array:
     """Return values at samples, array (row, column), interpolated from a few points of the pupil if possible.
 
-    values: function of NumPy arrays x and y [m]. It returns an array of NumPy or PyTorch, the library in which
-        `convert` creates arrays.
+    values: function of NumPy arrays x and y [m]. It returns an array of the same library (NumPy or PyTorch) as
+        `convert`.
     powers: number of powers of x and of y of a polynomial; None for other functions, which are not interpolated.
     """
     many, few = len(samples.at), (powers or 0) + SPHERE_POINTS

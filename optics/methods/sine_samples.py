@@ -1,4 +1,4 @@
-"""Samples of a pupil that are evenly spaced in their sines, as seen from the window's centre.
+"""Samples of a pupil with evenly spaced sines, which are components of directions from the window's centre.
 
 The sines of a point are the x and y components of the unit vector from the window's centre to the point. The distance
 from a point ξ of the pupil to points x = c + u of a window about c is
@@ -48,9 +48,8 @@ class SineSamples:
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: a component of s - s₀. `axis_kernel.AxisFactor` computes how the diffraction kernel differs from a
-        Fourier kernel along one axis of the window, x or y. It does so for points of the pupil whose s - s₀ has this
-        component along the other axis.
+    elsewhere: a fixed value of a component of s - s₀. `axis_kernel.AxisFactor` evaluates the diffraction kernel along
+        one axis of the window, x or y, for points of the pupil whose s - s₀ has this value along the other axis.
     """
 
     edge: PupilEdge
@@ -104,8 +103,8 @@ class SineSamples:
     def light(self, beam: Beam, dtype: str) -> np.ndarray:
         """Return the result of `field` as a complex NumPy array (y, x), without derivatives.
 
-        dtype: type of the real and imaginary parts, to which the phase is rounded after whole waves are subtracted,
-            "float32" or "float64".
+        dtype: type of the real and imaginary parts, "float32" or "float64". The phase is rounded to the same type after
+            whole waves are subtracted.
         """
         x, y, weight = self.layout
         if beam.pupil.mask is not None:
@@ -147,7 +146,8 @@ class SineSamples:
     def field(self, beam: Beam, types: Precision) -> Field:
         """Return the field behind the pupil times the areas of the samples [m²].
 
-        The area is dξ dη = z²/cos⁴θ ds dt for a ray at the angle θ, with the sines (s, t).
+        The area of a sample is dξ dη = z²/cos⁴θ ds dt. Here z is the distance between pupil and window, (s, t) are the
+        sines of the sample, and θ is the angle between the axis and the line from the window's centre to the sample.
         """
         import drjit as dr
 
@@ -163,7 +163,7 @@ class SineSamples:
 
 @lru_cache(maxsize=64)
 def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return `SineSamples.layout`. Many PSFs have the same samples, so it is cached."""
+    """Return `SineSamples.layout`. Many PSFs have the same samples, so the layout is cached."""
     types, radius = precision("float64"), samples.edge.radius
     sx, sy = np.meshgrid(samples.at + samples._middle[0], samples.at + samples._middle[1])
     x, y = samples.points_at(sx - samples._middle[0], sy - samples._middle[1])
@@ -189,23 +189,24 @@ def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]
 def sine_samples(problem: Problem) -> SineSamples | None:
     """Return the fewest samples that resolve the phase over the pupil; None if their spacing would be too uneven.
 
-    It is the phase of the light behind the pupil plus the phase of the path from there to a point of the window. The
-    result is also None if the grid would be too large.
+    The phase is the sum of the phase of the light behind the pupil and the phase of the path from the pupil to a point
+    of the window. The result is also None if the grid would be too large.
     """
     edge = problem.soft_edge(problem.turning)
     return evenly_in_sines(problem, edge, problem.turning + edge.stopband)
 
 
 def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: float = 0.0) -> SineSamples | None:
-    """Return samples that resolve a number of cycles per metre of the pupil.
+    """Return samples that resolve light behind the pupil whose phase varies by up to `cycles` cycles per metre.
 
     The result is None if samples that are evenly spaced in sines are too uneven in the pupil, or if the grid would be
     too large.
 
-    The distance between two points in the pupil is at most z/cos³θ times the distance between their sines, with θ the
-    angle of the steepest ray. The number of cycles per unit of sine is therefore `cycles` times this factor.
+    The distance between two points in the pupil is at most z/cos³θ times the difference between their sines. Here z is
+    the distance between pupil and window, and θ is the angle of the steepest ray. The number of cycles per unit of sine
+    is therefore `cycles` times this factor.
 
-    cycles: number of cycles per metre [1/m].
+    cycles: number of cycles per metre in the pupil's plane [1/m].
     shift: distance by which the grid is shifted along both axes, in units of its pitch, at most 1.
     """
     angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)

@@ -1,7 +1,7 @@
-"""Samples of several pupils at once, evenly spaced in sines as in `sine_samples`, the same number for each pupil.
+"""Samples of several pupils at once, with evenly spaced sines (see `sine_samples`), the same number in each pupil.
 
-All arrays are of NumPy, and their first axis counts the pupils. It has length 1 if the light of several wavelengths or
-sources passes the same samples.
+All arrays are of NumPy, and their first axis counts the pupils. If the light of several wavelengths or sources passes
+the same pupil, its samples are stored once, and the first axis has length 1.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class SineGeometry:
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
     steepest: sines of the angle between the axis and the line to the outermost sample with light, (pupil,).
-    elsewhere: a fixed sine for each pupil, minus the sine of the pupil's centre, (pupil,). `axis_kernel.AxisFactor`, a
-        factor of the kernel along x or y, is computed for points with the fixed sine along the other axis.
+    elsewhere: a fixed sine for each pupil, minus the sine of the pupil's centre, (pupil,). `axis_kernel.AxisFactor`
+        evaluates the kernel along x for points with this sine along y, and along y for points with this sine along x.
     """
 
     distance: np.ndarray
@@ -58,13 +58,14 @@ class SineGeometry:
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the sines of points (x, y) [m] of the pupils, minus the sines of the pupils' centres.
 
-        Sines are the x and y components of the unit vector from the window's centre to a point, each (pupil, ...).
+        Sines are the x and y components of the unit vector from the window's centre to a point. Both arrays have the
+        shape (pupil, ...).
         """
         sx, sy = _sines(x, y, self.centre, _aligned(self.distance, x))
         return sx - _aligned(self._middle[0], sx), sy - _aligned(self._middle[1], sy)
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupils whose `directions` are (s, t)."""
+        """Return those points (x, y) [m] of the pupils for which `directions` returns (s, t)."""
         sx, sy = s + _aligned(self._middle[0], s), t + _aligned(self._middle[1], t)
         slant = _aligned(self.distance, sx) / np.sqrt(self._squared_cosine(sx, sy))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
@@ -77,13 +78,13 @@ class SineGeometry:
 
 @dataclass(frozen=True, eq=False)
 class SineStack(SineGeometry):
-    """Soft apertures on grids of sines, the components of unit vectors from the window's centre to the samples.
+    """Soft apertures, sampled on grids of sines. `SineGeometry` defines sines.
 
     at: sines along either axis minus those of the pupil's centre, (pupil, sample), evenly spaced.
     edges: soft apertures, (pupil,).
     radius: radii [m], (pupil,).
-    curvature: local frequency c at the rim [cycles per radius] of a curved wave e^{iπcr²} by which the aperture is
-        multiplied before its edge is softened, see `curved_ring`; 0 without such a wave, (pupil,).
+    curvature: local frequency c [cycles per radius] at the rim of a curved wave e^{iπcr²}, (pupil,). The hard aperture
+        is multiplied by this wave before the edge is softened, see `curved_ring`. 0 if there is no such wave.
     """
 
     at: np.ndarray
@@ -128,13 +129,13 @@ class SineStack(SineGeometry):
         return (self.at + sx)[:, None, :] * slant + self.centre[0], (self.at + sy)[:, :, None] * slant + self.centre[1]
 
     def arriving(self, stack: LightStack, dtype: str) -> np.ndarray:
-        """Return the contribution of each sample to the field at the middle of the window, (beam, y, x), complex.
+        """Return the complex contribution of each sample to the field at the middle of the window, (beam, y, x).
 
         It is the light behind the pupils, times the areas of the samples, times z/(λD²) (1/(kD) - i) e^{ik(D - ρ)}, up
         to a constant phase. D and ρ are the distances from the middle of the window to the sample and to the pupil's
         centre. z is the distance between the planes of pupil and window, and k the wave number.
 
-        dtype: type of the real and imaginary parts, and of the phase without whole waves, "float32" or "float64".
+        dtype: type of real and imaginary parts, and of the phase after whole waves are removed, "float32" or "float64".
         """
         size = self._sizes(dtype) / stack.wavelength[:, None, None].astype(dtype)
         if any(beam.pupil.mask is not None for beam in stack.beams):
@@ -188,16 +189,17 @@ class SineStack(SineGeometry):
         return found
 
     def _waves(self, stack: LightStack) -> np.ndarray:
-        """Return the paths through all samples to the middle of the window, in waves up to a constant, (beam, y, x).
+        """Return paths [waves] from the source through all samples to the window's middle, (beam, y, x).
 
-        Paths without fine detail are interpolated from a few points of the pupil if no sine exceeds SMOOTH_SINE.
+        A constant is omitted. Paths that vary smoothly are interpolated from a few points of the pupil. This requires
+        that the sines of the angles between the axis and the rays to the window do not exceed SMOOTH_SINE.
         """
         count = stack.smooth_points
         if count is None or count >= self.at.shape[1] or not self.smooth(0.0):
             return self._paths(stack, *self.points)
 
         def computed() -> tuple[np.ndarray, np.ndarray]:
-            """Return, at Chebyshev points, paths [waves] without reliefs and wavefronts, and the powers y^i x^j."""
+            """Return paths [waves] without relief and aberration, and polynomial terms y^i x^j, at Chebyshev points."""
             side = self.at[:, [0, -1]]
             nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
             points = self.points_at(nodes[:, None, :], nodes[:, :, None])
@@ -210,7 +212,7 @@ class SineStack(SineGeometry):
         return np.asarray(weight @ paths @ weight.T)
 
     def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the paths through points (x, y) [m], in waves up to a constant."""
+        """Return paths [waves] from the source through points (x, y) [m] to the window's middle, without a constant."""
         return np.asarray(stack.waves(x, y) + self._to_middle(stack.wavelength[:, None, None], x, y)[1])
 
     def _to_middle(self, wavelength: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -232,13 +234,13 @@ class SineStack(SineGeometry):
 def rim_sines(
     outermost: np.ndarray, centre: tuple[float, float], distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return half the width of the grid of sines that each pupil needs, and two further properties of its rim.
+    """Return three properties of each pupil's rim, which determine the grid of sines with which it is sampled.
 
-    Sines are the x and y components of the unit vector from the window's centre to a point. The first result is the
-    largest difference, along x or y, between the sine of a point on the rim and the sine of the pupil's centre. The
-    second is the largest sine of the angle between the axis and the line to a point on the rim. The third is True for
-    pupils in which samples with evenly spaced sines are fairly evenly spaced [m] in the pupil's plane, too: their
-    spacing at the rim is at most MOST_STRETCH times that at the centre. All are arrays (pupil,).
+    Sines are the x and y components of the unit vector from the window's centre to a point. The first result is half
+    the width of the grid: the largest difference, along x or y, between the sine of a point on the rim and that of the
+    pupil's centre. The second is the largest sine of the angle between the axis and the line to a point on the rim. The
+    third is True for pupils in which samples with evenly spaced sines are fairly evenly spaced in the pupil's plane,
+    too: their spacing [m] at the rim is at most MOST_STRETCH times that at the centre. All are arrays (pupil,).
 
     outermost: radii [m] of the rims.
     """
@@ -286,8 +288,9 @@ def _profile(edge: SoftAperture, curvature: float, dtype: str) -> np.ndarray:
 
     Its values are in the middle of equal steps of r² up to the outermost radius with light, followed by a 0.
 
-    curvature: if it is not 0, the values for a ring are those of `curved_ring`, complex in single precision.
-    dtype: type of the table in all other cases, "float32" or "float64".
+    curvature: if it is not 0, and the aperture is a circle or a ring, the table contains the result of `curved_ring`,
+        complex in single precision.
+    dtype: type of the table otherwise, "float32" or "float64".
     """
     if curvature and isinstance(edge, SoftAnnulus):
         return np.append(curved_ring(edge.edge, edge.inner, curvature, SMOOTHED_LEVELS), 0)

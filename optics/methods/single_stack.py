@@ -1,6 +1,7 @@
-"""Samples of a single pupil as a stack of one, kept for further PSFs with the same samples.
+"""Samples of a single pupil as a `SineStack`, the samples of several pupils, that contains only this pupil.
 
-A stack keeps arrays (`SineStack.known`), whose memory grows with the number of samples.
+The stack is kept for further PSFs with the same samples. It keeps arrays (`SineStack.known`), whose memory grows with
+the number of samples.
 """
 
 from __future__ import annotations

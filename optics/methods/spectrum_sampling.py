@@ -1,6 +1,7 @@
 """Grids for propagation by the angular spectrum, and the Fourier sums that transform a field from one grid to another.
 
-There are grids of the spectrum, of the relay plane of the split method, and of the window (see `angular_spectrum`).
+There are grids of the spectrum, of the window, and of the relay plane. The relay plane is an intermediate plane of the
+split method, which propagates light to the window in two steps (see `angular_spectrum`).
 """
 
 from __future__ import annotations
@@ -25,13 +26,14 @@ __all__ = ["SpectrumSampling"]
 
 
 class SpectrumSampling:
-    """Samples of a spectrum and of the planes onto which it is transformed.
+    """Grid of the spectrum of the light behind a pupil, and grids in the planes where the field is computed from it.
 
     method: "angular_spectrum" or "split_angular_spectrum".
     taper: taper that fades the spectrum out.
     period: width [m] after which the field in the pupil's plane repeats. The spectrum's samples are 1/period apart.
-    output_period: number of samples per period in the window's plane or, with the split method, in the `relay` plane.
-    even: True if the field is even in x and y. A quarter of each plane is then sufficient.
+    output_period: number of samples after which the field in the window's plane repeats. With the split method, it is
+        this number in the `relay` plane.
+    even: True if the field is even in x and y. A quarter of the samples of each plane is then sufficient.
     """
 
     method: str
@@ -63,16 +65,17 @@ class SpectrumSampling:
         return Grid.square(self.output_period, self.period / self.output_period)
 
     def part(self, grid: Grid) -> Grid:
-        """Return the samples of a grid that represent a field: a quarter of them if the field is even, else all."""
+        """Return the part of a grid on which a field is stored: a quarter if the field is even in x and y, else all."""
         return quarter(grid) if self.even else grid
 
     def sum(self, field: Field, start: Grid, period: Scalar, end: Grid, sign: int, first: int = 0) -> Field:
-        """Return the Fourier sum over a field's samples on one grid, at the samples of another; see `fourier.dft2`.
+        """Return the Fourier sum of a field on one grid, computed at the samples of another grid; see `fourier.dft2`.
 
-        start, end: grids before and after the sum.
-        period: number of samples after which the sum repeats the field.
+        start: grid of the field.
+        period: number of samples of the result after which it repeats.
+        end: grid of the result.
         sign: sign of the exponent.
-        first: first row of the field, if it contains only some rows of the grid.
+        first: index of the field's first row in `start`, if the field contains only some rows of this grid.
         """
         if self.even:
             return even_sum(field, start.shape, period, end, first)
@@ -123,7 +126,7 @@ class SpectrumSampling:
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`.
 
-        The square lies in the plane of the window. The Fourier sum that computes the field in this plane repeats it
-        periodically. The width of the square is this period.
+        Rounding errors are assumed to be spread evenly over the square. The square lies in the plane of the window. The
+        field in this plane is a Fourier sum, so it repeats periodically. The width of the square is one period.
         """
         return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx

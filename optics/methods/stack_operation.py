@@ -41,9 +41,9 @@ def stack_images(size: Array, waves: Array, sums: WindowSums, dtype: str, many: 
     size: S, the light without the phase of relief and wavefront, times the areas of the samples, complex. Its shape is
         (source, row of the pupil's samples, column).
     waves: phase w of relief and wavefront [waves], (row, column).
-    sums: arrays with which the field U over the window is computed from this light.
+    sums: arrays with which `window_field` computes the field U over the window from this light.
     dtype: "float32" or "float64".
-    many: largest number of sources whose sums are computed together, which limits the memory.
+    many: largest number of sources for which U is computed at the same time. It limits the memory.
     """
     return _operation(library(waves)).apply(waves, size.numpy(), sums, dtype, many)
 

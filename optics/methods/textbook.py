@@ -1,8 +1,8 @@
-"""The textbook angular spectrum of a pupil's field in plain NumPy: the integral that all other methods compute.
+"""Propagation of a pupil's field by the angular spectrum as in a textbook, in plain NumPy.
 
-Read this module first. Its method is slow, coarse at the pupil's edge, and correct only if the single grid is fine and
-wide enough. Tests compare the other methods with it. References are to Goodman, Introduction to Fourier Optics, third
-edition.
+Read this module first: all other methods compute the same integral. The method here is slow and coarse at the pupil's
+edge. It uses one grid for the pupil and the plane behind it, and is correct only if this grid is fine and wide enough.
+Tests compare the other methods with it. References are to Goodman, Introduction to Fourier Optics, third edition.
 """
 
 from __future__ import annotations

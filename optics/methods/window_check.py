@@ -8,8 +8,8 @@ soft edge.
 The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The PSF is computed by
 interpolation of this factor over the window, and the check interpolates the factor over the pupil instead. The
 comparison therefore also shows the error of the interpolation over the window. Both sums use the slow factor, so the
-check also compares this factor with the diffraction kernel itself. The error of the check's own sum is at most half of
-the error that the check finds.
+check also compares this factor with the diffraction kernel itself. The interpolation over the pupil has an error, too.
+Its number of points is chosen for an error below half the tolerance, and a larger error is added to the estimate.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ def window_errors(samples: SineStack, path: Path, field: Array, crossings: Windo
     """Return the relative L2 errors of intensities over a window, estimated at crossings of rows and columns, (stack,).
 
     The intensities at the crossings are compared with those from a second sum over other, finer samples of the pupils.
-    The result is NaN for a window without light. Its library and device are those of `field`.
+    The result is NaN for a window without light. It is an array of NumPy or PyTorch like `field`, on the same device.
 
-    samples: the finer samples. The arrays of samples and path may have a first axis of length 1.
+    samples: the finer samples. If they are the same for all PSFs, the first axis of their arrays has the length 1.
     path: wavelengths, distances and window.
     field: contribution of each of the finer samples to the field at the middle of the window, (stack, y, x), an array
         of NumPy or PyTorch; see `SineStack.arriving`.
-    crossings: intensities to be checked, at the crossings.
+    crossings: the rows and columns, and the intensities to be checked where they cross.
     tolerance: tolerance of the PSFs.
     """
     own, dtype = library(field), str(field.real.dtype).removeprefix("torch.")
@@ -72,17 +72,18 @@ def window_errors(samples: SineStack, path: Path, field: Array, crossings: Windo
 
 @dataclass(frozen=True, eq=False)
 class _CheckSums:
-    """Fields where some rows and columns of a window cross, as sums over samples of pupils.
+    """Sums over samples of pupils that yield the field U at points of a window, the crossings of some rows and columns.
 
     Parts that do not depend on the light are cached. The slow factor is the factor by which the diffraction kernel
-    differs from a Fourier kernel, relative to the middle of the window. A_u and A_v are its values along the axes x and
-    y of the window. The quotient G of the slow factor and A_u A_v is interpolated from a few points (ξ_a, η_b) of the
-    pupil with the weights L_a and L_b:
+    differs from a Fourier kernel, divided by its value at the middle of the window. A_u and A_v are the values of the
+    slow factor along the axes x and y of the window. The quotient G of the slow factor and A_u A_v is interpolated from
+    a few points (ξ_a, η_b) of the pupil with the weights L_a and L_b:
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v) Σ_ηξ L_b A_v e^{-ik v t} P L_a A_u e^{-ik u s}.
 
-    P is the contribution of the sample with the sines (s, t) to the middle of the window, (u, v) is a position relative
-    to this middle, and k the wave number.
+    P is the contribution of a sample of the pupil to the field at the middle of the window. (s, t) are the x and y
+    components of the unit vector from this middle to the sample, minus those of the unit vector to the pupil's centre.
+    (u, v) is a position relative to the middle of the window, and k the wave number.
 
     samples: samples of the pupils.
     path: wavelengths, distances and window.
@@ -114,18 +115,20 @@ class _CheckSums:
 
     @property
     def apart(self) -> np.ndarray:
-        """Largest error of the factor G of `_CheckSums` after interpolation over the pupil, (stack,).
+        """Largest interpolation error of G, a slowly varying factor of the diffraction kernel (see `_CheckSums`).
 
-        The error is evaluated in the corners of the window, see `_interpolation`.
+        G is interpolated over the pupil. The error is evaluated in the corners of the window (see `_interpolation`).
+        The shape is (stack,).
         """
         return self._interpolation[1]
 
     @cached_property
     def _interpolation(self) -> tuple[np.ndarray, np.ndarray, RemainingFactor]:
-        """Interpolation of the factor G of `_CheckSums` over the pupil, as three values.
+        """Interpolation points in the pupil, errors of the interpolation, and values of the interpolated factor G.
 
-        The first are the sines of the interpolation points along an axis, (pupil, point). The second are the errors of
-        the interpolation, see `apart`. The third is G for all pairs of these sines, as a `RemainingFactor`.
+        G is a slowly varying factor of the diffraction kernel (see `_CheckSums`). The first result are the sines of the
+        interpolation points along an axis, (pupil, point). The second are the errors of the interpolation, see `apart`.
+        The third is G for all pairs of these sines, as a `RemainingFactor`.
 
         Increasing numbers of points are tried. For each, the interpolated G is compared with the value that follows
         from the diffraction kernel itself, for rays from the middle and from the rim of the pupil to the corners of the
@@ -161,9 +164,10 @@ class _CheckSums:
 
     @cached_property
     def _weight(self) -> np.ndarray:
-        """Weights with which values at the interpolation points yield those at the samples, (point, sample).
+        """Weights that interpolate a function along an axis of the pupil, (interpolation point, sample).
 
-        The interpolation points and the samples of all pupils are alike, apart from their scale.
+        The value at a sample is the sum over the interpolation points of weight times value. The weights are the same
+        for all pupils, because their interpolation points and samples differ only in scale.
         """
         return lagrange_basis(self.samples.at[0], self._interpolation[0][0]).astype(self.dtype)
 
@@ -194,11 +198,12 @@ class _CheckSums:
 
     @cached_property
     def _along(self) -> tuple[np.ndarray, np.ndarray]:
-        """Slow factors A_u in all columns and A_v in all rows of the window, for a single pupil.
+        """Values of the slow factor along the axes of the window: A_u in all columns and A_v in all rows.
 
-        See `_CheckSums` for these factors. The first axis of both arrays distinguishes the amplitude (0) and the phase
-        [waves] (1). The shapes are (part, 1, point along x, 1, column) and (part, point along y, 1, 1, row), where the
-        points are the interpolation points.
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `_CheckSums`).
+        The values are for the interpolation points of a single pupil. The first axis of both arrays distinguishes the
+        amplitude (0) and the phase [waves] (1). The shapes are (part, 1, interpolation point along x, 1, column) and
+        (part, interpolation point along y, 1, 1, row).
         """
         factor, (u, v) = self._interpolation[2], self._places
         across = factor.along[0].at(factor.rounded(u[None, None, None, None, :]))
@@ -206,12 +211,12 @@ class _CheckSums:
         return np.stack(across)[:, 0], np.stack(down)[:, 0].swapaxes(-1, -2)
 
     def _ratio(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return the factor G of `_CheckSums` between interpolation points of the pupil and points of the window.
+        """Return G for light from the interpolation points of the pupil to the crossings of rows and columns.
 
-        The points of the window are those where the rows and columns cross. The shape is
+        G is a slowly varying factor of the diffraction kernel (see `_CheckSums`). The shape is
         (stack, interpolation point along y, interpolation point along x, row, column).
 
-        rows, columns: indices, (stack, row) and (stack, column).
+        rows, columns: indices of rows and columns of the window, (stack, row) and (stack, column).
         """
         factor, (x, y) = self._interpolation[2], self._places
         u, v = factor.rounded(x[columns][:, None, None, None, :]), factor.rounded(y[rows][:, None, None, :, None])
@@ -228,14 +233,14 @@ def _remaining(
     directions: tuple[np.ndarray, np.ndarray],
     place: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Return the diffraction kernel, divided by its parts that are treated separately, as a complex array.
+    """Return the quotient of the diffraction kernel and factors that are computed elsewhere, as a complex array.
 
-    The parts are the kernel's value at the middle of the window, the Fourier kernel, and two axis factors. The axis
-    factors are the values of the slow factor, by which the kernel differs from a Fourier kernel, on the axes of the
-    window. `RemainingFactor` computes this quotient from a formula for the slow factor.
+    The factors are the kernel's value at the middle of the window, the Fourier kernel, and two axis factors. The slow
+    factor is the factor by which the kernel differs from a Fourier kernel. The axis factors are its values on the x and
+    y axes of the window. `RemainingFactor` computes the same quotient from a formula for the slow factor.
 
-    directions: x and y components (s, t) of the unit vectors from the window's centre to points of the pupils, minus
-        those of the unit vectors to the pupils' centres.
+    directions: x and y components (s, t) of the difference of two unit vectors, which point from the window's centre to
+        a point of a pupil and to the pupil's centre.
     place: positions (u, v) [m] relative to the middle of the window. All arrays are broadcast.
     """
     (s, t), (u, v) = directions, place

@@ -1,6 +1,7 @@
-"""The part of a plan for a window that depends neither on reliefs, wavefronts and masks nor on the tolerance.
+"""Geometry of pupils and a window, by which `window_plan` chooses samples.
 
-Users often compute many PSFs of one window whose wavefronts differ. The geometry of a single beam is therefore cached.
+The geometry depends neither on reliefs, wavefronts and masks nor on the tolerance. Users often compute many PSFs with
+different wavefronts, but the same beam and window. The geometry of a single beam is therefore cached.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ class PathSlopes(NamedTuple):
     """Gradients of the optical paths from points of the pupils to the middle of a window.
 
     along_x, along_y: gradients along x and y of the pupil, (beam, point).
-    cycles: phase that a gradient of 1 causes, in cycles per radius of the pupil, (beam, 1).
+    cycles: frequency of the light for a gradient of 1, in cycles of the phase per radius of the pupil, (beam, 1).
     rim: indices of the points near the rim.
     """
 
@@ -66,9 +67,9 @@ class PlannedRays(NamedTuple):
 
 @dataclass(frozen=True)
 class WindowGeometry:
-    """Geometry of several beams and their window, which is the same for all reliefs, wavefronts and masks.
+    """Geometry of several beams and of their window.
 
-    Results that depend on nothing else are computed once.
+    Reliefs, wavefronts and masks are not part of the geometry. Results that depend only on it are computed once.
 
     light: radii of the pupils, distances, wavelengths, media, ideal lenses and sources.
     window: samples of the window.
@@ -79,7 +80,7 @@ class WindowGeometry:
 
     @cached_property
     def half(self) -> float:
-        """Distance [m] from the middle of the window within which interpolation points lie."""
+        """Half the width [m] of a square around the window's middle, in which all interpolation points lie."""
         return half_window(self.window)
 
     @cached_property
@@ -88,16 +89,18 @@ class WindowGeometry:
 
     @cached_property
     def cycles(self) -> np.ndarray:
-        """Spatial frequencies in the pupil's plane of light that arrives at the sides of the window, (beam,).
+        """Spatial frequencies of the light that arrives at the sides of the window, (beam,).
 
-        A frequency is the number of cycles of the light's phase per radius of the pupil. It is 0 for light that arrives
-        at the middle of the window.
+        A frequency is the number of cycles of the light's phase per radius of the pupil, in the plane of the pupil. It
+        is 0 for light that arrives at the middle of the window.
         """
         radius, distance, *_ = self.light.arrays
         return np.asarray(self.half * radius / (self.light.wavelength * distance))
 
     def to_middle(self, across: int) -> PathSlopes:
-        """Return the gradients of the paths from points of the pupils to the middle of the window.
+        """Return the gradients of the optical paths from points of the pupils to the middle of the window.
+
+        The gradients are derivatives with respect to the position of the point in the pupil.
 
         across: number of points across the pupil, see `disk_points`.
         """
@@ -140,7 +143,10 @@ class WindowGeometry:
         return (x, y), np.sqrt(x * x + y * y + np.square(distance))
 
     def rims(self, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the `rim_sines` of soft edges that extend by `reach` radii beyond the rim, (beam,)."""
+        """Return three properties of the outer ends of soft edges, as seen from the window; see `rim_sines`.
+
+        reach: distances in pupil radii by which the soft edges extend beyond the rims, (beam,).
+        """
         radius, distance, *_ = self.light.arrays
         found: tuple[np.ndarray, np.ndarray, np.ndarray] = self.known.get(
             ("rims", reach.tobytes()), lambda: rim_sines((1 + reach) * radius, self.window.centre, distance)
@@ -148,10 +154,10 @@ class WindowGeometry:
         return found
 
     def ray_factor(self, across: int, steepest: np.ndarray, elsewhere: np.ndarray) -> RemainingFactor:
-        """Return the quotient of the slow factor and its values on the x axis and on the y axis of the window.
+        """Return the slow factor divided by its values on the x axis and by those on the y axis of the window.
 
-        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The quotient is for
-        light from the points of the pupils that the method `rays` returns.
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. It depends on the
+        point of the pupil where light starts. The points are those that the method `rays` returns.
 
         across: number of points across the pupil, see `disk_points`.
         steepest, elsewhere: see `SineGeometry`.
@@ -167,12 +173,12 @@ class WindowGeometry:
 
     @cached_property
     def known(self) -> KeptValues:
-        """Cached values that depend on the geometry and on their key."""
+        """Cached results of methods. The key of a result holds the arguments of the method."""
         return KeptValues(KEPT)
 
 
 def half_window(window: Grid) -> float:
-    """Return the distance [m] from the middle of a window within which interpolation points lie."""
+    """Return half the width [m] of a square around a window's middle, in which all interpolation points lie."""
     return max(window.own_half_width, window.dx)
 
 

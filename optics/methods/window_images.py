@@ -1,4 +1,7 @@
-"""PSFs of several pupils over one window at coarse tolerances, as stacked matrix products, and their errors."""
+"""PSFs of several pupils over one window, computed together as matrix products, and estimated errors of the PSFs.
+
+The method is used for PSFs with coarse tolerances.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +33,9 @@ def window_images(
     varies slowly over the window, the slow factor.
 
     samples: grids of samples, one for each beam's pupil, or one for all pupils.
-    rank: number of points along an axis of the window between which the slow factor is interpolated.
-    crossed: True to approximate the slow factor without interpolation, by its values along both axes of the window and
-        `cross_term`. This requires rank 1.
+    rank: number of interpolation points along each axis of the window, from which the slow factor is interpolated.
+    crossed: True to approximate the slow factor without interpolation. It is then the product of its values along both
+        axes of the window, corrected by `cross_term`. This requires rank 1.
     dtype: "float32" or "float64".
     """
     path = Path(stack.wavelength, stack.distance, window)
@@ -68,13 +71,13 @@ def window_image_errors(
 
 
 def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dtype: str) -> list[tuple[Any, Any]]:
-    """Return pairs of matrices, each with the kernels (see `_along`) for the rows and for the columns of the window.
+    """Return pairs of matrices: diffraction kernels (see `_along`) for rows and for columns of the window.
 
-    PSFs with the same samples share the matrices. If `crossed` is True, there are two pairs, the second one for
-    `cross_term`. Each pair yields a field over the window, and the sum of both fields is the field of the PSF. If the
-    matrices are mirrored (`MirroredMatrix`), the list holds both pairs. Else they are joined to one larger pair,
-    because one large product takes less time than two. This pair has the shapes (pupil, y, 2 · sample) and
-    (pupil, 2 · x, sample).
+    PSFs with the same samples share the matrices. Without `crossed`, there is one pair. If `crossed` is True, there are
+    two pairs, the second one for `cross_term`. Each pair yields a field over the window, and the sum of both fields is
+    the field of the PSF. If the matrices are mirrored (`MirroredMatrix`), the list holds two pairs. Else the two are
+    joined to one larger pair, because one large product takes less time than two. The larger pair has the shapes
+    (pupil, y, 2 · sample) and (pupil, 2 · x, sample).
     """
     window = path.window
 
@@ -117,9 +120,10 @@ def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: 
 def _node_factors(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str) -> np.ndarray:
     """Return the part of the slow factor that varies along both axes of the window, at nodes (points) of the window.
 
-    The slow factor is the quotient of the diffraction kernel and a Fourier kernel. Here it is relative to its value at
-    the middle of the window, and divided by its values along the x axis and along the y axis of the window (see
-    `RemainingFactor`). The shape is (pupil, node along y, node along x, row of samples, column of samples).
+    The slow factor is the quotient of the diffraction kernel and a Fourier kernel, divided by the value of this
+    quotient at the middle of the window. The result is the slow factor at a node, divided by the values of the slow
+    factor on the x axis and on the y axis of the window (see `RemainingFactor`). The shape is
+    (pupil, node along y, node along x, row of samples, column of samples).
     """
     s, t = samples.at[:, None, None, None, :], samples.at[:, None, None, :, None]
     u, v = nodes[None, None, :, None, None], nodes[None, :, None, None, None]

@@ -1,7 +1,8 @@
-"""The rank of the slow factor at coarse tolerances, if samples are chosen for the light that arrives in a window.
+"""Number of points (rank) between which the slow factor of the diffraction kernel is interpolated over a window.
 
 The slow factor is the quotient of the diffraction kernel and a Fourier kernel. It varies slowly over the window, so it
-is interpolated there. The rank is the number of interpolation points along an axis of the window.
+is interpolated there. The rank is the number of interpolation points along an axis of the window. This module computes
+it for coarse tolerances, from the rays that hit the window.
 """
 
 from __future__ import annotations
@@ -56,13 +57,13 @@ class Derivatives:
 class WindowRays:
     """Some rays from each pupil, and where they hit a window.
 
-    window: positions (u, v) [m] of the light of the rays, relative to the middle of the window, (beam, ray). Each is
-        the point that the ray hits, moved outwards along both axes by the distance over which diffraction spreads the
-        light. Positions outside the window are then moved to the nearest side of the window.
+    window: positions (u, v) [m] relative to the middle of the window, one for each ray, (beam, ray). Each is the point
+        that the ray hits, moved outwards along both axes by the distance over which diffraction spreads the light.
+        Positions outside the window are then moved to the nearest side of the window.
     weight: weights of the rays, with a mean of 1, (beam, ray). Rays that miss the window have a small weight.
-    mean_sine: typical difference between two directions, seen from the middle of the window: to a ray's point of the
-        pupil, and to the pupil's centre, (beam,). It is the weighted root mean square of the x and y components of the
-        difference between both unit vectors.
+    mean_sine: weighted root mean square of the x and y components of vector differences, (beam,). For each ray, two
+        unit vectors start in the middle of the window: one points to the start of the ray in the pupil, the other to
+        the pupil's centre. The components are those of their difference.
     """
 
     window: tuple[np.ndarray, np.ndarray]
@@ -73,9 +74,9 @@ class WindowRays:
     def from_slopes(cls, slopes: StackSlopes, geometry: WindowGeometry) -> WindowRays:
         """Return rays from points that are spread evenly over the disks of the pupils.
 
-        To first order, a ray hits the window at the position D/n · g relative to the middle of the window. g is the
-        gradient, over the pupil, of the optical path through a point of the pupil to this middle. D is the distance
-        between the two points, and n the refractive index behind the pupil.
+        Let L be the optical path from the source, through a point p of the pupil, to the middle of the window. To first
+        order, the ray through p hits the window at D/n · ∇L relative to this middle. ∇L is the gradient of L with
+        respect to p, D the distance from p to the middle, and n the refractive index behind the pupil.
 
         slopes: gradients of the optical paths behind the pupils.
         """
@@ -95,16 +96,18 @@ def window_ranks(
     tolerance: np.ndarray,
     derivatives: Derivatives | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ranks that the tolerance requires, and whether `cross_term` is needed, each (beam,).
+    """Return the ranks of the slow factor that the tolerance requires, and whether `cross_term` is used.
 
-    The slow factor is the quotient of the diffraction kernel and a Fourier kernel. The rank is the number of points
-    along an axis of the window between which this factor is interpolated, or 0 if it would exceed MOST_RANK. With
-    `cross_term`, it is 1. The interpolation is tested near the points where the rays hit the window, because the light
-    arrives there. If derivatives are requested, a change of the pupil may send light to any point of the window. The
-    error is then also tested on average over the whole window.
+    The slow factor is the quotient of the diffraction kernel and a Fourier kernel. It is interpolated between points of
+    the window. The rank is the number of these points along an axis. It is 0 if more than MOST_RANK points are needed,
+    and 1 if the formula `cross_term` replaces the interpolation. Both results have the shape (beam,).
 
-    factor: slow factor at a position (u, v) of the window, divided by its values at (u, 0) and (0, v), for light from
-        the points of the pupils where the rays start.
+    The interpolation is tested near the points where the rays hit the window, because the light arrives there. If
+    derivatives are requested, a change of the pupil may send light to any point of the window. The error is then also
+    tested on average over the whole window.
+
+    factor: F(u, v) / (F(u, 0) F(0, v)), where F is the slow factor at a position (u, v) of the window. The light comes
+        from the points of the pupils where the rays start.
     tolerance: tolerances of the PSFs, (beam,).
     """
     half, path, directions = geometry.half, factor.path, factor.directions
@@ -155,8 +158,7 @@ def interpolation_errors(
 ) -> np.ndarray:
     """Return the weighted root mean square errors of interpolating a factor between nodes of the window, (beam,).
 
-    factor: the slow factor, by which the diffraction kernel differs from a Fourier kernel, divided by its values along
-        both axes.
+    factor: F(u, v) / (F(u, 0) F(0, v)), where F is the slow factor: the diffraction kernel divided by a Fourier kernel.
     place: positions (u, v) [m] relative to the middle of the window, at which the errors are computed.
     weight: weights of the positions, with a mean of 1.
     nodes: interpolation points along an axis [m], relative to the middle of the window.

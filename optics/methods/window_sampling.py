@@ -2,8 +2,8 @@
 
 The pupil has only as many samples as the light that reaches the window requires. Their number, and the number of
 interpolation points in the window (the rank), are planned as for several PSFs at once (`window_plan`). Both numbers
-are estimates. Every PSF is therefore compared with a sum over finer samples in a few rows and columns of the window
-(`window_check`).
+are estimates. Every PSF is therefore checked in a few rows and columns of the window, where it is compared with a sum
+over finer samples of the pupil (`window_check`).
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class WindowSampling:
     The diffraction kernel of the sum is a Fourier kernel times a factor that varies slowly over the window, the slow
     factor.
 
-    rank: number of points along an axis of the window between which the slow factor is interpolated.
-    crossed: True if `plain_intensity` approximates the slow factor by a formula (`cross_term`), not by interpolation.
+    rank: number of interpolation points of the slow factor along an axis of the window.
+    crossed: True if `plain_intensity` computes the slow factor by a formula (`cross_term`) instead of interpolation.
         This formula is not used for the complex field or for intensities with derivatives. For these, the slow factor
         is interpolated, with a rank of at least CROSSED_RANK.
     half_width: distance [m] from the middle of the window within which the interpolation points lie.
@@ -102,7 +102,10 @@ class WindowSampling:
         )
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
+
+        Their size in the window is estimated from this width, see `Sampling.plane`.
+        """
         return problem.wavelength / self.pupil.grid.dx
 
     @property
@@ -149,7 +152,7 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
 
 
 def _single(stack: SineStack) -> SineSamples:
-    """Return a stack of one as samples of a single pupil."""
+    """Return the samples of a single pupil, given a stack that contains only this pupil."""
     edge, pitch = PupilEdge(stack.edges[0], float(stack.radius[0])), float(stack.pitch[0])
     count = stack.at.shape[1]
     shift = float(stack.at[0, count // 2])
@@ -172,7 +175,10 @@ def _window_sums(pupil: WindowSamples, rank: int, half: float, path: Path, dtype
     kernel = kernel / (axis_factor(path, pupil, 0, column, u) * axis_factor(path, pupil, 1, row, v))
 
     def by_distance() -> np.ndarray:
-        """Return the derivative of the kernel z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to the distance z."""
+        """Return the derivative of the kernel z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to the distance z.
+
+        D and ρ are the distances of a point of the window from a sample of the pupil and from the pupil's centre.
+        """
         turns = 2j * np.pi / path.wavelength * (z / distance - z / np.sqrt(x * x + y * y + z * z))
         near_by = -(near.real * z / distance**2) / near
         return np.asarray(kernel * (1 / z - 2 * z / distance**2 + turns + near_by), complex_dtype)

@@ -1,8 +1,8 @@
 """PSFs of several sources and wavelengths through one pupil, from the same samples of the pupil, at coarse tolerances.
 
 The light behind the pupil is the product of two factors. The first is the wave of the source, bent by the ideal lens
-and attenuated by aperture and mask. The second is the phase that the relief and the wavefront add. The height of the
-relief and the wavefront are computed once for all PSFs, and the second factor once for each wavelength. The sums over
+and attenuated by aperture and mask. The second is the phase that the relief and the wavefront add. The wavefront and
+the height of the relief are computed once for all PSFs, and the second factor once for each wavelength. The sums over
 the pupil are stacked matrix products (`window_sums`).
 """
 
@@ -40,8 +40,8 @@ MOST_BYTES = 64e6  # choice, limited by memory: all waves that are cached
 class WindowStack:
     """Light of several sources and wavelengths through a pupil to a window at one distance.
 
-    The distance, the parameters of the sources, and those of the pupil except its radius may carry derivatives of
-    PyTorch.
+    The distance, the parameters of the sources, and all parameters of the pupil except its radius may be tensors of
+    PyTorch that require a gradient.
 
     wavelengths: wavelengths [m] in vacuum.
     distance: distance [m] of the window behind the pupil.
@@ -66,7 +66,8 @@ class WindowStack:
     def errors(self, sampling: WindowSampling, images: Array, tolerance: float) -> Array:
         """Return the relative L2 error of each PSF over the window, see `window_errors`, (source, wavelength).
 
-        images: result of `intensity` without derivatives, in the library and on the device of `convert`.
+        images: result of `intensity` without derivatives. The array has the library and the device of the arrays that
+            the attribute `convert` returns.
         tolerance: tolerance of the PSFs.
         """
         seen, finer = (images * self.pupil.area).swapaxes(0, 1), single_stack(sampling.finer)
@@ -86,8 +87,9 @@ class WindowStack:
     def _factors(self, samples: WindowSamples) -> Iterator[tuple[Array, Array | None]]:
         """Yield factors of the light behind the pupil for each wavelength, see `_product`.
 
-        The first factor is the light without relief and wavefront times the areas of the samples, (source, η, ξ). The
-        second is the phase of relief and wavefront [waves], (η, ξ); None without these.
+        The first factor is the light that a pupil without relief and wavefront would pass, multiplied by the areas of
+        the samples, (source, η, ξ). The second is the phase of relief and wavefront [waves], (η, ξ); None without
+        these. η and ξ count the rows and columns of samples.
         """
         pupil = self.pupil
         height, ahead = (found(pupil, samples, self.convert) for found in (sampled_height, sampled_wavefront))

@@ -1,8 +1,8 @@
 """Operations on arrays of NumPy, PyTorch or Dr.Jit whose names or forms differ between these libraries.
 
-Optical elements compute with the operators of the arrays that they receive, so they evaluate on all three. Plans use
-NumPy, graphs of PyTorch use its tensors, and compiled kernels use Dr.Jit. No function imports PyTorch: a caller who
-passes a tensor has imported it.
+Optical elements compute with the operators of the arrays that they receive, so the same code works with all three
+libraries. Plans use NumPy, graphs of PyTorch use its tensors, and compiled kernels use Dr.Jit. No function imports
+PyTorch: a caller who passes a tensor has imported it.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def on_processor(x: Array) -> np.ndarray:
 
 
 def to_double(x: Array) -> Array:
-    """Return an array of NumPy or PyTorch in double precision, a copy unless it has this precision."""
+    """Return an array of NumPy or PyTorch in double precision. An array that is already double is not copied."""
     return x.astype(np.float64, copy=False) if library(x) is np else x.double()
 
 
@@ -114,7 +114,7 @@ def indices(x: Array) -> Array:
 def gather(values: Array, at: Any) -> Array:
     """Return one element of `values`, or several. Elements are counted row by row, as in a flat array.
 
-    at: a whole number, or an array of them as the function `indices` returns it.
+    at: index of the element, or an array of indices that the function `indices` has returned.
     """
     own = library(values)
     if own is np:

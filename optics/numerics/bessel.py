@@ -68,9 +68,12 @@ def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
 
 @lru_cache(maxsize=3)
 def _series(rounding: str) -> tuple[list[float], list[float], list[float]]:
-    """Return Chebyshev coefficients of J₀ in x² over [0, 8], and of P and of Q · x/8 in (8/x)² beyond 8.
+    """Return the Chebyshev coefficients of three functions: J₀(x), P(x) and Q(x) · x/8.
 
-    P and Q are defined at the top of the module.
+    J₀ is a series in x² for x in [0, 8]. P and Q · x/8 are series in (8/x)² for x > 8. There,
+    J₀(x) = √(2/(πx)) Re[(P + iQ) e^{i(x - π/4)}].
+
+    rounding: key of TERMS, which contains the numbers of coefficients.
     """
     from scipy.special import hankel1e, j0
 

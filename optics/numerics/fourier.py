@@ -1,6 +1,6 @@
 """Centred two-dimensional Fourier sums of any size and period.
 
-`dft2` computes this sum for fields of Dr.Jit, and `fourier_sum` for NumPy arrays:
+`dft2` computes the following sum for fields of Dr.Jit, and `fourier_sum` computes it for NumPy arrays:
 
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
@@ -87,7 +87,7 @@ def dft2(
 
 
 def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int) -> np.ndarray:
-    """Return the sum of `dft2` for a complex NumPy array, computed without Dr.Jit and without derivatives."""
+    """Return the Fourier sum that `dft2` computes, for a complex NumPy array, without Dr.Jit and derivatives."""
     shape_in = (u.shape[0], u.shape[1])
     if fft_wins(shape_in, period, shape, u.real.dtype.name):
         for axis in (1, 0):
@@ -99,9 +99,9 @@ def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int)
 
 @lru_cache(maxsize=16)
 def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> np.ndarray:
-    """Return the matrix of a sum along one axis: exp(±2πi k j / period) in row k and column j, counted from n//2.
+    """Return the matrix of a sum along one axis: exp(±2πi k j / period), k = row - n_out//2, j = column - n_in//2.
 
-    Whole waves are subtracted from k j / period first, because they would reduce the precision of the remainder.
+    Only the fractional part of k j / period matters. The whole part is subtracted before the exponential is computed.
     """
     k, j = np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2
     waves = np.outer(k, j) / period
@@ -192,7 +192,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
         return _fft_of_parts(parts, period, to, turn, types)
 
     class FourierSum(dr.CustomOp):
-        """The Fourier sum, differentiable. Its adjoint is the sum with the opposite sign, from output to input."""
+        """The Fourier sum, differentiable. Its adjoint sums over the output, with the opposite sign of the exponent."""
 
         def eval(self, re: Array, im: Array) -> tuple[Array, Array]:
             return transform(re, im, shape, shape_in, sign)
@@ -212,7 +212,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
 def _fft_of_parts(
     parts: tuple[np.ndarray, np.ndarray], period: int, to: tuple[int, int], sign: int, types: Precision
 ) -> tuple[Array, Array]:
-    """Return the Fourier sum of `dft2` by FFTs, as flat real and imaginary parts. `parts` are those of the field.
+    """Return the Fourier sum of `dft2`, by FFTs, as flat real and imaginary part. `parts`: the same parts of the field.
 
     The FFTs are computed for blocks of lines, because a whole plane, padded to one period, exceeds the cache.
     """
@@ -248,9 +248,9 @@ def _lines(n: int, period: int) -> list[slice]:
 
 
 def _runs(n: int, period: int) -> list[tuple[slice, slice]]:
-    """Return pairs of slices: of n centred samples, and of their positions within one period in FFT order.
+    """Return pairs of slices that divide n centred samples into runs which are contiguous in FFT order.
 
-    Samples beyond one period are aliased onto it.
+    The first slice selects a run, the second its place within one period. Samples beyond a period are aliased onto it.
     """
     found, start = [], 0
     while start < n:

@@ -1,7 +1,7 @@
 """Interpolation between samples (linear, Lagrange polynomials, cubic B-splines), and tabulated functions.
 
 `lagrange_weights`, `cubic_bsplines` and `tensor_product` accept arrays of NumPy, PyTorch and Dr.Jit. `Interpolant.at`
-requires Dr.Jit arrays, and the other functions of positions require NumPy arrays.
+requires Dr.Jit arrays. `linear_weights`, `lagrange_basis` and `chebyshev_basis` require NumPy arrays.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Interpolant:
     first: position of the lower end.
     step: distance between samples.
     samples: values at the positions first + i step, i = -2 ... n + 1. The n samples from i = 0 to n - 1 reach from end
-        to end. The two samples beyond either end are needed for six-point interpolation.
+        to end. Beyond each end there are two more, which six-point interpolation needs.
     """
 
     first: float
@@ -108,7 +108,7 @@ def _cosine_sums(values: np.ndarray) -> np.ndarray:
 
 
 def lagrange_weights(t: Array, taps: int) -> list[Array]:
-    """Return the Lagrange weights of `taps` samples (an even number), which are 1 apart.
+    """Return the weights of Lagrange interpolation at t from an even number `taps` of samples at distances of 1.
 
         L_i(t) = Π_{j≠i} (t - x_j) / (x_i - x_j),   x_i = i + 1 - taps/2,   i = 0 ... taps - 1.
 

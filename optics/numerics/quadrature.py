@@ -3,8 +3,8 @@
 The errors of equidistant nodes on a circle and of Gauss-Legendre nodes are due to aliasing. With n equidistant nodes on
 a circle, harmonics of e^{iz cos φ} of orders m >= n alias. Their amplitudes are J_m(z) (Jacobi-Anger expansion). n
 Gauss-Legendre nodes are exact for polynomials up to degree 2n - 1. The Chebyshev series of a wave whose phase is ±z
-radians at the ends has the coefficients 2 J_m(z). The same number therefore determines both rules: the smallest m from
-which on 2 |J_m(z)| stays below the requested error.
+radians at the ends has the coefficients 2 J_m(z). Both numbers of nodes therefore follow from the smallest m such that
+2 |J_k(z)| is below the requested error for all orders k >= m.
 """
 
 from __future__ import annotations
@@ -82,9 +82,9 @@ def _degree(cycles: float, digits: float) -> int:
 def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Return Gauss-Legendre nodes and weights on [0, 1].
 
-    On [-1, 1], the nodes are the roots x of Legendre's polynomial P. Newton's method computes them, starting from
-    Tricomi's estimate. The weights there are 2 / ((1 - x²) P'²) (Davis & Rabinowitz, Methods of Numerical Integration,
-    §2.7).
+    They are computed on [-1, 1], where the nodes are the roots x of Legendre's polynomial P of degree n, and the
+    weights are 2 / ((1 - x²) P'²) (Davis & Rabinowitz, Methods of Numerical Integration, §2.7). Newton's method
+    computes the roots, starting from Tricomi's estimate.
     """
     half = (n + 1) // 2  # the other half of the nodes follows by symmetry
     x = (1 - (n - 1) / (8.0 * n**3)) * np.cos(pi * (4 * np.arange(1, half + 1) - 1) / (4 * n + 2))

@@ -135,9 +135,9 @@ def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
 def computing_device(numbers: Mapping[str, torch.Tensor], otherwise: torch.device) -> torch.device:
     """Return the device on which PyTorch computes with these tensors.
 
-    It is the device of the tensors, except single numbers on the CPU, which fit any device. If the tensors are on
-    several devices, or only such single numbers are given, it is `otherwise`. If the device found in this way has one
-    of the types ON_PROCESSOR, the device on which Dr.Jit computes is returned instead.
+    It is the device that the tensors share. Single numbers on the CPU are not considered, because they fit any device.
+    If the tensors are on several devices, or only such single numbers are given, it is `otherwise`. If the device found
+    in this way is of the type cpu, mps or meta, the device on which Dr.Jit computes is returned instead.
     """
     places = {tensor.device for tensor in numbers.values() if tensor.ndim or tensor.device.type != "cpu"}
     found = places.pop() if len(places) == 1 else otherwise
@@ -159,6 +159,6 @@ def plain_numbers(numbers: Mapping[str, torch.Tensor]) -> dict[str, Any]:
 
 
 def on_device(place: torch.device, values: np.ndarray) -> torch.Tensor:
-    """Return an array of NumPy as a tensor on a device. On the processor, both share their memory."""
+    """Return an array of NumPy as a tensor on a device. On the processor, tensor and array share memory."""
     tensor = torch.from_numpy(values)
     return tensor if place.type == "cpu" else tensor.to(place)

@@ -79,12 +79,12 @@ class Ommatidium:
 
         angle_x, angle_y: angles [rad] from the axis of the lens to the direction in which the source lies, projected
             onto the planes (x, z) and (y, z). A `PointSource` instead has the angles of the direction in which its
-            light travels, so the source at these angles is a `PointSource` with the negative angles.
+            light travels. The `PointSource` for angles a and b therefore has the angles -a and -b.
         wavelength: vacuum wavelength [m].
 
         Raises:
             ValueError: an angle has a sine above 0.5 or below -0.5, the shapes of the angles cannot be broadcast, the
-                rhabdom has no modes, the pupil has a relief of pixels, or one of the pupil's parameters carries a
+                rhabdom has no modes, the pupil's relief is a `PixelRelief`, or one of the pupil's parameters carries a
                 derivative. See also `Waveguide.modes`.
         """
         x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)
@@ -103,7 +103,7 @@ class Ommatidium:
         return found.reshape(len(found), *x.shape)
 
     def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Return the fraction of the light on the facet that the rhabdom absorbs, for a distant point source.
+        """Return the power that the rhabdom absorbs from a distant point source, divided by the power on the facet.
 
         angle_x, angle_y: see `mode_power`. The result has the shape to which both are broadcast.
         wavelength: vacuum wavelength [m].
@@ -117,14 +117,14 @@ class Ommatidium:
     def acceptance_angle(self, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
         """Return the acceptance angle Δρ [rad]: the full width at half maximum of the sensitivity.
 
-        It is measured along a line through the axis at an azimuth from x. If the sensitivity has several lobes, the
-        angle is that between the two outermost directions at half maximum.
+        The direction of the source varies in a plane that contains the axis of the lens. If the sensitivity has several
+        lobes, the angle is measured between the two outermost directions at half maximum.
 
-        azimuth_deg: azimuth [degrees] from x towards y, -360 to 360.
+        azimuth_deg: azimuth [degrees] of this plane, counted from x towards y, -360 to 360.
 
         Raises:
-            ValueError: the azimuth is outside its range, the rhabdom is so far from the focus that no peak is found, or
-                see `mode_power`.
+            ValueError: the azimuth is outside its range, or the rhabdom is so far from the focus that no peak is found.
+                See also `mode_power`.
         """
         pupil = self.pupil
         turn = math.radians(in_range("azimuth_deg", azimuth_deg, -360, 360))
@@ -155,7 +155,10 @@ class Ommatidium:
         return float(at[1]) if bend >= 0 else float(at[1]) + step * (left - right) / (2 * bend)
 
     def _half(self, low: float, high: float, peak: float, turn: float, wavelength: float) -> float:
-        """Return the angle between `low` and `high` at which the sensitivity is half of `peak`, by a cubic fit."""
+        """Return the angle [rad], in the range from `low` to `high`, at which the sensitivity is half of `peak`.
+
+        In this range, the angle is fitted by a cubic polynomial of the sensitivity.
+        """
         at = np.linspace(low, high, 4)
         seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
         return float(np.polynomial.polynomial.polyval(peak / 2, np.polynomial.polynomial.polyfit(seen, at, 3)))

@@ -69,13 +69,13 @@ def radiated(
 
 
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return a function that maps a mode's index to values of G D², for a waveguide on the pupil's axis.
+    """Return a function for the field of each mode at points of the pupil, for a waveguide on the pupil's axis.
 
-    Each value belongs to a point of the pupil. D is the distance of this point from the waveguide's end, and θ its
-    angle from the waveguide's axis. G(sin θ, D) is proportional to the field that the mode radiates to the point. It is
-    an integral over the waveguide's end, see the top of the module. For a waveguide on the axis, D is z/cos θ, where z
-    is the distance of the end from the pupil, so G depends on θ alone. It is computed at closely spaced θ, and
-    interpolated linearly between them.
+    The function maps a mode's index to values of G D², (point,). G(sin θ, D) is proportional to the field that the mode
+    radiates to a point at the distance D from the waveguide's end. θ is the angle from the waveguide's axis to the line
+    between the waveguide's end and the point. G is an integral over the waveguide's end, see the top of the module. For
+    a waveguide on the axis, D is z/cos θ, where z is the distance of the end from the pupil, so G depends on θ alone.
+    It is computed at closely spaced θ, and interpolated linearly between them.
 
     sine, distance: sin θ and D of the points, (point,).
     k: wavenumber [1/m].
@@ -95,12 +95,12 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return a function that maps a mode's index to values of G D², for a waveguide off the pupil's axis.
+    """Return a function for the field of each mode at points of the pupil, for a waveguide off the pupil's axis.
 
-    Each value belongs to a point of the pupil. D is the distance of this point from the waveguide's end, and θ its
-    angle from the waveguide's axis. G(sin θ, D) is proportional to the field that the mode radiates to the point. It is
-    an integral over the waveguide's end, see the top of the module. G is interpolated in sin θ and in 1/D, which are
-    independent of each other.
+    The function maps a mode's index to values of G D², (point,). G(sin θ, D) is proportional to the field that the mode
+    radiates to a point at the distance D from the waveguide's end. θ is the angle from the waveguide's axis to the line
+    between the waveguide's end and the point. G is an integral over the waveguide's end, see the top of the module. It
+    is interpolated in sin θ and in 1/D, which are independent of each other.
 
     sine, distance: sin θ and D of the points, (point,).
     k: wavenumber [1/m].
@@ -143,15 +143,16 @@ def _scaled(at: np.ndarray, ends: Ends) -> np.ndarray:
 
 
 def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
-    """Return Chebyshev points for a function whose phase changes by `radians` over half the range."""
+    """Return Chebyshev points in the range `ends` for a function whose phase changes by `radians` over half of it."""
     return (ends[0] + ends[1] + (ends[1] - ends[0]) * chebyshev_points(math.ceil(1.2 * radians) + spare)) / 2
 
 
 def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> np.ndarray:
     """Return values of G D² by quadrature over the modes' fields, for pairs of sin θ and D, (mode, pair).
 
-    G(sin θ, D) is the integral, defined at the top of the module, that determines the field which a mode radiates to
-    the distance D at the angle θ from the waveguide's axis.
+    G(sin θ, D) is proportional to the field that a mode radiates to a point at the distance D from the waveguide's end
+    and at the angle θ from the waveguide's axis. G is the integral of ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} over the
+    waveguide's end, where ψ(x) is the mode's field at a position x on this end, and d the distance from x to the point.
 
     sine, distance: sin θ and D [m] of each pair, (pair,).
     k: wavenumber [1/m].

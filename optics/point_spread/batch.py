@@ -46,8 +46,8 @@ class PSFBatch(OnWindow):
     plans: one plan per PSF, in the same order, as a flat tuple.
     members: the light from which each PSF was computed (pupil, source, wavelength and sensor's distance), in the order
         of `plans`.
-    setup: window, tolerance, method and dtype, which all PSFs share. Its source and its sensor's distance are those of
-        the first PSF only.
+    setup: window, tolerance, method and dtype, which all PSFs share. The source and the sensor's distance in `setup`
+        are those of the first PSF only.
 
     See PSFResult for conventions.
     """
@@ -122,10 +122,11 @@ def psf_batch(
     source_distances: sequence of distances [m] of sources on the axis.
     dx, shape, tolerance, method, dtype: see `optics.psf`.
 
-    At tolerances of 3e-4 or more, with the method "auto", "exact" or "low_rank", all PSFs are planned together, and
-    PSFs with equal numbers of samples are computed as stacks of matrix products. The error of each PSF is checked.
-    Pupils with derivatives or pixels are excluded, as are PSFs that remain inaccurate or take long. These are planned
-    one by one, before the first of them is computed.
+    At tolerances of 3e-4 or more, with the method "auto", "exact" or "low_rank", the samples for all PSFs are chosen
+    together, and PSFs with equal numbers of samples are computed as stacks of matrix products. The error of each PSF is
+    checked. All other PSFs are planned and computed one by one: PSFs of pupils with derivatives or with a
+    `PixelRelief`, and PSFs that would otherwise be inaccurate or take long. The first of them is computed after all of
+    them have been planned.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.

@@ -30,7 +30,7 @@ MOST_AGAIN = 1025  # choice: most samples along a side of a recomputed window
 class DiskSum:
     """Light on a disk, as a weighted sum over samples.
 
-    light: the field on samples that are fine enough for sums.
+    light: the field on samples that are fine enough for a weighted sum to equal the integral over the disk.
     share: weight of each sample, (y, x).
     radius: radius [m] of the disk.
     """
@@ -103,14 +103,14 @@ def _kernel(dx: float, cutoff: float) -> SoftEdge:
 
 
 def _around(light: VectorFocus, towards: Converging, middle: tuple[float, float], radius: float) -> VectorFocus:
-    """Return light on samples from which the integral over a disk can be computed as a weighted sum.
+    """Return light on samples that are suitable for a weighted sum that equals the integral over a disk.
 
-    Their pitch is at most FINE/cutoff, where the cutoff is the highest frequency of the intensity. They extend beyond
-    the disk by the radius of the kernel that softens the disk's edge, because the weights are nonzero up to there. If
-    the given light has other samples, it is computed again.
+    The pitch of these samples is at most FINE/cutoff, where the cutoff is the highest frequency of the intensity. The
+    samples extend beyond the disk by the radius of the kernel that softens the disk's edge, because the weights are
+    nonzero up to there. If the given light has other samples, it is computed again.
 
-    light: the light on its samples.
-    towards: the light that converges towards them.
+    light: the light on its present samples.
+    towards: the light behind the pupil, from which `light` can be computed again.
     middle: centre (x, y) [m] of the disk.
 
     Raises:

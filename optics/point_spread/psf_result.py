@@ -50,13 +50,13 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         that arrives there; evanescent light, for example, does not. The PSF is never renormalised.
     plans: one plan per wavelength; `plan` is the least accurate one.
     requests: parameters with which functions such as `optics.strehl_ratio` recompute the PSF on other samples, one
-        entry per wavelength. A mean over wavelengths (see `mean`) keeps the entries of all of them. Empty if unknown.
+        entry per wavelength. A mean over wavelengths (see `mean`) keeps those of all wavelengths. Empty if unknown.
     shares: weight of each request in a mean over wavelengths, (request,). None if the PSF is no such mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
         derivatives; None for means, and unless `psf` was called with field=True. The amplitude [1/m] has the carrier
         exp(ikz), and its squared modulus is the PSF. `field` is the same as one complex NumPy array.
-    for_window: True if the samples of the pupil suffice only for the light in the window. Errors of sums over dark
-        parts may then exceed their bound, so functions that sum the PSF recompute it from finer samples if possible.
+    for_window: True if the samples of the pupil suffice only for the light in the window. Sums over dark parts of the
+        PSF may then be less accurate than predicted, so functions that sum it use finer samples if possible.
     """
 
     tensor: Array
@@ -103,7 +103,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         It is a sum over the samples. If they are too far apart for this sum, the PSF is recomputed on finer ones.
 
         Raises:
-            AccuracyError: samples are too coarse, and finer ones cannot be computed. The message states which suffice.
+            AccuracyError: samples are too coarse and cannot be recomputed. The message states sufficient samples.
         """
         return self._resolved.window_sums
 
@@ -135,7 +135,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def window_sums(self) -> np.ndarray | Array:
-        """Sum over the samples times their area, (wavelength,). The pitch is not checked."""
+        """Sum of the PSF's samples times dx², (wavelength,). Unlike in `power`, dx may be too coarse for sums."""
         import drjit as dr
 
         waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)
@@ -147,7 +147,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def sum_error(self) -> np.ndarray:
-        """Error of sums over the PSF due to the error of the PSF, relative to the pupil's power, (wavelength,)."""
+        """Error of `window_sums` (fraction of the pupil's power) due to the PSF's predicted error, (wavelength,)."""
         errors = [plan.predicted_error for plan in self.plans]
         own = np.array(errors if len(errors) == len(self.psf) else [max(errors)] * len(self.psf))
         factor = CELL_SUM_ERROR if self.holds_cells else SUM_ERROR
@@ -166,14 +166,14 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def highest_cutoff(self) -> float:
-        """Highest frequency [1/m] of the intensity. In a mean over wavelengths, each of them counts if it is known."""
+        """Highest frequency [1/m] of the intensity. In a mean over wavelengths, that of the shortest, if known."""
         if self.shares is None or not self.can_recompute:
             return float(self.cutoff.max())
         shortest = min(request.beam.wavelength for request in self.requests)
         return float(self.cutoff.max() * self.wavelengths.max() / shortest)
 
     def mean(self, shares: np.ndarray) -> PSFResult:
-        """Return the PSF of light of all wavelengths at once, (1, y, x), with derivatives; its wavelength is the mean.
+        """Return the PSF of all wavelengths together, (1, y, x), with derivatives, at their weighted mean wavelength.
 
         shares: fraction of each wavelength, with the sum 1, (wavelength,). A PSF that is already a mean is unchanged.
 
@@ -198,7 +198,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         )
 
     def of_wavelength(self, index: int) -> PSFResult:
-        """Return the PSF of one of the wavelengths, (1, y, x), with derivatives. A result of `mean` has only one.
+        """Return the PSF of one wavelength, (1, y, x), with derivatives. A PSF from `mean` has only one wavelength.
 
         Raises:
             ValueError: there is no such wavelength.
@@ -217,7 +217,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         )
 
     def recompute_on(self, window: Grid, what: str) -> PSFResult:
-        """Return the PSF of the same light over another window, to the same tolerance and without the amplitude.
+        """Return the PSF of the same light over another window, with the same tolerance, but no `field`.
 
         what: name of the quantity that needs the other window, such as "power", for the error message.
 
@@ -237,7 +237,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def of_all_light(self) -> PSFResult:
-        """This PSF, recomputed from finer samples of the pupil if `for_window` and `can_recompute` are True.
+        """This PSF, if possible from samples of the pupil that resolve all light, and not only the light in the window.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -245,10 +245,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return self.recompute_on(self.window, "a sum") if self.for_window and self.can_recompute else self
 
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
-        """Return a PSF whose samples can be summed: they are at most `coarsest` [m] apart, or are means over squares.
+        """Return a PSF whose samples are at most `coarsest` [m] apart, or are means over squares of side dx.
 
-        Suitable samples are kept, and at most their values are recomputed, see `of_all_light`. Otherwise the square
-        around each sample is divided into smaller ones, and the PSF is recomputed at their centres.
+        Suitable samples stay in place; `of_all_light` may recompute their values. Otherwise the square around each
+        sample is divided into smaller ones, and the PSF is recomputed at their centres.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -280,7 +280,7 @@ def _through(request: Request, window: Grid) -> Request:
 def spread(requests: Sequence[Request]) -> PSFResult:
     """Return PSFs of one pupil at several wavelengths over one window.
 
-    For at least MANY wavelengths, each may use the method of the preceding one, see `Request.after`.
+    With MANY or more wavelengths, the method of one wavelength may be reused for the next, see `Request.after`.
 
     Raises:
         AccuracyError: no method meets the tolerance, or rounding errors exceed the tolerance in a dark window.

@@ -36,12 +36,12 @@ class Effort:
     """Limits (choices) on the effort of a spot check, which compares a PSF with the direct sum at a few points.
 
     points: largest number of points at which a PSF is checked.
-    points_along_radius: the same for a rotationally symmetric PSF in a window around the axis.
+    points_along_radius: the largest number of points for a rotationally symmetric PSF in a window around the axis.
     fewest: number of points below which the estimate is useless.
-    spare_digits: numbers of digits by which the direct sum exceeds the accuracy of the tolerance. They are tried in
-        this order. The first number with which all points can be checked in time is used, or else the last number.
+    spare_digits: numbers of digits by which the direct sum is more accurate than the tolerance, tried in this order.
+        The first number with which all points can be checked in time is used, or else the last number.
     share: time limit of the check, relative to the time of the PSF.
-    share_of_few: the same for windows with fewer than `few` samples, where `share` is too short for `fewest` points.
+    share_of_few: the same for windows with fewer than `few` samples, since `share` leaves no time for `fewest` points.
         Without a check, the error of the PSF may be as large as its predicted upper bound.
     seconds: time [s] that a check may take even if the shares permit less.
     """
@@ -61,7 +61,7 @@ EFFORT = Effort()
 
 @dataclass(frozen=True)
 class _DirectSum:
-    """The reference: the direct sum at a number of points.
+    """The direct sum with which a PSF is compared, at `points` points of the window.
 
     Its quadrature resolves `cycles` cycles per pupil radius and is accurate to `digits` digits.
     """
@@ -107,17 +107,17 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
 def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> float:
     """Return the relative error of an intensity computed by the direct sum.
 
-    It has two causes: the rounding of paths, and the quadrature. The quadrature's error of the amplitude is 10^-digits
-    times the amplitude that all light would have in phase. The intensity has twice the amplitude's relative error.
+    It has two causes: the rounding of paths, and the quadrature. The quadrature changes the amplitude by 10^-digits
+    times the amplitude of light that all arrives in phase. The intensity has twice the relative error of the amplitude.
     """
     return 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
 
 
 def path_rounding(problem: Problem, darkness: float) -> float:
-    """Return the relative error of the intensity that the rounding of paths in float64 causes.
+    """Return the relative error of the intensity due to the rounding of optical paths in float64.
 
-    A phase error of δ [rad] changes the amplitude by δ times the amplitude that all light would have in phase. The
-    comparison with the direct sum does not show this error, because the direct sum has similar paths.
+    A phase error of δ [rad] changes the amplitude by δ times the amplitude of light that all arrives in phase. A spot
+    check does not show this error, because the direct sum uses similar paths.
     """
     return WAVE_ROUNDING * problem.waves * 10.0**darkness
 
@@ -136,7 +136,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
-    """Return the most accurate direct sum that is fast enough at all points, or else a coarse one at fewer points."""
+    """Return the most accurate direct sum with time for all points, else the least accurate one, for fewer points."""
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
     share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
@@ -154,10 +154,10 @@ def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -
 
 
 def _finer_detail(beam: Beam, problem: Problem) -> float:
-    """Return how much finer detail a spot check resolves than the PSF does, as a difference [cycles per pupil radius].
+    """Return how many more cycles per pupil radius the direct sum of a spot check resolves than the PSF does.
 
-    A PSF neglects detail of reliefs, wavefronts and masks below a tenth of its tolerance. The direct sum, with which a
-    spot check compares it, resolves finer detail. Otherwise the comparison would not show the resulting error.
+    A PSF neglects detail of reliefs, wavefronts and masks that changes phases [rad] by less than a tenth of the PSF's
+    tolerance. The direct sum resolves finer detail. Otherwise the comparison would not show the resulting error.
     """
     fine = beam.pupil.bandwidth(beam.wavelength, FINER_DETAIL * problem.tolerance / 10)
     return problem.radius * max(fine - problem.detail, 0.0)
@@ -180,10 +180,10 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
 def exact_psf(
     beam: Beam, problem: Problem, x: np.ndarray, y: np.ndarray, bright: float, seconds: float
 ) -> tuple[np.ndarray, float] | None:
-    """Return the PSF at points (x, y) [m] by the direct sum, and the relative error of a value of `bright` [1/m²].
+    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error where it is `bright` [1/m²].
 
     The result is None if PSFs of this problem may be wrong beyond some distance from the axis (`Problem.reach`), or if
-    the sum needs more time than `spot_check` may spend on a PSF whose computation takes `seconds`.
+    the sum takes too long. Its time limit is that of `spot_check` for a PSF that takes `seconds`.
     """
     darkness = _darkness(beam, problem, bright)
     reference = _affordable(beam, problem, darkness, seconds)
@@ -253,8 +253,8 @@ def _in_order(window: Grid) -> np.ndarray:
 def _by_radius(window: Grid) -> np.ndarray:
     """Return the flat indices of a window's samples in order of their distance from the axis.
 
-    `_drawn` adds up the probabilities of the samples in this order, and draws one sample in each equal step of the sum.
-    The drawn samples are therefore spread over all bright rings.
+    `_drawn` adds up the samples' probabilities in this order, and draws a sample at equal steps of the growing sum. The
+    drawn samples are therefore spread over all bright rings.
     """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
     # Squared radii are rounded, so that rounding errors do not change the order of equal radii.
@@ -271,11 +271,11 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return two flat arrays for `_chances`: sums of probability distributions over the samples of a window.
+    """Return two flat arrays, with one number per sample of a window, from which `_chances` adds up probabilities.
 
-    These distributions do not depend on the PSF. The first array is the sum of two distributions. One of them prefers
-    samples near a side of the window, the other samples near a corner. The second array is the first array plus the
-    uniform distribution.
+    The arrays do not depend on the PSF. The first is the sum of two probability distributions. One of them prefers
+    samples near a side of the window, the other samples near a corner. The second array is the first plus the uniform
+    distribution.
 
     centre: position (x, y) of the window's centre, in samples.
     """

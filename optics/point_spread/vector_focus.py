@@ -46,7 +46,8 @@ def vector_focus(
     Fresnel number.
 
     wavelength: wavelength [m] in vacuum.
-    sensor_distance: distance [m] behind the pupil. None: the focus of the ideal lens, or 240 µm without one.
+    sensor_distance: distance [m] behind the pupil. None: the focus of the ideal lens, or 240 µm if the pupil has no
+        ideal lens.
     polarization: polarisation of the light in front of the pupil: a Jones vector (x, y) or Stokes parameters (S0, S1,
         S2, S3). Here S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey) and S3 = 2 Im(Ex* Ey). None: unpolarised. For oblique light,
         the x and y of these definitions are rotated with the light's direction.
@@ -95,7 +96,7 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
 def _check_rays(beam: Beam) -> None:
     """Raise an AccuracyError if the sine of a ray's angle to the axis exceeds STEEPEST behind the pupil.
 
-    This includes evanescent light, with a sine above 1.
+    Evanescent light, for which the sine is above 1, is refused as well.
     """
     steepest = beam.pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.index
     if steepest > STEEPEST:
@@ -119,7 +120,9 @@ def _check_aplanatic(beam: Beam) -> None:
 
 
 def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Return Jones vectors (part, 2) of parts that do not interfere, and the Stokes parameters divided by S0.
+    """Return the Jones vectors of the light's polarised parts, (part, 2), and the Stokes parameters divided by S0.
+
+    Polarised light has one part. Other light is the sum of two polarised parts that do not interfere.
 
     Raises:
         ValueError: `polarization` is neither a Jones vector nor Stokes parameters.

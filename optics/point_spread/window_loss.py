@@ -27,7 +27,7 @@ NEAR_ZERO = 2.0
 
 @dataclass(frozen=True, eq=False)
 class ErrorCauses(ReadOnlyArrays):
-    """Parts of the error of contrasts, as fractions of all light that arrives, (wavelength,).
+    """Parts of the error of a PSF's contrasts, as fractions of all light that arrives, (wavelength,).
 
     lost: upper bound on the light outside the window. It includes the uncertainty `light`.
     light: uncertainty of the amount of light that arrives.
@@ -40,17 +40,19 @@ class ErrorCauses(ReadOnlyArrays):
 
     @property
     def total(self) -> np.ndarray:
-        """Largest error of any contrast, (wavelength,)."""
+        """Largest error of the contrasts over all spatial frequencies, (wavelength,)."""
         found: np.ndarray = self.lost + self.rest
         return found
 
     def first(self, count: int) -> ErrorCauses:
-        """Return the parts of the first `count` wavelengths."""
+        """Return the parts of the error for the first `count` wavelengths."""
         return ErrorCauses(self.lost[:count], self.light[:count], self.rest[:count])
 
 
 def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return the error of each contrast due to light outside the window, (fy, fx), at the frequencies of `MTF.fx`.
+    """Return the error of the contrast at each frequency, (fy, fx), if light outside the window is missing.
+
+    The frequencies are those of `MTF.fx`, along both axes.
 
     Spectra have zeros, so each result is the largest estimate of nine neighbouring frequencies.
 
@@ -68,7 +70,7 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
 
 
 def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return an estimate of what the light outside the window contributes to each contrast, (fy, fx).
+    """Return an estimate of what light outside the window contributes to the contrast at each frequency, (fy, fx).
 
     The estimate assumes that this light has the same contrasts as the light in the outer parts of the window.
     """

@@ -7,7 +7,8 @@ the transfer function of free space and transformed onto the output samples:
 
 A finite transform repeats the field periodically, so light that lands one period away would wrap around into the
 window. The period is long enough for light that lands near the window, and a smooth fade in the spectrum removes light
-that lands farther away. Neither is possible close to grazing incidence; the predicted error includes such light.
+that lands farther away. Light close to grazing incidence can be kept away in neither of these ways. The predicted error
+includes it.
 """
 
 from __future__ import annotations
@@ -172,9 +173,11 @@ def propagated_between_depths(
 
 
 def step_map(result: PropagationResult, shape: tuple[int, int], depths: Depths | None) -> LinearMap:
-    """Return the propagation that gave `result`, which used transforms, as a linear map of fields (y, x) of `shape`.
+    """Return the propagation that gave `result` as a linear map of fields (y, x) of the shape `shape`.
 
-    depths: depths of a step between tilted planes.
+    The propagation must have used Fourier transforms, not matrix products.
+
+    depths: if a plane is tilted, the depths at which fields are computed, and between which they are interpolated.
     """
     how = result._sampling
     assert isinstance(how, TransformSampling)
@@ -191,9 +194,9 @@ def _field(u: np.ndarray) -> np.ndarray:
 
 
 def lit_part(field: np.ndarray) -> np.ndarray:
-    """Return the smallest part of a field around the centre sample that contains all light.
+    """Return the smallest part of a field (…, y, x) that has the same centre sample and contains all lit samples.
 
-    Dark samples outside it would only increase the cost.
+    Dark samples outside this part would only increase the cost.
     """
     for axis in (-2, -1):
         n = field.shape[axis]
@@ -207,7 +210,10 @@ def lit_part(field: np.ndarray) -> np.ndarray:
 def _propagated(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling | SeparableSampling, list[PropagatedPlane]]:
-    """Return the planes, propagated by transforms, or by matrix products if possible and predicted to be faster."""
+    """Return the sampling of the propagation, and the propagated field of each source (y, x) in `sources`.
+
+    Matrix products are used if they are possible and predicted to be faster, and Fourier transforms otherwise.
+    """
     direct = separable(passage, *grids, SEPARABLE_SHARE * tolerance)
     if direct is None:
         return _with_padding(sources, passage, grids, tolerance, types)
@@ -224,10 +230,13 @@ def _propagated(
 def _with_padding(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling, list[PropagatedPlane]]:
-    """Return the planes, propagated with enough padding for the blur due to light at the Nyquist frequency.
+    """Return the sampling and the propagated fields, with enough padding to keep a blur away from the window.
 
-    If even the largest useful padding is insufficient, the initial one is kept, because the samples themselves are then
-    too coarse.
+    The spectrum is truncated at the Nyquist frequency. Light at this frequency therefore causes a blur, which falls
+    with the padding of the Fourier transform.
+
+    If even the largest useful padding (`most_spare`) is insufficient, the samples themselves are too coarse. An initial
+    padding of about √(λz) is then kept.
     """
     most = most_spare(passage, grids[0])
     spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)

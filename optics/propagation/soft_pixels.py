@@ -9,9 +9,10 @@ would be wrong, because the product of two softened functions differs from their
 The convolution is a sum over quadrature nodes within the pixels (`optics.apertures.pixelated`). The nodes resolve every
 frequency of the kernel within each pixel. Large pixels are divided into several smaller ones for this purpose.
 
-On a tilted pupil, samples that are evenly spaced across the axis have the coordinates x' = a x + b y and y' = b x + d y
-along the pupil. If b is not 0, one coordinate after the other is evaluated (two shears), and the matrix of either
-coordinate is shifted by an amount that depends on the other one. The shifts are phase factors of a spectrum.
+On a tilted pupil, samples that are evenly spaced in a plane perpendicular to the axis have the coordinates x' = a x + b
+y and y' = b x + d y along the pupil. If b is not 0, the convolution is evaluated along x first and then along y. In
+either case, the samples along the one coordinate are shifted by an amount proportional to the other coordinate (a
+shear). The shifts are phase factors of a spectrum.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class SoftPixels:
     aperture: opening, divided into the pixels or into parts of them.
     across: number of nodes along a pixel.
     ripple: ripple of the kernel's spectrum.
-    alignment: position of the pupil. If it is tilted, samples are farther apart along the pupil than across the axis.
+    alignment: position of the pupil. If the pupil is tilted, samples are farther apart along the pupil than in a plane
+        perpendicular to the axis.
     """
 
     edge: SoftEdge
@@ -63,7 +65,7 @@ class SoftPixels:
     ) -> SoftPixels:
         """Return the filter that leaves frequencies up to `passband` unchanged along x and y, to within `ripple`.
 
-        widest_reach: largest distance beyond the aperture at which a sample may be lit.
+        widest_reach: largest distance beyond the aperture's edge at which the softened transmittance may differ from 0.
 
         Raises:
             ValueError: the radius of the pupil carries a derivative.
@@ -114,7 +116,7 @@ class SoftPixels:
         return RIPPLES * self.ripple + cut + 2 * FLOAT_NOISE[dtype]
 
     def behind(self, beam: Beam, grid: Grid, types: Precision) -> Field:
-        """Return the field just behind the pupil at the samples of a grid about its centre."""
+        """Return the field just behind the pupil at the samples of a grid about the pupil's centre."""
         pupil, at = beam.pupil, self.aperture.rows(self.across)
         x, y = (types.Float64(padded_for_packets(axis)) for axis in np.meshgrid(at, at))
         turns = like(x, pupil.index_step(beam.wavelength)) * like(x, 1 / beam.wavelength)
@@ -157,7 +159,7 @@ class _Filter:
     def between(
         cls, edge: SoftEdge, samples: np.ndarray, nodes: np.ndarray, shifts: np.ndarray, types: Precision
     ) -> _Filter:
-        """Return the filter along one axis, from values at `nodes` to values at `samples`.
+        """Return the filter along one axis that computes values at the positions `samples` from values at `nodes`.
 
         shifts: for each position along the other axis, the distance by which all samples are shifted.
         """
@@ -176,7 +178,8 @@ class _Filter:
         """Return the filtered values at the samples, given values at the nodes.
 
         The filter acts along x or along y. Samples and nodes lie along this axis, and positions along the axis
-        perpendicular to it. The result is an array (sample, position), and `values` is an array (node, position).
+        perpendicular to it. The filter is applied for each position along the perpendicular axis. The result is an
+        array (sample, position), and `values` is an array (node, position).
         """
         if self.matrix is not None:
             return _product(self.matrix, values)
@@ -189,7 +192,8 @@ class _Filter:
         """Return the adjoint of the linear map `forward`, applied to values at the samples.
 
         The filter acts along x or along y. Samples and nodes lie along this axis, and positions along the axis
-        perpendicular to it. `values` is an array (sample, position), and the result is an array (node, position).
+        perpendicular to it. The adjoint is applied for each position along the perpendicular axis. `values` is an array
+        (sample, position), and the result is an array (node, position).
         """
         if self.matrix is not None:
             return _product(self.matrix.T, values)
@@ -223,7 +227,8 @@ def _product(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _stretch(alignment: Alignment) -> float:
     """Return an upper bound of distances along a tilted pupil, relative to those in a plane perpendicular to the axis.
 
-    Let s be the tangent of the tilt. Distances grow by a factor of at most 1 + s²/2. The bound also includes the two
-    shears by which the kernel is evaluated on a tilted pupil (see the module). They are at most s²/4.
+    Let s be the tangent of the tilt. Distances grow by a factor of at most 1 + s²/2. The bound also allows for two
+    shears, in which samples along one coordinate are shifted in proportion to the other coordinate. Each shift is at
+    most s²/4 times the other coordinate.
     """
     return 1 + alignment.steepness**2

@@ -74,7 +74,7 @@ class ScaledPlane:
 def filtered(
     given: np.ndarray, how: TransformSampling, types: Precision, depths: Depths | None = None
 ) -> PropagatedPlane:
-    """Return a plane (y, x) after propagation, between tilted planes if depths are given."""
+    """Return a plane (y, x) after propagation. If `depths` is given, the two planes may be tilted."""
     scaled = ScaledPlane.from_plane(given, types)
     plane, total = scaled.u, scaled.power
     if total == 0:
@@ -111,7 +111,7 @@ def filtered(
 def linear_map(
     how: TransformSampling, shape: tuple[int, int], types: Precision, depths: Depths | None = None
 ) -> LinearMap:
-    """Return the propagation that `filtered` computes as a linear map of fields (y, x) of this shape.
+    """Return a linear map that propagates fields (y, x) of this shape as `filtered` does.
 
     The map depends on the distance z between the planes. Its derivative with respect to z (`LinearMap.rate`) does not
     include the derivative of the carrier exp(ikz).
@@ -147,7 +147,7 @@ def linear_map(
 
 
 def _middle(shape: tuple[int, int], part: tuple[int, int]) -> tuple[slice, ...]:
-    """Return the index of a part around the centre sample, which is sample n//2 of the whole and of the part."""
+    """Return the index of a part that has the same centre as the whole. The centre of n samples is sample n//2."""
     starts = [n // 2 - m // 2 for n, m in zip(shape, part, strict=True)]
     return tuple(slice(start, start + m) for start, m in zip(starts, part, strict=True))
 
@@ -164,7 +164,7 @@ def _spectrum(plane: np.ndarray, how: TransformSampling) -> np.ndarray:
 
 
 def _result(spectrum: np.ndarray, how: TransformSampling) -> np.ndarray:
-    """Return the field (y, x) of a spectrum over the window."""
+    """Return the field (y, x) at the samples of the window, given its spectrum."""
     if how.step:
         return periodic_sum(spectrum, how.period, how.step, how.window.shape)
     return fourier_sum(spectrum, how.back_period, how.window.shape, +1)

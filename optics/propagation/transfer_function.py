@@ -61,12 +61,12 @@ FADE_SINES = np.geomspace(0.003, 0.6, 33)
 class Band:
     """A band of frequencies: light is unchanged up to `kept` [1/m] and faded out between `kept` and `kept` + `fade`.
 
-    kept: infinite if no light may be faded, so that the band contains all frequencies.
-    square: False for a fade of the radial frequency √(fx² + fy²). True for the product of two fades, one along x and
-        one along y. In the paraxial case, they depend on fx and on fy. Otherwise the fade along x depends on fx / √(1 -
-        λ²fy²), and that along y correspondingly.
-    walk: sideways distance [m] within which the light of the band lands in the next plane. It is the displacement of
-        light at the frequency `kept` + `fade`, plus the distance over which the outer end of the fade blurs the field.
+    kept: infinite if no light is faded out. The band then contains all frequencies.
+    square: False for one fade of the radial frequency √(fx² + fy²). True for the product of two fades, one along x and
+        one along y. In the paraxial case, these are functions of fx and of fy. Otherwise the fade along x is a function
+        of fx / √(1 - λ²fy²), and the fade along y is a function of fy / √(1 - λ²fx²).
+    walk: largest sideways displacement [m] of the band's light at the next plane. It is the displacement of light at
+        the frequency `kept` + `fade`, plus the distance over which this light is blurred by the fade.
     """
 
     kept: float
@@ -81,8 +81,8 @@ class Band:
     def diagonal(self, wavelength: float) -> float:
         """Return the highest radial frequency [1/m] of a square band.
 
-        It lies on the diagonal fx = fy, where fx / √(1 - λ²fy²) equals `kept` + `fade`, the end of the fade along x.
-        λ is the wavelength [m] in the medium.
+        At this frequency, fx = fy, and fx / √(1 - λ²fy²) equals `kept` + `fade`, at which the fade along x reaches 0. λ
+        is the wavelength [m] in the medium.
         """
         return math.sqrt(2) * self.end / math.hypot(1, self.end * wavelength)
 
@@ -100,10 +100,11 @@ def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxia
     """Return the band of the light whose sideways displacement over the distance z is at most `corner` [m].
 
     Light of higher frequencies is faded out. The width of the fade is chosen so that the Fourier transforms of the
-    propagation can have the shortest period. The result is `EVERYTHING` if no light may be faded.
+    propagation can have the shortest period. The result is `EVERYTHING`, without a fade, if z is 0 or if every fade
+    would end too near grazing incidence.
 
-    ripple: the fade blurs the field, so some of the faded light lands closer than it would without the blur. This is
-        the fraction of its amplitude that may land at displacements of at most `corner`.
+    ripple: fraction of the amplitude of faded light that may land at displacements of at most `corner`. Some of it
+        lands there, because the fade blurs the field.
     """
     return _shortest(corner, wavelength, z, ripple, paraxial, square=False)
 
@@ -111,14 +112,15 @@ def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxia
 def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
     """Return the band of the light whose displacements along x and along y over the distance z are at most `half` [m].
 
-    Light that moves farther along x or y is faded out. The round band of `kept_band` must include the displacement to
-    the corner of a square window in every direction. This square band includes it only along the diagonals, so it can
-    be smaller. Unless paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²) instead of fx alone, so the
-    fade along x is a function of this expression. The fade blurs the field over a larger distance than a fade in fx,
-    by a factor that is the largest gradient of the expression. The result is `EVERYTHING` if no light may be faded.
+    Light that moves farther along x or y is faded out. In a square window, displacements as far as a corner occur only
+    along the diagonals. The round band of `kept_band` includes displacements of this length in every direction, so the
+    square band can be smaller. Unless paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²) instead of
+    fx alone, so the fade along x is a function of this expression. It blurs the field over a larger distance than a
+    fade in fx. The ratio of the two distances is the largest gradient of the expression. The result is `EVERYTHING`,
+    without a fade, if z is 0 or if every fade would end at too large an angle.
 
-    ripple: because of the blur, some of the faded light lands closer than it otherwise would. This is the fraction of
-        its amplitude that may land at displacements of at most `half`.
+    ripple: fraction of the amplitude of faded light that may land at displacements of at most `half` because of the
+        blur.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
@@ -129,8 +131,8 @@ def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: 
     These limits do not depend on which light can reach the next plane. The result is `EVERYTHING` if light at the
     frequency kept + fade is too near grazing incidence.
 
-    ripple: the fade blurs the field over a certain distance. This is the fraction of the amplitude of faded light that
-        the blur moves farther than this distance. A smaller fraction belongs to a larger distance.
+    ripple: fraction of the amplitude of faded light that the blur may move beyond the distance for which `Band.walk`
+        allows. The smaller the fraction, the larger is this distance.
     """
     if (kept + fade) * wavelength >= PERIOD_MAX_SINE:
         return EVERYTHING
@@ -165,7 +167,8 @@ def _walk(band: Band) -> float:
 def _gradient(sine: float) -> float:
     """Return the largest gradient |∇F| of F(fx, fy) = fx / √(1 - λ²fy²).
 
-    The distance that light moves along x depends on F. The fade along x of a square band (`Band`) is a function of F.
+    Over a distance z, light moves zλF / √(1 - λ²F²) along x. A square band (`Band`) is faded out along x by a function
+    of F.
 
     sine: largest value of λ|F| and of λ|fy|, where λ is the wavelength, and fx and fy are spatial frequencies.
     """
@@ -187,10 +190,10 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _fade_table(ripple: float) -> Interpolant:
-    """Return a fade from 1 at 0 to 0 at 1: the complement of the integral of a Kaiser window.
+    """Return a function that decreases from f(0) = 1 to f(1) = 0: the complement of the integral of a Kaiser window.
 
     A fade of this shape over a band of width Δf blurs a field over the distance β/(π Δf), where β is the window's
-    parameter. The amplitude beyond this distance is the fraction `ripple`.
+    parameter. The fraction `ripple` of the faded light's amplitude is blurred farther than this.
     """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)
@@ -212,7 +215,7 @@ class TransferFunction:
 
     transfer: the transfer function, with all factors that do not depend on the field, complex (fy, fx).
     grazing: 1 for frequencies whose light is too near grazing incidence, else 0, (fy, 2 fx). Each value occurs twice in
-        succession, for the real and the imaginary part of the spectrum. None if all values are 0.
+        succession, for the real and the imaginary part of the spectrum. `grazing` is None if all values would be 0.
     """
 
     transfer: np.ndarray
@@ -228,8 +231,8 @@ class Passage:
     paraxial: True for Fresnel's approximation.
     band: band of the light that can reach the window.
     centre: position (x, y) [m] of the window.
-    ripple: fraction of the amplitude of removed light that may still reach the window. Light outside the band is
-        removed by fading out its frequencies, which blurs the field and so spreads this light.
+    ripple: fraction of the amplitude of faded light that may still reach the window. Light outside the band is faded
+        out. The fade blurs the field, so some of this light reaches the window although it would otherwise miss it.
     limit: band beyond which light is removed although it could reach the window; None if there is no limit.
     by_transforms: True if Fourier transforms must not be replaced by matrix products.
 
@@ -255,7 +258,7 @@ class Passage:
         return TransferFunction(self._transfer(fx, fy, types), weight)
 
     def _transfer(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> np.ndarray:
-        """Return the transfer function of free space H, multiplied by the fade of light outside `band`.
+        """Return the transfer function H of free space, multiplied by the factors that fade out light outside `band`.
 
         The result also contains the phase that displaces the field to the window's centre. It is an array (fy, fx).
         Whole waves are subtracted from the phases in float64.

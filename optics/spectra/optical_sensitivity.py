@@ -22,8 +22,8 @@ def optical_sensitivity(
 ) -> float:
     """Return Land's optical sensitivity S = (π/4)² D² (d/f)² P [m² sr].
 
-    The photons that a receptor absorbs are S times the radiance of a scene that fills its visual field. P is the
-    fraction of the light entering the receptor that it absorbs over its length l:
+    The photons that a receptor absorbs are S times the radiance of a scene that fills its visual field. Of the light
+    that enters the receptor, the fraction P is absorbed over the receptor's length l:
 
         P = k l / (2.3 + k l)   for white light (Warrant & Nilsson, Vision Research 38, 195, 1998, eq. 4),
         P = 1 - exp(-k l)       for light at the pigment's peak (Land, Handbook of Sensory Physiology VII/6B, 1981).

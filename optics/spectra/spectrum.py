@@ -1,7 +1,7 @@
 """Spectra as tables: illuminants, reflectances, cone fundamentals, and user data.
 
-The tables are copied from the package colour-science, and tests compare them with the package. Only the tables of water
-and phytoplankton are copied from publications. The original sources are named with each table.
+The tables of water and phytoplankton are copied from publications. All others are copied from the package
+colour-science, and tests compare them with the package. The original sources are named with each table.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Signals of one kind of an agent's eyes in all worlds, including noise and the dynamics of receptors."""
+"""Signals of those eyes of an agent that are of one kind, in all worlds, with noise and receptor dynamics."""
 
 from __future__ import annotations
 
@@ -143,9 +143,10 @@ class EyesOfKind:
         return spaces.Box(low, high, frames, np.float32)
 
     def _brightest(self) -> float:
-        """Return the largest signal of a white surface that faces all directional lights at once, or of veiling light.
+        """Return the larger of the signals of veiling light and of a white surface that faces all directional lights.
 
-        If light varies, this is the largest signal at the ends of its ranges (`Variation.extremes`).
+        If light varies from episode to episode, return the largest such signal at the limits of the ranges of the light
+        (`Variation.extremes`).
         """
         variation = self._simulation.variation
         if variation is None or not variation.of_light:

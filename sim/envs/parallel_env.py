@@ -119,7 +119,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         `render_mode` selects one of the two. Without a mode, the result is None.
 
         Raises:
-            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
+            RuntimeError: `render_mode` is not None, and either there has been no reset yet or `close` has been called.
         """
         if self.render_mode is None:
             return None

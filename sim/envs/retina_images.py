@@ -40,14 +40,14 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
 
 
 def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Return images (y, x, 3) stacked vertically, padded to the same width with the grey of the gaps."""
+    """Return images (y, x, 3) stacked vertically with grey gaps; grey also fills the space beside narrower images."""
     width = max(picture.shape[1] for picture in pictures)
     rows = [np.pad(p, ((GAP, 0), (0, width - p.shape[1]), (0, 0)), constant_values=BETWEEN) for p in pictures]
     return np.concatenate(rows)[GAP:]
 
 
 def _palette(eye: Eye) -> np.ndarray:
-    """Return the linear sRGB colour in which each signal of an eye is shown if the receptor sees white.
+    """Return the linear sRGB colour in which each signal of an eye is shown if its receptor sees white.
 
     If the receptor receives less light than from white, the colour is darker in proportion to the signal. The result is
     an array (channel, row, column, 3).

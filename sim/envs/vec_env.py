@@ -31,7 +31,8 @@ class EyesVecEnv(OneEnvironment):
     documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
     observation is then the first observation of the new episode, and info["terminal_observation"] is the last
     observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
-    episodes depend only on the seed, the world's index and its actions. A `sim.BatchTask`'s exceptions are raised.
+    episodes depend only on the seed, the world's index and its actions. An exception in a `sim.Task` during an episode
+    ends it as a failure, whereas an exception in a `sim.BatchTask` is raised.
 
     simulation, renderers: the worlds, and renderers of every agent's eyes
     memory, render_mode: see `sim.make_vec_env`
@@ -72,7 +73,7 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def batch_task(self) -> BatchTask:
-        """The task on arrays of all worlds."""
+        """The task in its batched form, whose methods take and return arrays with one row for each world."""
         return self.simulation.task
 
     @property
@@ -108,9 +109,9 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations)
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
-        """Seed each world with its own seed at the next reset; None: the world draws this seed itself.
+        """Give each world its own seed at the next reset; a world whose seed is None draws a seed itself.
 
-        An episode is then the same as in a single environment with this seed.
+        The episodes of a world are then the same as in a single environment with the world's seed.
 
         Raises:
             ValueError: there is not one seed per world, or a seed is neither None nor a whole number of at least 0.
@@ -192,7 +193,7 @@ class EyesVecEnv(OneEnvironment):
         """Restore a stored state in these worlds (None: all); return the current observations of all worlds.
 
         Raises:
-            ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
+            ValueError: the state is from another task or another number of worlds, or a world's index is out of range.
             RuntimeError: there was no reset, `close` was called, an action is pending, or MuJoCo's "sleep" is enabled.
         """
         held_state.checked(state, self.get_state())
@@ -207,7 +208,7 @@ class EyesVecEnv(OneEnvironment):
         self.simulation.close()
 
     def get_images(self) -> list[np.ndarray]:
-        """Return images (y, x, 3) uint8, see `WorldPictures.taken`; an empty list without a mode.
+        """Return images (y, x, 3) uint8, see `WorldPictures.taken`; an empty list if `render_mode` is None.
 
         Raises:
             RuntimeError: there has been no reset yet, `close` has been called, or an action is pending.
@@ -262,7 +263,7 @@ class EyesVecEnv(OneEnvironment):
         return infos
 
     def _first_infos(self, worlds: np.ndarray) -> list[dict[str, Any]]:
-        """Return the infos before the first action in these worlds: all of the first learner, then of the second."""
+        """Return the infos of these worlds before the first action: one per world, learner after learner."""
         simulation = self.simulation
         more = simulation.task.first_info(simulation.physics, worlds) or [{}] * len(worlds)
         return [

@@ -27,10 +27,10 @@ class OmmatidialSampling:
     """Samples of a compound eye.
 
     An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
-    weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. With 8
-    rays or more, weights are corrected so that the signals of two test scenes are exact in every band. Equal ommatidia
-    share 16 arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random choice, so that the errors
-    of neighbours are nearly independent.
+    weight of a ray is the integral of the acceptance function over the directions that are nearer to it than to any
+    other ray. With 8 rays or more, weights are corrected so that the signals of two test scenes are exact in every
+    band. Equal ommatidia share 16 arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random
+    choice, so that the errors of neighbours are nearly independent.
 
     depth: a single layer, because facets have a large depth of field
     """
@@ -84,8 +84,9 @@ class _RayPattern:
 def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
     """Return rays at the centroids of a Voronoi tessellation of directions, by Lloyd's algorithm (1982).
 
-    The weight of a ray is the integral of the acceptance function over its cell. Importance weights at random points
-    would double the error at edges, because bands differ in their acceptance functions.
+    The weight of a ray in a band is the integral of the band's acceptance function over the ray's cell. Random points
+    with importance weights would double the error at edges in the scene. All bands share the rays but differ in their
+    acceptance functions, so these weights would vary from ray to ray.
 
     seed: determines the initial points
     """
@@ -113,7 +114,7 @@ def _tests(places: np.ndarray, spread: float) -> np.ndarray:
     The light is uniform in the first scene, and a Gaussian of variance `spread` around the ommatidium's axis in the
     second.
 
-    places: components of the directions, which are unit vectors, perpendicular to the axis, (direction, 2)
+    places: the two components perpendicular to the ommatidium's axis of each direction (a unit vector), (direction, 2)
     """
     return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
 
@@ -141,11 +142,11 @@ def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray,
 def _centroids(
     points: np.ndarray, places: np.ndarray, masses: np.ndarray, nearest: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return for each point the centre of mass of the places that are nearest to it, (point, 2).
+    """Return for each point the centre of mass of the places that are nearer to it than to other points, (point, 2).
 
-    A point without mass stays where it is.
+    If the mass of these places is 0, the point stays where it is.
 
-    places, masses: positions (place, 2) and their masses (place,)
+    places, masses: positions (place, 2), and the mass at each position (place,)
     nearest: index of the nearest point for each place, (place,); None: computed here
     """
     nearest = KDTree(points).query(places)[1] if nearest is None else nearest

@@ -44,7 +44,10 @@ class Motion:
     unstable: np.ndarray
 
     def put(self, worlds: np.ndarray, motion: Motion) -> None:
-        """Overwrite the motion of the worlds with these indices. Use this only while a result is being assembled."""
+        """Overwrite the motion in the worlds with these indices, in place.
+
+        Call this only before the object is returned to other code, because results are not meant to change.
+        """
         for name, array in vars(self).items():
             array[worlds] = getattr(motion, name)
 
@@ -133,7 +136,7 @@ class AgentPhysics:
         return motion
 
     def _simulate(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """Step the agents in the whole world with MuJoCo."""
+        """Simulate the agents with MuJoCo in the complete model of the world, with all its geoms."""
         models = [self._model] * len(velocity)
         return self._motion(agents.position, *self._step_batch(models, *self._start_of(agents, velocity)))
 
@@ -161,7 +164,7 @@ class AgentPhysics:
     def _untouched(
         self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's paths [m] and velocities [m/s] with contacts disabled, (n, substep, 2) each.
+        """Return paths [m] and velocities [m/s] of agents, simulated by MuJoCo without contacts, (n, substep, 2) each.
 
         speed, command: initial and commanded velocities [m/s], (n, 2)
         displacement: displacements of the starting points from the agent's initial position [m], (n, 2)

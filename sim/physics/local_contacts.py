@@ -29,8 +29,8 @@ class LocalContacts:
     """Small models that contain the agent and only a few of a world's geoms. They are built on demand and cached.
 
     whole: the world's complete model
-    alone: the model of the world's agent without the world (`sim.worlds.agent_model`)
-    free_motion: obstacles of the agent, and the distance at which it may touch them
+    alone: the model of the agent without the walls and objects of its world (`sim.worlds.agent_model`)
+    free_motion: obstacles that the agent can touch, and the largest distance at which it may touch one
     threads: number of threads for MuJoCo's batched step of 128 or more worlds
     """
 
@@ -47,9 +47,9 @@ class LocalContacts:
         self._step = BatchedStep(self._alone, threads)
 
     def few(self, in_reach: np.ndarray) -> np.ndarray:
-        """Return a mask of the obstacles that each agent's small model contains, (agent, obstacle) bool.
+        """Return True for the obstacles in the small model in which each agent is simulated, (agent, obstacle) bool.
 
-        A small model contains all obstacles within the agent's reach. However, it has room for only 4 obstacles
+        The small model contains the agent and all obstacles within its reach. However, it has room for only 4 obstacles
         (`sim.worlds.agent_model.ROOM`). If more are within reach, it contains none.
 
         in_reach: True for the obstacles within reach of each agent, (agent, obstacle) bool
@@ -72,9 +72,10 @@ class LocalContacts:
         return self._step(models, initial, control)
 
     def strayed(self, position: np.ndarray, path: np.ndarray, few: np.ndarray) -> np.ndarray:
-        """Return whether agents came within reach of obstacles that their small models lack, (n,) bool.
+        """Return whether each agent came within reach of an obstacle that its small model lacks, (n,) bool.
 
-        This happens if one obstacle deflects an agent towards another one.
+        The small model, in which the agent is simulated, contains only the obstacles that it would reach without
+        contacts. One of these may deflect the agent towards another obstacle.
 
         position: positions at the beginning (n, 2) [m]
         path: positions after each substep, relative to `position` (n, substep, 2) [m]

@@ -123,7 +123,7 @@ class CameraRays:
 
     @property
     def recordings(self) -> int:
-        """Number of times that the kernels were recorded."""
+        """Number of times that Dr.Jit recorded the kernels, instead of reusing an earlier recording."""
         return int(self._outside.n_recordings + self._inside.n_recordings)
 
     def _trace(
@@ -168,9 +168,9 @@ class CameraRays:
 
 
 def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
-    """Return the first hits of rays, which the inner sides of closed shapes do not stop.
+    """Return the first hit of each ray, if rays pass through the inner sides of closed shapes.
 
-    si: first hits of the rays, including inner sides
+    si: first hits of the rays, including hits on inner sides
     closed: see `CameraInputs`
     """
 

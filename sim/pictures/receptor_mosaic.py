@@ -1,4 +1,7 @@
-"""Signals of the receptors that see a photograph, drawn as hexagons or squares and written as EXR."""
+"""Signals of receptors that see a photograph.
+
+The receptors are drawn as hexagons or squares, and their signals can be written to an EXR file.
+"""
 
 from __future__ import annotations
 

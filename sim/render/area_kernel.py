@@ -26,7 +26,10 @@ from sim.tracing.areas.patch import Area
 
 @dataclass(frozen=True)
 class BorderInputs:
-    """Horizontal directions to the borders between columns of areas, the rectangles of an eye's visual field.
+    """Borders between areas, with the horizontal directions in which they lie.
+
+    Areas are the rectangles into which an eye's visual field is divided. Areas in the same column share their left and
+    right borders.
 
     lanes: indices of lanes, the parallel computations of a kernel; there is one for each border of each eye in each
         world
@@ -76,8 +79,9 @@ class AreaKernel(RayKernel):
     def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None, facets: Facets | None = None) -> AreaInputs:
         """Return the inputs of the kernel; see `RayKernel.inputs`.
 
-        ways: centres of the areas on the plane at distance 1, (area, 3)
-        bounces, facets: ignored, because areas do not use them
+        ways: centres of the areas on the tangent plane, which is perpendicular to the eye's axis at the distance 1,
+            (area, 3)
+        bounces, facets: ignored, because they describe rays, which this kernel does not trace
         """
         whole, places = super().inputs(ways), self._areas.places
         return AreaInputs(
@@ -123,7 +127,10 @@ class AreaKernel(RayKernel):
         return self._areas.radiance(area, faces, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
-        """Return the tables of the light on the bodies of all worlds (`IlluminatedBodies`); [] if none are needed."""
+        """Return tables of the light that reaches and leaves bodies in all worlds; [] if none are needed.
+
+        Their rows are described in `IlluminatedBodies`.
+        """
         if inputs.places is None:
             return []
         world = inputs.places // self._areas.places
@@ -137,9 +144,11 @@ class AreaKernel(RayKernel):
     def _shared_border_faces(
         self, frame: Frame, inputs: AreaInputs, borders: BorderInputs, lane: Lane
     ) -> tuple[Array, Array]:
-        """Return the indices of the walls' faces that are visible at the left and the right border of an area.
+        """Return two indices for each area: of the wall's face visible at its left border, and of that at its right
+        border.
 
-        An area is a rectangle of an eye's visual field.
+        An area is a rectangle of an eye's visual field. The face is the one that a horizontal ray from the eye towards
+        the border hits first.
 
         lane: the area for which each lane (parallel computation) of the kernel is responsible
         """

@@ -32,8 +32,9 @@ class EdgeRays:
     """Sums of the light over each receptor's rays, with many rays only for receptors that see an edge.
 
     An edge is a border between surfaces of different brightness or colour. Four rays are traced for every receptor. The
-    full number of rays is traced if the four signals differ, or if a neighbouring receptor differs strongly. The result
-    approximates the sums of `RayKernel.sums`, for which every receptor has the full number of rays.
+    full number of rays is traced if the four signals differ, or if the receptor's signal differs strongly from the
+    signal of a neighbouring receptor. The result approximates the sums of `RayKernel.sums`, for which every receptor
+    has the full number of rays.
 
     kernel: kernel that traces the rays
     sampling: rule by which the directions of the receptors' rays are chosen
@@ -56,10 +57,12 @@ class EdgeRays:
     def launch(self, launch: Launch) -> Callable[[], np.ndarray]:
         """Start rendering, and return a function that waits for the sums of light over each receptor's rays.
 
-        All sums are scaled to 4 rays per receptor. The worlds must not change before the sums are read. The sums are a
-        flat array (component, world, eye, receptor).
+        Sums over more than 4 rays are multiplied by 4 and divided by the number of rays, so that all receptors are
+        comparable. The worlds must not change before the sums are read. The sums are a flat array (component, world,
+        eye, receptor).
 
-        launch: function that starts a frozen kernel, which is a recorded kernel
+        launch: function that launches a `FrozenKernel` with its inputs, and returns a function that waits for the
+            result
         """
         found = launch(self._coarse, self._first)
         return lambda: self._refined(found(), launch)
@@ -81,13 +84,14 @@ class EdgeRays:
         return light.ravel()
 
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
-        """Return a mask of the receptors whose signal differs strongly from a neighbour's, flat (view, receptor).
+        """Return a mask that is True for receptors whose signal differs strongly from that of a neighbour.
 
         An edge between two surfaces may pass unnoticed between the first four rays of such a receptor. Receptors at the
-        rim of the visual field are also compared with squares just outside it, which are as large as a receptor.
+        rim of the visual field are also compared with squares just outside it, which are as large as a receptor. The
+        mask is a flat array (view, receptor).
 
-        light: sums over the first four rays, array (component, view, square), in which a square is a receptor or lies
-            just outside the rim
+        light: sums of the light over the first four rays of each square, array (component, view, square). The squares
+            are those of the receptors, and those just outside the visual field
         """
         means = np.tensordot(np.array(self._signals), light, 1) / FIRST
         field = np.empty((*means.shape[:2], *self._beyond.shape), means.dtype)
@@ -102,11 +106,13 @@ class EdgeRays:
         return found[:, 1:-1, 1:-1].ravel()
 
     def _render_all(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
-        """Return the sums of light over the first four rays of each receptor, and the spread of their four signals.
+        """Return the sums of light over the first four rays of each square, and the spread of the signals of these
+        rays.
 
-        These rays test whether a receptor sees an edge. There is one array of sums for each component of the light's
-        spectrum. The spread is the difference between the largest and the smallest signal of the four rays, in the type
-        of receptor for which it is largest.
+        The squares are those of the receptors, and those just outside the visual field. The four rays test whether a
+        receptor sees an edge. There is one array of sums for each component of the light's spectrum. For one type of
+        receptor, the spread is the difference between the largest and the smallest signal of the four rays. The largest
+        spread of all types is returned.
         """
         components = self._kernel.layers(scenes, frame, inputs)
         signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]
@@ -140,8 +146,9 @@ def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
     """Return whether adaptive edge sampling is likely to save rays.
 
     Adaptive edge sampling first traces four rays for every receptor and for every square just beyond the rim of the
-    retina, and all rays only for receptors that see an edge. These first rays must be at most half of the rays without
-    adaptive sampling. With more first rays, nothing would be saved once a few receptors need all rays.
+    retina. It then traces the full number of rays, but only for receptors that see an edge. Return True if the first
+    rays are at most half of the rays without adaptive sampling. With more first rays, nothing would be saved once a few
+    receptors need all rays.
 
     resolution: number of rows and of columns of receptors
     rays: number of rays per receptor without adaptive sampling

@@ -30,7 +30,7 @@ class Counts:
 
     @classmethod
     def from_numbers(cls, samples: int, eyes: int) -> Counts:
-        """Return these numbers on the device."""
+        """Return the numbers of samples and eyes, copied to the device the device."""
         return cls(Divisor.from_number(samples), Divisor.from_number(eyes))
 
 
@@ -49,7 +49,7 @@ class Lane:
 
     @classmethod
     def from_index(cls, index: Array, counts: Counts) -> Lane:
-        """Return the lane with this index, flat (world, eye, sample)."""
+        """Return the lane with this index in the flat array (world, eye, sample) of all samples."""
         row = counts.samples.quotient(index)
         world = counts.eyes.quotient(row)
         return cls(world, row - world * counts.eyes.number, index - row * counts.samples.number, row)
@@ -78,17 +78,17 @@ class EyeRays(Protocol):
     """The eyes of all worlds, and the rays that start at them."""
 
     def fill(self, poses: Poses) -> None:
-        """Write the eyes of these worlds to the kernel's buffer."""
+        """Write the positions and orientations that the eyes have in these poses to the kernel's buffer."""
 
     def array(self) -> Array:
-        """Return the buffer of the eyes on the device, which the kernel reads."""
+        """Return the buffer, on the device, from which the kernel reads what `fill` wrote."""
 
     def directions(self, ways: np.ndarray, origins: np.ndarray | None = None) -> Directions:
         """Return the directions of all samples on the device, in the frame that `Directions` describes.
 
         ways: directions of the samples in the eye's frame, array (ray, 3)
         origins: starting points of the samples in the eye's frame [m], array (ray, 3); None: all samples start at the
-            pupil. Eyes that stand upright on one body ignore the starting points
+            pupil. For upright eyes (see `Directions`), `origins` is ignored, as if it were None
         """
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
@@ -96,7 +96,8 @@ class EyeRays(Protocol):
 
         The kernel calls this method, so all arguments and the result are Dr.Jit variables on the device.
 
-        rows: buffer with the poses of all eyes or of their bodies, in rows of four floats; `array` returns it
+        rows: the return value of the method `array`, in rows of four floats. It contains the poses of all free eyes, or
+            the poses of the bodies of upright eyes
         along: directions of the samples
         lane: the world, the eye and the sample of this ray
         samples: number of samples of an eye

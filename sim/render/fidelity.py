@@ -30,9 +30,9 @@ class Level:
 
     stage, level: names of the stage and of its chosen level, for example "light" and "bounce"
     why: reason for this choice
-    predicted_error: error of a signal that this level causes (root mean square); None if it is unknown. In the stage
-        "bands", if the number of bands is the eyes' own and was not chosen, the error is an upper bound, which may
-        exceed the tolerance. This bound is the largest error over all types of receptors and over several surfaces:
+    predicted_error: error of a signal that this level causes (root mean square); None if it is unknown. If the
+        eyes keep the number of bands that they were built with, the error in the stage "bands" is an upper bound, which
+        may exceed the tolerance. This bound is the largest error over all types of receptors and over several surfaces:
         measured reflectances and, in a medium, white and black
     """
 
@@ -48,20 +48,22 @@ class Fidelity:
 
     rays_per_receptor: average number of samples (rays or areas) per receptor, above 0 and at most 10⁷. With
         samples="edges", it is the number for receptors that see an edge. If the eye has a pupil, rays_per_receptor may
-        be below 1, since receptors share rays and may share areas.
-    bands: number of spectral bands, 1 to 4096, used instead of the eye's own. An eye in a world has at most 64 bands,
-        so a larger number cannot be rendered.
+        be below 1, because several receptors then use the same ray or area.
+    bands: number of spectral bands, 1 to 4096. It replaces the number of bands that the eye was built with. An eye in a
+        world has at most 64 bands, so a larger number cannot be rendered.
     depth: distances for which the eye has a PSF
     light: "direct": light of lamps after one reflection; "bounce": also after two reflections; "all": after any number
         of reflections, with samples="areas" only
     samples: "rays", "areas" or "edges". With "areas", each receptor's square is divided into rays_per_receptor
         rectangles, and the mean light in each of them is computed in closed form. If the eye has a pupil, there are
-        also rectangles around the receptors, and receptors share larger rectangles if rays_per_receptor is below 1.
-        Areas need a world of upright walls, a floor and spheres. "edges" is adaptive edge sampling: four rays per
-        receptor, and rays_per_receptor rays if the signals of the four differ, or if a neighbouring receptor differs
-        strongly. It needs a perfect lens and direct light, and is chosen automatically only for user models.
+        also rectangles outside the retina, along its rim, and receptors share larger rectangles if rays_per_receptor is
+        below 1. Areas need a world of upright walls, a floor and spheres. "edges" is adaptive edge sampling. A receptor
+        has four rays. It has rays_per_receptor rays instead if the signals of the four differ, or if its signal differs
+        strongly from that of a neighbouring receptor. Adaptive edge sampling needs a perfect lens and direct light, and
+        is chosen automatically only for user models.
     frames: number of rendered frames per action, for receptors with `dynamics`: a divisor of the number of physics
-        steps per action, at most 10⁶. None: environments choose the smallest number of frames whose error is allowed.
+        steps per action, at most 10⁶. None: environments choose the smallest number with which the error of the signals
+        is allowed.
     tolerance: allowed error of a receptor's signal (root mean square), above 0; None if nothing was chosen. In adaptive
         edge sampling, rays whose signals differ by at most the tolerance count as equal.
     levels: decisions by which this fidelity was chosen, with their reasons; see `Level`
@@ -107,7 +109,7 @@ class Fidelity:
 
     @property
     def why(self) -> str:
-        """Reasons for the chosen levels, one line per stage."""
+        """Reasons for the decisions about bands, depth layers, light and samples, one per line."""
         return "\n".join(f"{level.stage}: {level.why}" for level in self.levels) or "as requested"
 
     def __str__(self) -> str:
@@ -129,7 +131,7 @@ class Fidelity:
 def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
     """Return a fidelity with this number of rays per receptor; None for "auto".
 
-    In this fidelity, light is followed to one reflection ("direct"), and the spectral bands are as given for the eyes.
+    The fidelity includes only light that is reflected once ("direct"). Its number of spectral bands is `eyes.bands`.
 
     Raises:
         ValueError: the value is neither a positive number nor "auto".

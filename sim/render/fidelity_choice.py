@@ -3,8 +3,8 @@
 By default, the allowed error is half of the receptors' noise. A brain could not distinguish such an error from the
 noise. Every stage has levels, ordered by cost. The cheapest level whose predicted error is allowed is chosen, and
 stored with the reason. The available levels and their errors depend on the kind of scene (`world_fidelity`,
-`model_fidelity`). The rule for choosing a level is the same for all scenes (`cheapest`). Environments without a given
-fidelity apply this rule (`sim.envs.prepared_task`), and so do user tasks with the setting "auto"
+`model_fidelity`). The rule for choosing a level is the same for all scenes (`cheapest`). It is used in environments for
+which the user specifies no fidelity (`sim.envs.prepared_task`), and in user tasks whose setting `fidelity` is "auto"
 (`sim.tasks.task_fidelity`).
 """
 
@@ -21,7 +21,7 @@ from sim.render.fidelity import Fidelity, Level
 
 
 class FidelityWarning(UserWarning):
-    """Warning that no available level keeps the error within the tolerance."""
+    """Warning that even the most accurate rendering available has an error above the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Samples:
     kind: "rays", "areas" or "edges" (adaptive edge sampling: more rays for receptors that see an edge)
     light: record of how many reflections of light are followed, with the error due to further reflections
     number: number of samples per receptor
-    level: record of the chosen kind and number, as text for reports, with their error and the reason for them
+    level: the same kind and number as text for reports, with the predicted error and the reason for the choice
     enough: True if the error due to the samples is at most the allowed one
     """
 
@@ -49,10 +49,10 @@ class Samples:
 
 @dataclass(frozen=True)
 class Allowed:
-    """Largest error of a signal that the samples (rays or areas) may cause (root mean square).
+    """Upper limits of the root mean square error that the samples (rays or areas) may cause in a signal.
 
-    error: limit if some reflections of light are omitted. The error due to the omitted light uses a part of the
-        tolerance, so this limit is smaller.
+    error: limit if some reflections of light are omitted. It is smaller than `without_light`, because the omitted light
+        already causes a part of the error that is allowed for all causes together.
     without_light: limit if no light is omitted
     """
 
@@ -65,7 +65,8 @@ class Shares:
     """Limits of the errors due to bands, depth layers and omitted light, as fractions of the tolerance.
 
     The tolerance is the allowed error of a signal. These three errors and the error of the samples (rays or areas) are
-    independent, so their squares add up. The samples may cause the error that remains.
+    independent, so their squares add up. The limit for the samples is the part of the tolerance that the three others
+    leave.
     """
 
     bands: float
@@ -103,7 +104,7 @@ class Stages(Protocol):
     shares: Shares | None
 
     def bands(self) -> Level:
-        """Return a record of the number of spectral bands, with the error that it causes, if this is known.
+        """Return a record of the number of spectral bands, and of the error due to this number if the error is known.
 
         There is no choice in this stage: the number is that of the eye.
         """
@@ -115,7 +116,7 @@ class Stages(Protocol):
         """
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
-        """Return a record of how many reflections of light are followed, with the reason and the predicted error."""
+        """Return a record of how many reflections of light are followed, why, and the error due to all others."""
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """Return the kind and number of samples."""
@@ -124,9 +125,9 @@ class Stages(Protocol):
 def cheapest(stages: Stages) -> Fidelity:
     """Return the cheapest fidelity (accuracy of rendering) whose predicted error is allowed.
 
-    The spectral bands are as given for the eye. Depth layers, light and samples are chosen in this order. For each of
-    them, the result is the cheapest option whose predicted error is allowed. If the options exceed the allowed error, a
-    FidelityWarning states by how much.
+    The spectral bands are those of the eye. Depth layers, light and samples are chosen in this order. For each of them,
+    the result is the cheapest option whose predicted error is allowed. If no available option is accurate enough, a
+    FidelityWarning states by how much the allowed error is exceeded.
     """
     allowed, shares = stages.allowed, stages.shares
     depth, depth_level = stages.depth(allowed * (shares.depth if shares else 1))

@@ -1,6 +1,7 @@
-"""The first stages in the choice of a fidelity for a built-in world: bands, depth layers and light.
+"""Choice of spectral bands, depth layers and light for a built-in world, before the choice of rays or areas.
 
-Each stage has levels, ordered by cost. The cheapest level whose error is allowed is chosen, with a reason.
+These are the first stages in the choice of a fidelity, the accuracy of rendering. Each stage has levels, ordered by
+cost. The cheapest level whose error is allowed is chosen, with a reason.
 """
 
 from __future__ import annotations

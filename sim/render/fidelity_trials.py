@@ -1,9 +1,8 @@
-"""Trials of sampling methods in views of a world, before a renderer of the world is built.
+"""Trial renderings of a world, which determine the errors of sampling methods before the renderer is built.
 
-A trial renders some of an eye's receptors and compares their signals with signals from many more rays. Errors due to
-the number of rays or areas are computed for random receptors and, if there are objects, also for receptors that see an
-object (`sim.render.populations`). Errors due to the number of depth layers are computed for random receptors only. All
-draws have fixed seeds, so the same world and eyes give the same result.
+A trial renders some of an eye's receptors and compares their signals with signals from many more rays. The errors of
+rays and areas are computed for random receptors and, if there are objects, also for receptors that see an object
+(`sim.render.populations`), the errors of depth layers only for random receptors. Seeds are fixed, so errors repeat.
 """
 
 from __future__ import annotations
@@ -108,9 +107,9 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """Return a function that maps areas per receptor to the root mean square error of signals, as in `errors`.
+        """Return a function that maps the number of areas per receptor to the root mean square error of signals.
 
-        The reference is computed with many random rays, and its noise is included in the error.
+        The reference is computed with many random rays, whose noise is included. Objects count as in `errors`.
         """
         populations = self._populations(sampling)
         truths = [
@@ -129,16 +128,16 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether areas that several receptors share are small enough for neighbours to differ in signal."""
+        """Return whether receptors may share areas without losing the differences between neighbouring receptors."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:
-        """Return the number of rendered areas, including those around the receptors, divided by that of receptors."""
+        """Return the number of areas per receptor, including the areas beyond the rim of the retina."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
     def _truth(self, sampling: EyeSampling, receptors: np.ndarray) -> Trial:
-        """Return many rays, drawn for these receptors only, as the reference for the errors of area sampling."""
+        """Return many rays for these receptors, as a trial whose signals are the reference for area sampling."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
             return sampling.trial(int(np.clip(of_a_view // len(receptors), *TRUE_AREA)), receptors)
@@ -156,7 +155,7 @@ class FidelityTrials:
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
         """Return root mean squares of the signals due to the second reflection and to direct light.
 
-        Both are for random receptors or for receptors near an object, whichever have a larger second reflection.
+        Both are for random receptors or for receptors that see an object, whichever makes the first value larger.
 
         Raises:
             ValueError: light cannot be followed after the first reflection.
@@ -171,7 +170,7 @@ class FidelityTrials:
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Return, for each n in `counts`, the root mean square error of signals with n depth layers.
 
-        The reference has the `finest` layers, and the n layers must be among them. The rays are always the same.
+        The reference has the same rays and all `finest` layers. Each n must select evenly spaced ones of them.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -190,7 +189,7 @@ class FidelityTrials:
         return found
 
     def distances(self) -> np.ndarray:
-        """Return distances of hit points along the eyes' axes in all views [m], sorted; infinite without a hit."""
+        """Return the depth of the surface that each ray hits, along the eye's axis [m], sorted; infinite for no hit."""
         _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
         return np.sort(np.array(z))
 
@@ -200,9 +199,9 @@ class FidelityTrials:
         """Return signals (view, channel, receptor) in as many of the views as the number of rays allows.
 
         trial: samples (rays or areas), with their weights in the signals
-        depth, light: layers among which light is divided by its distance, and reflections that are followed
-        views: places and directions of the eyes; None: those of random views
-        most: largest number of rays in all views together, unless fewer than 12 views would remain
+        depth: layers, to which light is assigned by the distance of its surface; light: reflections that are followed
+        views: places and directions of the eyes; None: the random views of this object
+        most: largest total number of rays, which limits the number of views; at least 12 views are rendered anyway
         """
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
@@ -221,13 +220,13 @@ class FidelityTrials:
         """Return the contribution of component k of the light in band b to channel c: mixing[c, b] basis[k, b].
 
         The shape is (channel, component, band). `mixing` is a band's weight times the aperture's throughput. Signals
-        are sum_bklp mixing[c, b] basis[k, b] W_lb[r, p] light_lk[p]: weights W, ray p, receptor r, depth layer l.
+        are sum_bklp mixing[c, b] basis[k, b] W_lb[r, p] light_lk[p] for the weight W of ray p, receptor r and layer l.
         """
         basis = (self._scene.areas if trial.extent else self._scene.tracers.tracer_for)(light).basis
         return self._eye.aperture_throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
 
     def _see_areas(self, views: RandomViews, trial: Trial, light: str, depth: DepthLayers) -> list[np.ndarray]:
-        """Return the components of the mean light in a trial's areas, for each depth layer, flat (view, area)."""
+        """Return the mean light in all areas: a flat array (view, area) per depth layer and component of light."""
         tracer = self._scene.areas(light)
         origins, directions = views.in_agents(self._eyes, trial.directions)
         n = len(trial.directions)
@@ -276,14 +275,15 @@ class FidelityTrials:
 
 
 def _in_fours(trial: Trial) -> np.ndarray:
-    """Return four numbers per ray: its bounce sample, and a sample for a second reflection, (ray, 4)."""
+    """Return two numbers that determine the first bounce of each ray, and two for the second, (ray, 4)."""
     return np.concatenate([trial.bounce_samples, np.random.default_rng(SECOND).random(trial.bounce_samples.shape)], 1)
 
 
 def _summed(weights: np.ndarray, layers: np.ndarray) -> np.ndarray:
-    """Return sums over layer, component and ray, (view, channel, receptor); `np.einsum` takes up to twice as long.
+    """Return signals (view, channel, receptor): weighted light, summed over depth layers, components and rays.
 
-    weights: (channel, layer, component, receptor, ray); layers: (layer, component, view, ray)
+    The weights are (channel, layer, component, receptor, ray), and the light (`layers`) is (layer, component, view,
+    ray). `np.einsum` takes up to twice as long.
     """
     (channels, receptors), views = (weights.shape[0], weights.shape[3]), layers.shape[2]
     of_receptors = np.moveaxis(weights, 3, 1).reshape(channels * receptors, -1)

@@ -38,9 +38,9 @@ Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # pos
 
 
 class PreparedScene:
-    """A MuJoCo model, prepared for rendering by given eyes: light and materials are stored in the eyes' spectral bands.
+    """A MuJoCo model and its eyes, prepared for rendering; light and materials are stored in the eyes' spectral bands.
 
-    It can be rendered with any fidelity (number of samples, depth layers and light) that has these bands.
+    The scene can be rendered with any fidelity (number of samples, depth layers and light) that has these bands.
 
     model: the MuJoCo model
     eye: optics and retina, with the spectral bands
@@ -117,14 +117,14 @@ class PreparedScene:
             self.scene.warn_of_missing(light)
 
     def eye_rays(self, tracer: Tracer | AreaTracer, n_envs: int) -> EyeRays:
-        """Return the eyes in `n_envs` worlds, in the form for this tracer."""
+        """Return an object that computes the rays of the eyes in `n_envs` worlds for this tracer."""
         if isinstance(tracer, ClosedForm | AreaTracer):
             return UprightEyes(self.upright.stand, n_envs)
         return FreeEyes(self.places, n_envs)
 
     @property
     def upright(self) -> UprightScene:
-        """The closed form of the scene.
+        """The scene as upright walls, a floor and spheres, for which light is computed by formulas (closed form).
 
         Raises:
             NoClosedForm: the scene has no closed form.
@@ -157,15 +157,16 @@ class PreparedScene:
         Areas are rectangles of the visual field in which the mean light is computed.
 
         per_receptor: number of areas per receptor in the whole eye
-        receptors: indices of the receptors, row by row
+        receptors: indices of the receptors, which are numbered row by row
         """
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether receptors may share areas without losing the differences between neighbouring receptors.
+        """Return whether large areas, each shared by several receptors, preserve the differences between neighbours.
 
-        Areas are rectangles of the visual field in which the mean light is computed. If they are too large, neighbours
-        may have equal signals. The result is False for a perfect lens, whose receptors share no areas.
+        Areas are rectangles of the visual field in which the mean light is computed. If they are too large,
+        neighbouring receptors may have equal signals. The result is False for a perfect lens, whose receptors share no
+        areas.
 
         per_receptor: number of areas per receptor, below 1
         """
@@ -175,14 +176,18 @@ class PreparedScene:
     def _in_rows(self) -> bool:
         """True if a receptor's field is divided into rows and columns of areas, false if into columns only.
 
-        Areas are rectangles in which light is averaged. In columns of any height, the mean light of walls and floor has
-        a closed form. The outlines of spheres need rows as well.
+        Areas are rectangles in which light is averaged. The mean light of walls and floor in a column has a closed
+        form, however high the column is. The outlines of spheres need rows as well.
         """
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0
 
     def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> WorldSampling:
-        """Return the sampling of the eye with these depth layers; its PSFs are computed once, on first use.
+        """Return the method that places samples in the eye's visual field and weights them for each receptor.
+
+        The eye's PSFs for the distances in `depth` are computed at the first call, and kept.
+
+        depth: distances for which the eye has a PSF
 
         tolerance: allowed error of a signal, see `sim.eyes.allowed_error`
 

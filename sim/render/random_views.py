@@ -77,7 +77,7 @@ def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Return views of agents with an object at 0.8 to 8 m (NEAR), within the field of view of one eye.
+    """Return views in which an eye of an agent has an object in its field of view, at a distance of 0.8 to 8 m (NEAR).
 
     Places and directions are random, with a fixed seed.
     """

@@ -64,7 +64,7 @@ class Frame:
 
 
 class Moving:
-    """Buffers of all worlds that a kernel reads, its only inputs that change between calls."""
+    """Buffers from which a kernel reads the poses in all worlds, the only inputs that change between its calls."""
 
     def __init__(self, eyes: EyeRays, things: Buffers) -> None:
         self._eyes, self._things = eyes, things
@@ -124,7 +124,10 @@ class RayKernel:
         return KernelInputs(counted(lanes), counts, one_number(lanes), along, self.tracer.inputs, more, weights)
 
     def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
-        """Return sums of the light over groups of `reduced` adjacent lanes, flat (layer, component, world, eye, sum).
+        """Return sums of the light over groups of `reduced` adjacent lanes.
+
+        Each lane traces one ray: a sample of an eye in a world. Components are the parts, such as spectral bands, in
+        which light is computed. The sums are a flat array with the axes (layer, component, world, eye, group of lanes).
 
         lanes: total number of lanes
         """
@@ -139,7 +142,11 @@ class RayKernel:
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
     def layers(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> list[Array]:
-        """Return the components of the light along each lane's ray, for each depth layer."""
+        """Return the light along each lane's ray, one array per depth layer and component.
+
+        Each lane traces one ray: a sample of an eye in a world. Components are the parts, such as spectral bands, in
+        which light is computed. All components of the first depth layer come first.
+        """
         lane = Lane.from_index(inputs.lanes, inputs.counts)
         seen, there = self.seen(scenes, frame, inputs, lane)
         bounces = inputs.bounces is not None
@@ -155,7 +162,11 @@ class RayKernel:
         return [component * share for share in shares for component in components]
 
     def seen(self, scenes: Any, frame: Frame, inputs: KernelInputs, lane: Lane) -> tuple[EyeRay, Any]:
-        """Return the ray of a lane, and the geometry of the lane's world in the tracer's form."""
+        """Return each lane's ray, and the surfaces and lights that it can meet in its world.
+
+        A lane is a sample of an eye in a world. The tracer determines the type of the second result, see
+        `Tracer.around`.
+        """
         seen = self.eyes.ray(frame.eyes, inputs.along, lane, inputs.counts.samples.number)
         return seen, self.tracer.around(scenes, frame.things, inputs.tables, lane.world)
 

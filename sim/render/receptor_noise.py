@@ -3,8 +3,8 @@
 A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
 world's noise therefore depends on the world's own seed and history, and not on other worlds.
 
-This noise has the same mean, and nearly the same variance and third moment, as the noise of `optics.Eye.see`, which is
-drawn as numbers of photons (`optics.eye.photoreceptor`).
+This noise has the same mean, and nearly the same variance and third moment, as the noise of `optics.Eye.see`. That
+method draws numbers of photons (`optics.eye.photoreceptor`).
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ FEW = 8  # number of worlds of a second, narrower kernel
 class Normals:
     """Standard normal numbers for the noise of receptors, from a random generator for each world.
 
-    The numbers of one world are drawn in frames. A frame contains one number for each receptor.
+    Each draw gives a frame, which contains one number for each receptor of a world.
 
     keys: key of each world's generator (Philox), array (world,) uint64
-    shape: shape of one world's receptors, and of its frames
+    shape: shape of one world's receptors, and of each frame
     """
 
     def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:
@@ -46,7 +46,10 @@ class Normals:
         self._kernels: dict[int, _Kernel] = {}
 
     def restart(self, keys: np.ndarray) -> None:
-        """Start the random generators again at the first frame, with these keys, array (world,)."""
+        """Set the random generators to these keys, so that the next frame that is drawn is the first.
+
+        keys: key of each world's generator, array (world,)
+        """
         self._keys, self._frames = keys, np.zeros(len(keys), np.uint32)
 
     @property
@@ -66,7 +69,7 @@ class Normals:
         self._keys, self._frames = place[:, 0].astype(np.uint64), place[:, 1].astype(np.uint32)
 
     def launch(self, worlds: np.ndarray | None = None) -> PendingFrame:
-        """Start drawing the next frame (one random number per receptor) of these worlds (None: all).
+        """Start drawing the next random numbers of these worlds (None: all), one number for each receptor.
 
         The kernel runs asynchronously. The numbers are an array (len(worlds), *shape) float32.
         """
@@ -83,7 +86,10 @@ class Normals:
         return drawn
 
     def _frame(self, parts: list[Array], n: int) -> np.ndarray:
-        """Return the numbers of the first n worlds from the kernel's output arrays, each flat (world, draw)."""
+        """Return the random numbers of the first n worlds, (n, *shape).
+
+        parts: output arrays of the kernel, each flat (world, draw)
+        """
         ends = (max(self._size - k * self._draws, 0) for k in range(len(parts)))  # columns of each part in use
         used = [part.numpy().reshape(-1, self._draws)[:n, :end] for part, end in zip(parts, ends, strict=True)]
         return np.concatenate(used, axis=1).reshape(n, *self._shape)
@@ -159,8 +165,8 @@ class NoiseModel:
     def in_frames(self, share: float) -> tuple[NoiseModel | None, NoiseModel | None]:
         """Return the shot noise of a frame that lasts a part of the integration time, and the remaining noise.
 
-        Each is None if it is 0. Receptors with dynamics sum the photons of their frames. Only the shot noise passes
-        their filters.
+        Each is None if it is 0. Receptors with dynamics (`optics.ReceptorDynamics`) filter their signals in time, and
+        so sum the photons of several frames. Shot noise is added before these filters, the remaining noise after them.
 
         share: duration of the frame, as a fraction of the integration time
         """

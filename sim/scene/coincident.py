@@ -1,8 +1,9 @@
 """Geoms whose surfaces coincide. As in MuJoCo, the geom that is defined last is visible.
 
 If two surfaces are in the same place, rounding would decide which of them a ray hits. All renderers therefore move the
-surface of the later geom outwards by a small distance, which exceeds the rounding errors of float32. Coincidence is
-decided once, in the given pose. Planes are moved to their front, so the earlier of two planes is visible from behind.
+surface of the later geom outwards by a small distance, which exceeds the rounding errors of float32. The geoms to be
+moved are found once, in the poses that are passed to `coincidences`. A plane is moved along its normal, so the earlier
+of two planes is visible from behind.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Coincidences:
         return self.lifts.get(geom, 0.0)
 
     def message(self, model: mujoco.MjModel) -> str | None:
-        """Return a warning if geoms of different groups coincide (such as collision and visual ones), or None."""
+        """Return a warning if geoms of different groups (such as collision and visual) coincide, otherwise None."""
         found = [pair for pair in self.pairs if len(set(model.geom_group[list(pair)])) > 1]
         if not found:
             return None
@@ -133,9 +134,11 @@ def _points(data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom: int, apart: float) -> bool:
-    """Return whether any of the points is closer than `apart` to a geom's surface, with nearly parallel normals.
+    """Return whether another geom's surface touches this geom's surface in at least one point.
 
-    points, normals: points of another surface [m], and its normals there, unit vectors, in the world's frame, (n, 3)
+    It does if the distance is at most `apart` and the normals of the two surfaces are nearly parallel there.
+
+    points, normals: points of the other surface [m], and its normals there, unit vectors, in the world's frame, (n, 3)
     apart: distance [m]
     """
     model, turn = data.model, data.geom_xmat[geom].reshape(3, 3)

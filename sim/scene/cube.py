@@ -4,8 +4,8 @@ MuJoCo looks up a cube texture by direction. The direction consists of a point's
 primitives, these coordinates are divided by the geom's half sizes (see `directions` for the caps of capsules), unless
 the texture is uniform. Mitsuba has no such texture. Triangles are therefore cut along the seams between faces of the
 cube. Their texture coordinates refer to one image in which the six faces are stacked vertically, in MuJoCo's order R L
-U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The directions of each face's own axes are OpenGL's (table 3.19 of its
-2.1 specification).
+U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The columns and rows of each face are oriented as in OpenGL (table 3.19
+of its 2.1 specification).
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uni
 
 
 def look_up(towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the faces of the texture's cube that directions from its centre meet, and the positions on these faces.
+    """Return where rays from the centre of a texture's cube meet the cube: the faces, and the positions on them.
 
     Faces are numbered from 0 to 5 in MuJoCo's order R L U D F B. A position is a column and a row, both in [0, 1]. Row
     0 is at the top. The arrays have the shapes (direction,) and (direction, 2).
 
-    towards: directions, (direction, 3)
+    towards: directions of the rays, (direction, 3)
     """
     axis = np.argmax(np.abs(towards), axis=1)
     face = 2 * axis + (np.take_along_axis(towards, axis[:, None], 1)[:, 0] < 0)
@@ -77,7 +77,9 @@ def look_up(towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def laid(triangles: Triangles, towards: np.ndarray, width: int, n_faces: int) -> Triangles:
-    """Return the triangles, cut along the seams, with texture coordinates in the padded image.
+    """Return the triangles with texture coordinates in the image that `padded` returns.
+
+    Triangles are cut along the seams between faces of the texture's cube, so that each lies on one face.
 
     towards: directions of the vertices, (n, 3)
     width: width of a face in texels
@@ -142,9 +144,10 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 
 def _halved(pieces: np.ndarray) -> np.ndarray:
-    """Return triangles within which texture coordinates are nearly linear.
+    """Return the triangles, subdivided until texture coordinates are nearly linear within each.
 
-    Other triangles are bisected at the midpoint of their longest edge, repeatedly but at most _HALVINGS times.
+    A triangle in which they are not is bisected at the midpoint of its longest edge. This is repeated at most _HALVINGS
+    times.
     """
     done = []
     for _ in range(_HALVINGS):
@@ -162,11 +165,11 @@ def _halved(pieces: np.ndarray) -> np.ndarray:
 
 
 def _bend(pieces: np.ndarray) -> np.ndarray:
-    """Return the approximate error if a cube's texture coordinates are interpolated linearly in triangles, (triangle,).
+    """Return the approximate error of interpolating the texture coordinates linearly in each triangle, (triangle,).
 
     The coordinates are the position on a face of the cube that surrounds the object. The position is found by dividing
-    a direction by its component towards the face, so it is not a linear function of the point on the triangle. The unit
-    is the width of a face.
+    a direction by its component towards the face, so it is not a linear function of the point on the triangle. The
+    error is in units of the width of a face.
     """
     face = _face_of(pieces)
     major = np.take_along_axis(pieces[..., 3:6], _MAJOR[face][:, None, None], 2)[..., 0] * _MAJOR_SIGN[face][:, None]

@@ -78,8 +78,10 @@ class MovedBodies(Poses):
 
     reference: the model in its reference pose, and the ids of the moved bodies
     positions: positions of the moved bodies [m], (world, body, 3)
-    rotations: rotations of the bodies that may turn, which are the first ones, (world, turning body, 3, 3)
-    models: models of all worlds, if their sizes, colours or materials differ; None: as in the renderer's model
+    rotations: rotations of those moved bodies that may turn, (world, turning body, 3, 3). They precede the others in
+        the list of moved bodies
+    models: model of each world, if sizes, colours or materials of geoms differ between worlds; None: they are the same
+        as in the renderer's model
     """
 
     reference: ReferencePose
@@ -97,7 +99,7 @@ class MovedBodies(Poses):
         vars(self).update(reference=reference, positions=positions, rotations=rotations, **own)
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """Build an array of `Poses` when it is first read."""
+        """Build an array, one of the attributes that `Poses` defines, when the attribute is first read."""
         if name not in Poses.__dataclass_fields__:
             raise AttributeError(name)
         vars(self)[name] = built = self._built(name)

@@ -1,7 +1,7 @@
 """Colours and textures of geoms.
 
-MuJoCo's colours and textures are display-referred. They are linearised here, except for textures of linear light (see
-`linear_textures`). Jakob and Hanika's (2019) method assigns a spectrum to each RGB reflectance.
+MuJoCo's colours and textures are display-referred. They are linearised here, except for textures that contain linear
+light already (see `linear_textures`). Jakob and Hanika's (2019) method assigns a spectrum to each RGB reflectance.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ _ROLES = mujoco.mjtTextureRole
 def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
     """Return a geom's kind as a member of the enum.
 
-    NumPy's integer is converted, because comparing it with the enum's members works in one order only.
+    The model stores a NumPy integer. It is converted, because the result of comparing it with a member of the enum
+    depends on which of the two is on the left.
     """
     return mujoco.mjtGeom(int(model.geom_type[geom]))
 

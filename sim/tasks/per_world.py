@@ -1,4 +1,4 @@
-"""A batch task that wraps tasks of one world at a time, and calls their plain Python methods world by world."""
+"""A batch task that wraps tasks of one world at a time, and calls the methods of these tasks world by world."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class StreamsByPurpose:
 
     seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
     n: number of worlds
-    kinds: number of kinds of eyes, in a sequence with one number, since there is only one agent
+    kinds: number of kinds of eyes of each agent; the sequence has one number, because built-in tasks have one agent
 
     Attribute `motion`: random numbers for objects that move at random.
     """
@@ -74,7 +74,7 @@ class StreamsByPurpose:
 
     @cached_property
     def variation(self) -> list[np.random.Generator]:
-        """Generators of the quantities that vary between episodes, mainly light, one for each world."""
+        """One generator for each world, for the quantities that vary between episodes, such as the light."""
         return [np.random.Generator(np.random.PCG64(child)) for child in self._of_variation]
 
     def get_state(self) -> dict[str, np.ndarray]:
@@ -89,7 +89,7 @@ class StreamsByPurpose:
 class StreamsByWorld:
     """One generator for each world, for all random numbers of the world's episodes except the receptors' noise.
 
-    User tasks use this scheme. The noise follows from `noise_keys`.
+    User tasks use this scheme. The attribute `noise_keys` determines the receptors' noise.
 
     seed, n: see `StreamsByPurpose`
     kinds: number of kinds of eyes of each agent
@@ -150,8 +150,8 @@ class MotionNoise:
         All worlds draw numbers for 64 actions in advance, and use them at the same pace.
 
         Raises:
-            ValueError: only some worlds are restored, and in the restored state, the numbers drawn in advance last for
-                fewer or more actions than the present numbers of the other worlds.
+            ValueError: only some worlds are restored, and the number of further actions for which random numbers have
+                been drawn differs between the restored state and the other worlds.
         """
         _set_states(self._generators, state["motion"], worlds)
         ahead = np.asarray(state["motion_ahead"])

@@ -1,4 +1,4 @@
-"""Data about a ray from an eye into the scene, in the form in which the renderer's kernels pass it on."""
+"""A ray from an eye into the scene, and data about its eye, which functions of the renderer pass to each other."""
 
 from __future__ import annotations
 

@@ -29,10 +29,11 @@ class Components:
 
 
 def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components for light that is reflected once: spectra whose sums describe all light that surfaces reflect.
+    """Return components for light that is reflected only once.
 
-    There are fewer components than bands if all lights share one spectrum and the reflectances are linear combinations
-    of fewer spectra than there are bands. Otherwise, each component is one band.
+    Components are fixed spectra. The light that any surface reflects is a weighted sum of them. There are fewer
+    components than bands if all lights share one spectrum and the reflectances are linear combinations of fewer spectra
+    than there are bands. Otherwise, each component is one band.
 
     texels: reflectances of the surfaces, (texel, band)
     irradiance: irradiance of each light, (light, band)
@@ -51,9 +52,9 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
     """Return components for light that is reflected several times.
 
-    Every reflection must be a multiplication of each component of the light by the surface's reflectance in the same
-    component. One component is enough if all surfaces are grey and all lights share one spectrum. Otherwise, each
-    component is one band.
+    Components are fixed spectra, and light is a weighted sum of them. The components are chosen so that each reflection
+    multiplies the weight of each component by one number, the surface's reflectance for this component. One component
+    is enough if all surfaces are grey and all lights share one spectrum. Otherwise, each component is one band.
 
     texels, irradiance: see `components_of`
     """
@@ -67,7 +68,9 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 
 
 def components_in_bands(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return one component of light for each spectral band, for light that crosses a medium or is reflected often.
+    """Return components of light that are the spectral bands themselves.
+
+    Light that crosses a medium or is reflected several times generally needs all bands.
 
     texels, irradiance: see `components_of`
     """

@@ -1,4 +1,4 @@
-"""Absorption and veiling light of water or air between a surface and an eye, inside kernels."""
+"""Absorption and veiling light of water or air between a surface and an eye, for code in Dr.Jit kernels."""
 
 from __future__ import annotations
 
@@ -32,12 +32,15 @@ class MediumOnRays:
 
     @classmethod
     def from_bands(cls, medium: BandMedium, basis: np.ndarray) -> MediumOnRays:
-        """Return the medium for a tracer whose `basis` (component, band) is diagonal: components are scaled bands."""
+        """Return the medium for a tracer in which each component of light is one spectral band times a factor.
+
+        basis: matrix with these factors on its diagonal and 0 elsewhere, (component, band)
+        """
         veil = medium.veil / np.diag(basis)
         return cls(tuple(map(float, np.maximum(medium.attenuation, LEAST))), tuple(map(float, veil)))
 
     def through(self, radiance: Sequence[Array], distance: Array) -> list[Array]:
-        """Return the radiance that arrives at the eye from surfaces of a given radiance, per component.
+        """Return the radiance that arrives at the eye from surfaces of a given radiance, one array per spectral band.
 
         For a ray that hits no surface, the result is the veiling light.
 
@@ -46,10 +49,13 @@ class MediumOnRays:
         return [v + more for v, more in zip(self.veil, self.contrasts(radiance, [distance]), strict=True)]
 
     def contrasts(self, radiance: Sequence[Array], distances: Sequence[Array], share: Array | float = 1) -> list[Array]:
-        """Return share · (L - V) exp(-c d), the contrast of surfaces with the veiling light, per component.
+        """Return a surface's contrast with the veiling light, as it arrives at the eye, one array per spectral band.
 
-        radiance: share · L, where L is the radiance of the surface
-        distances: distances d [m], over which exp(-c d) is averaged
+        The contrast is share · (L - V) exp(-c d), with the surface's radiance L and distance d, the veiling light V and
+        the medium's attenuation coefficient c.
+
+        radiance: share · L
+        distances: values of d [m]; the mean of exp(-c d) over them is used
         share: fraction of an area that the surface fills
         """
         near = [dr.minimum(d, FARTHEST) for d in distances]
@@ -62,13 +68,13 @@ class MediumOnRays:
     def reflected_contrasts(
         self, reflectance: Sequence[Array], light: Sequence[Array], distances: Sequence[Array]
     ) -> tuple[list[Array], list[Array]]:
-        """Return a surface's contrast with the veiling light per component, and the factor 1 for each component.
+        """Return two factors for each spectral band: a surface's contrast with the veiling light, and 1.
 
-        The contrast is the surface's radiance (reflectance times light) minus the veiling light, times the transmission
-        of the medium. Without a medium, a caller multiplies the light on the surface by the reflectances. With a
-        medium, it uses the contrasts in place of the light, and the factors 1 in place of the reflectances.
+        The contrast is (reflectance · light - veiling light) · transmission of the medium. Without a medium, a caller
+        multiplies the light on the surface by the reflectance. With a medium, the same code multiplies the two factors:
+        the contrast in place of the light, and 1 in place of the reflectance.
 
-        light: light on the surface, per component
+        light: light on the surface, one array per spectral band
         distances: distances from the eye [m], over which the transmission is averaged
         """
         sent = [r * e for r, e in zip(reflectance, light, strict=True)]

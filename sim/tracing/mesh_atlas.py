@@ -26,7 +26,9 @@ PITCH, BALL = 2.5, 1.1
 
 @dataclass(frozen=True)
 class MeshAtlas:
-    """Moving meshes in one scene, each scaled to a ball of radius 1 in its own cell, a cube of the scene's space.
+    """Moving meshes in one scene, each in a separate cube of space, its cell.
+
+    Each mesh is scaled so that it just fits into a ball of radius 1 in its cell.
 
     cells: centre of each mesh's cell, (mesh, 3)
     scene: Mitsuba's scene of all meshes; None without meshes
@@ -69,7 +71,7 @@ class MeshAtlas:
         return dr.select(found.is_valid(), (start + found.t) * reach, dr.inf)
 
     def surface(self, o: Array, d: Array, cell: Array, reach: Array, active: Array) -> tuple[Array, Array]:
-        """Return the normal in the mesh's frame, and the texture coordinates, at the hits of `hit`.
+        """Return the normal in the mesh's frame, and the texture coordinates, at the points where rays hit the mesh.
 
         o, d, cell, reach: see `hit`
         active: True for rays that hit a mesh

@@ -44,7 +44,8 @@ class ModelScene:
     model: the MuJoCo model
     eye: determines the spectral bands
     groups: visible geom groups
-    medium: water or air between surfaces and eye; None: clear air. The attribute has values for the eye's bands
+    medium: water or air between surfaces and eye; None: clear air. The attribute `medium` contains the
+        medium's optical properties in the eye's bands
     variant: Mitsuba's variant
     geoms: ids of all visible geoms
     looks: appearances of these geoms; a geom that may have several materials has one for each of them
@@ -112,8 +113,9 @@ class ModelScene:
         Also warn of geoms of different groups in the same place, and of lights with a measured spectrum that the eye's
         bands represent inaccurately, because there are too few bands.
 
-        light: number of reflections after which light is rendered: "direct": 1, "bounce": 1 or 2, "all": any number.
-            With "direct", the light of the sky and of glowing materials on surfaces is also missing
+        light: how often the rendered light may be reflected on its way to the eye: "direct": once, "bounce": once or
+            twice, "all": any number of times. With "direct", surfaces are not lit by the sky or by glowing materials,
+            and the warning says so
         """
         model = self.model
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
@@ -176,7 +178,7 @@ class ModelScene:
     def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
         """Return a BSDF whose reflectance is the radiance of a glowing geom; None if the geom does not glow.
 
-        The kernel that renders evaluates this BSDF like other BSDFs.
+        The renderer's kernel evaluates this BSDF like other BSDFs.
 
         white: True if the geom's colour differs between worlds. The geom is then treated as white, and the kernel
             multiplies the radiance by the colour in the rendered world

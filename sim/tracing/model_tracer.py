@@ -56,7 +56,7 @@ class Tables:
 
 @dataclass(frozen=True)
 class Rows:
-    """Arrays that contain a part for each world: places of moving geoms, places of lights, and colours of geoms."""
+    """Arrays with the poses of moving geoms, the poses of lights, and the colours of geoms, in all worlds."""
 
     movers: Array
     lights: Array
@@ -75,7 +75,7 @@ class Surroundings:
 
 
 class RowBuffers:
-    """Buffers that kernels read: places of moving geoms, places of lights, and colours of geoms in `n_envs` worlds."""
+    """Buffers from which kernels read poses of moving geoms and lights, and colours of geoms, in `n_envs` worlds."""
 
     def __init__(self, scene: ModelScene, n_envs: int) -> None:
         self._scene = scene
@@ -84,7 +84,7 @@ class RowBuffers:
         self._movers, self._lights, self._paint = (shared.values.reshape(n_envs, -1) for shared in self._shared)
 
     def fill(self, poses: Poses) -> None:
-        """Write the places of moving geoms, places of lights, and colours of geoms in all worlds into the buffers."""
+        """Write the poses of moving geoms and lights, and the colours of geoms, in all worlds into the buffers."""
         scene = self._scene
         self._movers[:] = scene.movers.rows(poses)
         if len(scene.paint):
@@ -100,11 +100,11 @@ class RowBuffers:
 
 @dataclass(frozen=True)
 class _SurfaceHit:
-    """First hits of rays. A moving geom is one "mover" for each material that it may have.
+    """First hits of rays.
 
-    si, bsdf: Mitsuba's interaction between ray and surface, which is the argument of the BSDF, and the BSDF
-    colors, glow: factors that multiply reflectance and emission, one spectrum for every 4 bands
-    which: index of the mover, or the number of movers if the ray hits none of them
+    bsdf, si: BSDF of the hit surface; its argument, which is Mitsuba's description of the hit
+    colors, glow: factors that multiply the surface's reflectance and its emission, as spectra of 4 bands each
+    which: index of the hit moving geom in `Movers`, or len(Movers) if the ray hits no moving geom
     seen, active: seen is True for rays that hit a surface, active is True for rays that are traced
     point, normal, t, direction: hit point, normal towards the ray's origin, distance [m], and direction of the ray
     """
@@ -127,7 +127,7 @@ class ModelTracer:
 
     name, why: name of the tracer, and the reason for its choice, for reports
     light: level of light, "direct" or "bounce"; ValueError for "all"
-    basis: (component, band): contribution of each component to each band; each component is one band
+    basis: identity matrix (component, band), because each component of the light is one band
     """
 
     name = "mitsuba"
@@ -155,7 +155,7 @@ class ModelTracer:
         return whole_numbers([*of_movers, len(number)]), mi.BSDFPtr(list(scene.glows.values()))
 
     def buffers(self, n_envs: int) -> RowBuffers:
-        """Return buffers for places of moving geoms, places of lights, and colours of geoms in `n_envs` worlds."""
+        """Return buffers for the poses of moving geoms and lights, and the colours of geoms, in `n_envs` worlds."""
         return RowBuffers(self._scene, n_envs)
 
     def around(self, scenes: Scenes, rows: Rows, tables: Tables, world: Array) -> Surroundings:
@@ -182,7 +182,7 @@ class ModelTracer:
         return sent if self._medium is None else self._medium.through(sent, hit.t), hit.t
 
     def _returned(self, hit: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
-        """Return the light that a bounce ray collects for each visible surface, see the module's docstring."""
+        """Return the light that reaches each visible surface along one ray that leaves it in a sampled direction."""
         bounce_ray = lighting.spawn_bounce_ray(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
         second = self._first_hits(bounce_ray, there, hit.seen)
         arrives = self._irradiance(second, axis, there)
@@ -229,9 +229,9 @@ class ModelTracer:
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return which surface a ray hits first; `there.still` must be from `ModelScene.one_shape_per_geom`.
+        """Return what a ray hits first: a moving geom's index in `Movers`, or len(Movers) plus a static shape's id.
 
-        It is a moving geom's index in `Movers`, or the length of `Movers` plus a static shape's Mitsuba id (0: no hit).
+        The id is 0 without a hit. `there.still` must be the scene that `ModelScene.one_shape_per_geom` contains.
         """
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()

@@ -37,8 +37,8 @@ MESH = "mesh"
 class Hit:
     """First hit of a ray.
 
-    t, which: distance [m] and index of the mover; without a hit, the argument `farthest` and the number of movers
-    normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
+    t, which: distance [m] and index in `Movers`; without a hit, `farthest` (see `Movers.nearest`) and len(Movers)
+    normal, uv: unit vector in the world's frame; texture coordinates, which only meshes and planes have
     """
 
     t: Array
@@ -49,7 +49,7 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """Frame and size of one moving geom. For a mesh, `size` is the middle of its cube in the `MeshAtlas` instead.
+    """Frame and size of one moving geom. For a mesh, `size` is its position in the `MeshAtlas` instead.
 
     axes, origin: the frame's three axes (Vector3f each) and its origin (Vector3f), in the world's frame
     size, reach: half of the size along each axis, and largest distance from the origin to the geom's surface [m]
@@ -61,11 +61,11 @@ class _Frame:
     reach: Array
 
     def to_mover(self, v: Array) -> Array:
-        """Convert a direction from the world's frame to the mover's frame."""
+        """Convert a direction from the world's frame to the frame of the moving geom."""
         return mi.Vector3f(*(dr.dot(axis, v) for axis in self.axes))
 
     def to_world(self, v: Array) -> Array:
-        """Convert a direction from the mover's frame to the world's frame."""
+        """Convert a direction from the frame of the moving geom to the world's frame."""
         return self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
 
 
@@ -77,11 +77,11 @@ class MoverRows(WorldRows):
 
 
 class Movers:
-    """Moving geoms, one entry ("mover") for each material that a geom may have: primitives by kind, then meshes.
+    """The "movers": each moving geom once for each material that it may have. They are sorted by kind, meshes last.
 
     looks, geoms: appearance and geom id of each mover
-    atlas, bsdf: Mitsuba's scene of all movers that are meshes, and a BSDF for this scene, which has no effect on light
-    lifts: distances by which surfaces of geoms that coincide with others are moved outwards [m], by geom id
+    atlas, bsdf: Mitsuba's scene of the moving meshes; a BSDF that this scene needs, and that has no effect on light
+    lifts: for geoms that coincide with others, by geom id: distance [m] by which the surface is moved outwards
     ends: index of the first mover of each kind, followed by the number of movers; an array for the kernel
     """
 
@@ -110,7 +110,7 @@ class Movers:
         self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
 
     def _of_kind(self, kind: str) -> slice:
-        """Return the indices of the movers of a kind."""
+        """Return the indices in `Movers` of the geoms of one kind."""
         i = [*PRIMITIVES, MESH].index(kind)
         return slice(int(self._ends[i]), int(self._ends[i + 1]))
 
@@ -124,11 +124,11 @@ class Movers:
 
     @property
     def n_rows(self) -> int:
-        """Number of rows of four floats in one world."""
+        """Number of rows of four floats that describe the moving geoms of one world."""
         return 1 + ROWS * len(self)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return float32 rows of 4: one for a sphere around all moving geoms, then 4 per mover; (world, 4 n_rows)."""
+        """Return a sphere around all moving geoms, then each mover's frame and size, as float32 (world, 4 n_rows)."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
             places, (sizes, reach) = poses.geom_places(self.geoms), self._extents(poses)
@@ -148,7 +148,7 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return True if a mover's geom has another material in a world, (world or 1, mover); None if all are fixed."""
+        """Return where a geom lacks its mover's material, (world or 1, mover); None if no geom's material varies."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -228,7 +228,7 @@ class Movers:
         return blocked
 
     def _kinds(self) -> list[tuple[int, Callable[..., Array]]]:
-        """Return the index and the intersection function of each kind of mover that occurs."""
+        """Return the index and the intersection function of each kind of geom that is among the moving geoms."""
         hits = [*(_of_primitive(primitive) for primitive in PRIMITIVES.values()), self._mesh_hit]
         return [(i, hit) for i, hit in enumerate(hits) if self._ends[i] < self._ends[i + 1]]
 
@@ -265,7 +265,7 @@ def _of_primitive(primitive: Primitive) -> Callable[..., Array]:
 
 
 def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
-    """Return the distance to mover k along a ray [m]; infinite for a miss, and for absent movers (origin NaN)."""
+    """Return the distance along a ray to moving geom k [m]; infinite for a miss, or if the geom's origin is NaN."""
 
     # A branch skips the intersection for rays that miss the sphere around the mover, as most rays do.
     def within() -> Array:
@@ -277,7 +277,7 @@ def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Arr
 
 
 def _frame(there: MoverRows, k: Array) -> _Frame:
-    """Return the frame of a mover."""
+    """Return the frame and the size of moving geom k."""
     x, y, z, reach = there.four(1 + k * ROWS)
     fours = [list(there.four(1 + k * ROWS + i)) for i in range(1, ROWS)]
     a, b, c = (mi.Vector3f(*four[:3]) for four in fours)
@@ -285,7 +285,7 @@ def _frame(there: MoverRows, k: Array) -> _Frame:
 
 
 def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
-    """Return whether a ray hits a sphere around one or all moving geoms. This row contains its centre and radius."""
+    """Return whether a ray hits the sphere that a row contains, around one moving geom or around all (row 0)."""
     x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)

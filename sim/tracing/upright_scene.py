@@ -1,4 +1,4 @@
-"""A model as upright walls, a floor and moving spheres, for eyes that stay upright.
+"""Conversion of a model to upright walls, a floor and moving spheres, for eyes that move and turn horizontally only.
 
 If a model cannot be represented in this form, `NoClosedForm` states the reason in one line, if possible with the name
 of the geom, light or body.
@@ -150,8 +150,8 @@ def _refuse_what_eyes_would_see(
 ) -> None:
     """Refuse eyes that would see their own body.
 
-    A body without visible geoms passes. Otherwise, it must be one sphere on the body's vertical axis. The eyes must lie
-    on or outside its surface, and look straight away from its centre.
+    A body without visible geoms passes. Otherwise, its only visible geom must be a sphere on the body's vertical axis.
+    The eyes must lie on or outside the sphere's surface, and look straight away from the sphere's centre.
 
     own: ids of the body's visible geoms
 

@@ -26,7 +26,8 @@ class CellTables:
 
     wall: index of the wall that fills the cell; 0 for an empty cell
     top: height of this wall's top [m]; -inf for an empty cell
-    stop: height [m] below which a ray stops in the cell
+    stop: height [m] below which a ray is followed no further. It equals `top`, except that it is infinite in a ring of
+        cells around the walls, where all rays stop
     """
 
     wall: Array
@@ -167,7 +168,11 @@ class Cells:
         return _finished(dr.select(hit, t, math.inf), face, through_x, dx, dy)
 
     def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
-        """See Footprints. A shadow ray rises above all walls after a few cells, so the walk is unrolled."""
+        """See Footprints.
+
+        The loop over the grid's cells is unrolled, because a ray towards the light crosses only a few cells until it is
+        above all walls.
+        """
         assert cells is not None
         dx, dy, dz = map(float, direction)
         x, y = self._place(start)

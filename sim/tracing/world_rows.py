@@ -25,7 +25,7 @@ class WorldRows:
     first: Array
 
     def point(self, row: Array | int) -> Array:
-        """Return the first three floats of one of the world's rows."""
+        """Return the first three floats of a row (Vector3f), such as a position."""
         return three(self.fours, self.first + row)
 
     def four(self, row: Array | int) -> Array:

@@ -82,7 +82,7 @@ class LayoutFamily:
 
     @property
     def test(self) -> LayoutSet:
-        """Layouts for final results. Nothing is selected by the results in these layouts."""
+        """Layouts for final results, which must not be used to select policies or animals."""
         return LayoutSet(self, "test")
 
     def number(self, name: str) -> int:
@@ -132,10 +132,10 @@ class LayoutSet:
 
     @property
     def mazes(self) -> tuple[np.ndarray, ...]:
-        """Walls of the mazes, boolean (row, column) each.
+        """Walls of the mazes in this set, boolean (row, column) each.
 
         Raises:
-            ValueError: two mazes of the family are equal.
+            ValueError: two mazes of `family`, in any of its sets, are equal.
         """
         return _drawn(self.family, "maze")[self.name]
 
@@ -144,12 +144,12 @@ class LayoutSet:
         """The courses of this set.
 
         Raises:
-            ValueError: two courses of the family are equal, or courses of this size could not be drawn.
+            ValueError: two courses of `family`, in any of its sets, are equal, or no course of this size was found.
         """
         return _drawn(self.family, "navigation")[self.name]
 
     def stripes(self) -> list[np.random.Generator]:
-        """Return a new random number generator for the stripes of each layout."""
+        """Return one new random number generator for each layout, for the stripes on the layout's walls."""
         return [self.family.random(self.name, index, _STRIPES) for index in range(len(self))]
 
 
@@ -167,7 +167,11 @@ TASKS_WITH_LAYOUTS = tuple(_DRAW)
 
 @lru_cache(maxsize=8)
 def _drawn(family: LayoutFamily, task: str) -> Mapping[str, tuple[Any, ...]]:
-    """Return the layouts of all sets by name, after checking that their walls differ."""
+    """Return the mazes or courses of a family, by the name of the set ("training", "selection" or "test").
+
+    Raises:
+        ValueError: two layouts have the same walls, or no course of this size was found.
+    """
     draw = _DRAW[task]
     found: dict[str, tuple[Any, ...]] = {}
     known: dict[bytes, str] = {}

@@ -1,4 +1,4 @@
-"""Random courses: paths that bend, split and join again, on which the distance from the start hardly falls."""
+"""Random courses: paths that bend, split and join again, and lead back towards their start by at most 1.5 m."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3
 def _center_line(row: int, shape: tuple[int, int], rng: np.random.Generator) -> list[Cell]:
     """Return the cells of a centre line from the west end of a row to the column before the east border.
 
-    An agent that follows the line from any of its cells never comes back towards this cell by more than 1.5 m.
+    Along the line, the distance from any earlier cell never falls more than 1.5 m below a value that it had before.
     """
     line, last = [(row, 1), (row, 2), (row, 3)], _EAST
     while line[-1][1] < shape[1] - 2:
@@ -73,9 +73,9 @@ def _straight(cell: Cell, step: Cell, length: int, shape: tuple[int, int]) -> li
 
 
 def _hardly_falls(line: list[Cell]) -> bool:
-    """Return whether an agent that follows the line never comes back towards an earlier cell by more than 1.5 m.
+    """Return whether a line hardly leads back towards any of its earlier cells.
 
-    This means that the distance from each cell never falls more than 1.5 m below its largest value so far.
+    Along the line, the distance from any earlier cell must never fall more than 1.5 m below a value that it had before.
     """
     cells = np.array(line, float) * CELL
     apart = np.linalg.norm(cells[:, None] - cells[None], axis=-1)

@@ -59,8 +59,8 @@ class World(ReadOnlyArrays):
     object_spawn: possible positions of objects, at the centres of cells [m], (n, 2)
     goal_region: goal region in navigation and mazes, (x_min, y_min, x_max, y_max) [m]; None in other tasks
     spectra: measured spectra of materials and lights, by name. Renderers use them instead of the model's colours
-    alone: model of the agent without the rest of the world, with which agents near walls are simulated faster; None:
-        they are simulated in the whole model
+    alone: small model of the agent only, for a faster simulation of agents near walls; None: agents near walls are
+        simulated in the whole model
     training_starts: starting positions of the agent in training; None: `starts`
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     mazes: number of mazes or courses, which are arranged from south to north; 1 in other tasks
@@ -122,8 +122,9 @@ def build_world(
     Raises:
         ValueError: an argument has the wrong type or is out of range; the task, the course, the medium or a spectrum is
             unknown; or `spectra` names neither a material nor a light, or has a reflectance above 1. Other causes are
-            that `mazes`, `course` or `layouts` is given for a task without it, that `layouts` is combined with `seed`,
-            `mazes` or `course`, or that two layouts of the family are equal or some cannot be drawn.
+            that `mazes`, `course` or `layouts` is given for a task that does not use it, that `layouts` is combined
+            with `seed`, `mazes` or `course`, that two layouts of the family are equal, or that no random course of the
+            family's size was found.
     """
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")

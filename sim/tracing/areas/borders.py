@@ -43,5 +43,5 @@ class Borders:
 
     @property
     def directions(self) -> np.ndarray:
-        """Horizontal directions to the borders in the eye's frame, (border, 3)."""
+        """Horizontal directions to the left and right borders of areas, in the eye's frame, (border, 3)."""
         return np.stack([self.x, np.zeros_like(self.x), np.ones_like(self.x)], axis=-1)

@@ -47,13 +47,14 @@ class Face:
 
 @dataclass(frozen=True)
 class Piece:
-    """The part of a wall's face that is visible between two columns of an area, a rectangle of the visual field.
+    """The part of a wall's face that is visible between two vertical lines in an area ("columns").
 
-    A column is a vertical line in the area, at the position a from -1/2 (left border) to 1/2 (right border).
+    An area is a rectangle of the visual field. The position a of a column runs from -1/2 at the area's left border to
+    1/2 at its right border.
 
     start, end: positions a of the first and the last column
     inverse_distance: inverse distance 1/t of the face in the column a = 0, and its change per unit of a [1/m]
-    floor_share, wall_share, sky_share: fractions of the area that floor, wall and sky fill between the two columns
+    floor_share, wall_share, sky_share: floor, wall and sky between the two columns, as fractions of the whole area
     """
 
     face: Face
@@ -72,7 +73,8 @@ class Piece:
     def inverse_distance_at(self, a: Array) -> Array:
         """Return the inverse distance 1/t [1/m] of the wall's face in one column, a vertical line in the area.
 
-        With the pupil's horizontal position p, the visible point has the horizontal position p + t · `Area.level(a)`.
+        An area is a rectangle of the visual field. The distance t is measured along the eye's axis. If p is the x and y
+        of the pupil, the x and y of the face in this column are p + t · `Area.level(a)`.
 
         a: position of the column, from -1/2 (left border of the area) to 1/2 (right border)
         """
@@ -114,7 +116,8 @@ class Columns:
     All walls of the world have the same height.
 
     top: height of the walls' tops [m]
-    face_ends: attribute, positions of the left and right ends of all faces, an argument of the kernel
+
+    Attribute `face_ends`: x and y of the left and right ends of all faces, which is passed to the rendering program.
     """
 
     def __init__(self, walls: Walls, footprints: Footprints) -> None:
@@ -141,7 +144,8 @@ class Columns:
     def first_faces(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
         """Return the index of the face that a ray in the horizontal direction `level` (Vector2f) hits first.
 
-        A ray that hits no wall hits a side of the floor's rim.
+        If the ray hits no wall, return the index of the side through which it leaves the rectangular floor. The four
+        sides of the floor have the indices after those of the faces.
 
         cells: see `Footprints`
         """
@@ -185,9 +189,9 @@ class Columns:
         return self.behind(area, piece, Rectangle(mi.Float(0), mi.Float(0), mi.Float(1), mi.Float(1)))
 
     def behind(self, area: Area, piece: Piece, part: Rectangle) -> Piece:
-        """Return the piece of a wall's face, limited to what the eye sees of it in a smaller rectangle of the area.
+        """Return the part of a piece of a wall's face that is visible in a smaller rectangle within the area.
 
-        Floor, wall and sky are counted only within this rectangle, but still as fractions of the whole area.
+        The shares of floor, wall and sky are also those in the smaller rectangle, as fractions of the whole area.
 
         part: the smaller rectangle, in units of the area's sides
         """
@@ -203,10 +207,10 @@ class Columns:
 
 
 def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
-    """Return the inverse distance 1/t of a wall's face in the middle of an area, and its change across the area [1/m].
+    """Return a wall face's inverse distance 1/t [1/m] in an area's middle column, and its change across the area.
 
-    An area is a rectangle of the visual field. The change is the value at its right border minus that at its left
-    border. The face is extended to an infinite line in plan, so that it is hit everywhere in the area.
+    An area is a rectangle of the visual field. The change is 1/t at the area's right border minus 1/t at its left
+    border. The face is extended to the left and right without end, so that 1/t exists everywhere in the area.
     """
     side = face.right - face.left
     scale = dr.rcp(_cross(face.left - area.origin.xy, side))
@@ -214,7 +218,13 @@ def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
 
 
 def _column_of(area: Area, point: Array, beyond: float) -> Array:
-    """Return the column a in which a point is visible, or `beyond` (±1, outside the area) if it is behind the eye."""
+    """Return the horizontal position a at which a point is visible in an area, a rectangle of the visual field.
+
+    The position runs from -1/2 at the area's left border to 1/2 at its right border.
+
+    point: x and y of the point (Point2f)
+    beyond: return value if the point is behind the eye: -1 or 1, outside the area
+    """
     way = point - area.origin.xy
     across = _cross(area.right, way)
     return dr.select(across > 0, -_cross(area.ahead, way) / dr.select(across > 0, across, 1), beyond)
@@ -225,10 +235,10 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _face_ends(walls: Walls) -> np.ndarray:
-    """Return the left and right end of each face, (face, 4).
+    """Return the x and y of the left end, and of the right end, of each face, (face, 4).
 
-    The faces of the walls, as seen from the front, are followed by the sides of the floor's rim, as seen from
-    inside.
+    Left and right are those of a viewer in front of the wall. After the walls' faces follow the four sides of the
+    rectangular floor, with left and right as for a viewer on the floor.
     """
     found = []
     for (x0, y0), (x1, y1) in zip(walls.lower, walls.upper, strict=True):

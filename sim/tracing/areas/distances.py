@@ -24,7 +24,7 @@ def distances_to_wall(area: Area, piece: Piece, patch: Patch) -> list[Array]:
     """Return the distances [m] from the pupil to the two quadrature nodes on a wall, which lie side by side.
 
     piece: part of the wall's face that is visible in the area
-    patch: the same part as a parallelogram; both nodes are at the height of its middle
+    patch: this part, described as a parallelogram; both nodes are at the height of its middle
     """
     found, height = [], patch.point.z - area.origin.z
     for node in NODES:

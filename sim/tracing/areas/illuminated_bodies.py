@@ -28,11 +28,12 @@ Reflected = Callable[[Array, Array, Array], list[Array]]
 
 
 class IlluminatedBodies:
-    """Computation and lookup of the light on the moving bodies of all worlds.
+    """Computation and lookup of a table of the light on the moving bodies of all worlds.
 
-    A row of the table belongs to a place on a body. It contains the fraction of each light that reaches the place, in
-    groups of four ("fours"). The first four rows of a body also contain sixteen spherical harmonics of the reflected
-    light around the body: each row contains four harmonics per component.
+    Each row of the table describes one place on a body. For each light, it contains the fraction that reaches the
+    place. These numbers are stored in groups of four ("fours"). The first four rows of a body also contain sixteen
+    spherical harmonics of the reflected light around the body. Each of these rows contains four of the harmonics, for
+    each component of the light's spectrum.
 
     shadows: shadows of walls
     directions: directions towards the lights
@@ -45,17 +46,18 @@ class IlluminatedBodies:
 
     @property
     def nodes_per_body_set(self) -> int:
-        """Number of rows of one world in the table of light on bodies.
+        """Number of rows that one world has in the table of the light on bodies.
 
-        Each body has ten rows. They contain the light at nine places on the body's sides, and on the whole body.
+        Each body has ten rows: one for each of nine places on its sides, and one for the body as a whole.
         """
         return PLACES * len(self._radii)
 
     def table(self, place: Array, bodies: list[Array], walls_around: Array | None, reflected: Reflected) -> list[Array]:
         """Return rows of the table of light on bodies. A row contains the light at one place on a body.
 
-        A row starts with the fraction of each light that reaches the place, in groups of four. Four spherical harmonics
-        of the reflected light around the body follow for each component of the light.
+        A row starts with one number per light: the fraction of this light that reaches the place. The numbers are
+        stored in groups of four. Then follow, for each component of the light's spectrum, four spherical harmonics of
+        the reflected light around the body.
 
         A body has nine places on its sides, in a grid of three by three, and a tenth place that stands for the whole
         body. Walls block the light at all ten places. Other bodies block it only at the nine places on the sides.
@@ -86,7 +88,7 @@ class IlluminatedBodies:
     def reflected_around(self, k: Array, world: Array, table: list[Array]) -> list[list[Array]]:
         """Return the harmonics of the reflected light around the k-th body of a world.
 
-        There is one list per component, with the harmonics in groups of four.
+        There is one list for each component of the light's spectrum, with the harmonics in groups of four.
         """
         first = (world * len(self._radii) + k) * PLACES
         return [[dr.gather(mi.Vector4f, rows, first + i) for i in range(FOURS)] for rows in table[self._fours :]]

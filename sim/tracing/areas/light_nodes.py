@@ -1,7 +1,7 @@
 """Nodes at which the light that walls and floor reflect to each other is computed, and interpolation between them.
 
-Every free cell of the walls' grid has nodes on its floor and on its four sides, where walls may stand. It also has
-positions of a body's centre, for which the light on the body is computed.
+Every free cell of the walls' grid has nodes on its floor and on its four sides, where walls may stand. For every free
+cell, the light on a moving body is computed as well, with the body's centre at several positions in the cell.
 """
 
 from __future__ import annotations
@@ -63,11 +63,11 @@ class LightNodes:
         return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
 
     def body_margin(self, radius: float) -> float:
-        """Return the smallest distance [m] between the tabulated positions of a body's centre and the border of a cell.
+        """Return the smallest distance [m] from a cell's border at which the light on a body is computed in advance.
 
-        The cells are the squares of the walls' grid. The distance is the body's radius, because walls may stand at the
-        borders, and a body's centre cannot be closer to a wall. For large bodies, the distance is a quarter of the
-        cell's side instead.
+        The cells are the squares of the walls' grid. The distance is that of the body's centre. It is the body's
+        radius, because walls may stand at the borders, and a body's centre cannot be closer to a wall. For large
+        bodies, the distance is a quarter of the cell's side instead.
 
         radius: radius of the body [m]
         """
@@ -75,7 +75,7 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Index of each cell of the walls' grid among the free cells, those without a wall; 0 for cells with a wall.
+        """Numbers, from 0, of the cells of the walls' grid that contain no wall, and 0 for cells with a wall.
 
         The numbers are a flat float32 array for the kernel, row by row (`CellGrid.numbers`).
         """
@@ -86,8 +86,9 @@ class LightNodes:
 class NodeTables:
     """Tables of the reflected light at the nodes, the points of floor and walls for which it was computed in advance.
 
-    cells: index of each cell of the walls' grid among the cells without a wall, see `CellGrid.numbers`
-    floor, walls: irradiance at the nodes of the floor and of the walls, one array per component
+    cells: numbers, from 0, of the cells of the walls' grid that contain no wall, see `CellGrid.numbers`
+    floor, walls: irradiance at the nodes of the floor and of the walls, one array for each component of the light, a
+        spectral band or a fixed spectrum
     """
 
     cells: Array
@@ -99,20 +100,26 @@ class NodeLight:
     """Light interpolated between nodes, from tables that are passed to each call.
 
     nodes: nodes at which the light is known
-    components: number of components of light
+    components: number of components of the light, which are spectral bands or fixed spectra
     """
 
     def __init__(self, nodes: LightNodes, components: int) -> None:
         self._nodes, self._components = nodes, components
 
     def on_floor(self, patch: Patch, tables: NodeTables) -> list[Array]:
-        """Return the irradiance of a patch of the floor due to reflected light, per component."""
+        """Return the irradiance of a patch of the floor due to reflected light.
+
+        There is one array for each component of the light, a spectral band or a fixed spectrum.
+        """
         cell, x, y = self._nodes.grid.locate(patch.point, tables.cells)
         n = self._nodes.across
         return self._interpolate(tables.floor, cell * (n * n), (x, n), (y, n))
 
     def on_wall(self, patch: Patch, tables: NodeTables) -> list[Array]:
-        """Return the irradiance of a patch of a wall due to reflected light, per component."""
+        """Return the irradiance of a patch of a wall due to reflected light.
+
+        There is one array for each component of the light, a spectral band or a fixed spectrum.
+        """
         normal = patch.normal
         cell, x, y = self._nodes.grid.locate(patch.point + normal * MARGIN, tables.cells)
         along_y = dr.abs(normal.x) > 0.5
@@ -123,7 +130,10 @@ class NodeLight:
         return self._interpolate(tables.walls, first, (across, self._nodes.across), (z, self._nodes.up))
 
     def on_surface(self, point: Array, normal: Array, tables: NodeTables) -> list[Array]:
-        """Return the irradiance at a point of the floor or of a wall due to reflected light, per component."""
+        """Return the irradiance at a point of the floor or of a wall due to reflected light.
+
+        There is one array for each component of the light, a spectral band or a fixed spectrum.
+        """
         nothing = mi.Vector3f(0)
         patch = Patch(point, normal, nothing, nothing)
         either = zip(self.on_floor(patch, tables), self.on_wall(patch, tables), strict=True)

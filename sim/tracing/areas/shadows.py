@@ -25,7 +25,7 @@ NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
 
 
 def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, radius: Array) -> list[Array]:
-    """Return the fraction of a patch on which a sphere casts no shadow, for each light.
+    """Return the fraction of a patch that lies outside a sphere's shadow, for each light.
 
     directions: unit vectors towards the lights
     """
@@ -42,11 +42,11 @@ def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, 
 
 
 def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: Array) -> Array:
-    """Return the fraction of a patch of a surface on which a sphere casts no shadow, for one light.
+    """Return the fraction of a patch of a surface that lies outside a sphere's shadow, for one light.
 
-    The shadow's fraction is the smaller of two estimates. The first estimate treats the shadow as a strip between two
-    parallel straight lines that touch its rim on opposite sides. It suits patches that are small against the shadow.
-    The second estimate treats the shadow as a disk that lies wholly within the patch. It suits large patches.
+    The fraction in the shadow is the smaller of two estimates. The first estimate treats the shadow as a strip between
+    two parallel straight lines that touch its rim on opposite sides. It suits patches much smaller than the shadow. The
+    second estimate treats the shadow as a disk that lies wholly within the patch. It suits large patches.
 
     direction: unit vector towards the light
     way: vector from the middle of the patch to the centre of the sphere
@@ -69,13 +69,14 @@ class WallShadows:
     Below the walls' tops, a ray towards a light therefore crosses at most one border of cells along x and one along y.
     It enters the neighbouring cell along x or the one along y, and then possibly their common neighbour, the diagonal
     one. A table states which neighbours of each cell are walls. A patch of a surface is divided by three straight
-    lines. The lines separate points whose rays pass above a neighbouring wall from points whose rays hit it, and points
-    whose rays first enter the neighbour along x from points whose rays first enter the neighbour along y.
+    lines. Two lines, one for the neighbour along x and one for the neighbour along y, separate points whose rays pass
+    above the walls' height there from points whose rays do not. The third line separates points whose rays enter the
+    neighbour along x first from points whose rays enter the neighbour along y first.
 
     around: table for the kernel that states, for each cell, which of its neighbours are walls; None without walls
 
     Raises:
-        NoClosedForm: the walls lie on no grid or overlap, or shadows are longer than a cell.
+        NoClosedForm: some walls overlap or do not fit a grid, or shadows are longer than a cell.
     """
 
     def __init__(self, walls: Walls, directions: list[list[float]]) -> None:
@@ -120,7 +121,7 @@ class WallShadows:
         return only_where(concerns, lit, [1.0] * len(directions))
 
     def _lit_from(self, patch: Patch, direction: list[float], row: Array, column: Array, around: Array) -> Array:
-        """Return the fraction of a patch of a surface on which no wall in a neighbouring cell casts a shadow.
+        """Return the fraction of a patch of a surface that lies outside the shadows of walls in neighbouring cells.
 
         Rays to the light may enter three neighbours: the one along x, the one along y, and the diagonal one.
 
@@ -153,7 +154,7 @@ def _share(value: Array, patch: Patch, gradient: tuple[float, float, float]) -> 
 
 
 def _behind(direction: list[float]) -> tuple[tuple[int, int], ...]:
-    """Return the three neighbours of a cell that rays from the cell towards a light may enter.
+    """Return the three neighbouring cells that a ray may enter on its way from a cell to a light.
 
     They are the neighbour along x, the neighbour along y and the diagonal neighbour, each as its offset in rows and
     columns from the cell.
