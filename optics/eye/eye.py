@@ -71,9 +71,9 @@ class Eye(EyeSpec):
     dynamics: time course of the receptors' responses. Only environments use it. The methods of `Eye` return the signals
         for constant light. None: receptors respond without delay.
     density: receptors per area of the retina, up to a constant factor. It is a function of the angles (right, up)
-        [degrees] from the eye's axis (a `Fovea` or `VisualStreak`), or an array (row, column) over the whole field, from its
-        top left, or the `lattice` of an eye. Receptors are rectangles in rows. A signal is the mean over a receptor,
-        and large receptors have less shot noise (None: all receptors are alike).
+        [degrees] from the eye's axis (a `Fovea` or `VisualStreak`), an array (row, column) over the whole field, from
+        its top left, or the `lattice` of an eye. Receptors are rectangles in rows. A signal is the mean over a
+        receptor, and large receptors have less shot noise (None: all receptors are alike).
     tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
         receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
