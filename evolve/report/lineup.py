@@ -42,10 +42,10 @@ def lineup(run: Run) -> Html:
 
 
 def _heading(generation: int) -> str:
-    """Return the title above the best animal of the first generation in which a candidate succeeded.
+    """Return the title of the left card, which shows the best animal of a generation.
 
-    generation: number of this generation. It is above 0 if all candidates of generation 0 have failed. The title then
-        adds "the first to succeed".
+    generation: number of the first generation in which a candidate succeeded. If it is above 0, all candidates of
+        generation 0 have failed, and the title adds "the first to succeed".
     """
     return f"Generation {generation}’s best{', the first to succeed' if generation else ''}"
 

@@ -137,7 +137,7 @@ def evaluate(order: Order) -> Reply:
 
 
 def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
-    """Return the Evaluation, and the bytes of the policy and of the checkpoint, in a reply of `evaluate`."""
+    """Return the contents of a reply of `evaluate`: Evaluation, bytes of the policy, bytes of the checkpoint."""
     text, policy, checkpoint = reply
     record = json.loads(text)
     record["returns"] = tuple(record["returns"])

@@ -279,7 +279,7 @@ def _text(value: Any, name: str) -> str | None:
 
 
 def _checksum(value: Any) -> str | None:
-    """Return the SHA-256 of a policy's file, or None, after a check.
+    """Return the given value if it is a valid SHA-256 of a policy's file, or None.
 
     Raises:
         ValueError: the value is neither a SHA-256 in hexadecimal digits nor None.

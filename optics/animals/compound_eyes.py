@@ -1,7 +1,7 @@
 """Compound eyes of insects and of a crustacean.
 
-The docstrings of the insects' eyes name the receptors that belong to the eye, for example "honeybee".
-`optics.receptors_of` returns the receptors with this name.
+The function `optics.receptors_of` returns the receptors of an insect's eye, for example for the name "honeybee". The
+docstring of each insect's eye states the name to use.
 
 All rhabdoms and rhabdomeres have the refractive index 1.363 in a medium of index 1.340. These are values for flies
 (Stavenga, J. Comp. Physiol. A 190, 115, 2004). Measured indices of the other animals are not used.

@@ -155,8 +155,9 @@ class Aperture(ABC):
         """Return the aperture after a low-pass filter.
 
         The filter leaves frequencies up to `passband` [cycles per pupil radius] unchanged, to within `ripple`. The soft
-        edge extends at most `widest_reach` [pupil radii] beyond the aperture. Within this limit, the filter has the
-        transition width that needs the fewest samples.
+        edge extends at most `widest_reach` [pupil radii] beyond the aperture. Within this limit, the
+        width of the filter's transition from pass band to stop band is chosen so that the soft aperture needs the
+        fewest samples.
 
         Raises:
             ValueError: passband is outside [0, 1e90], ripple is outside [1e-13, 0.5], or widest_reach is not positive.

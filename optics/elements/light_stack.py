@@ -28,7 +28,7 @@ TILT_STEP = 1e-3  # choice: step [radii] of the slopes of oblique waves
 
 @dataclass(frozen=True, eq=False)
 class StackSlopes(ReadOnlyArrays):
-    """Gradients of the optical paths behind several pupils, at the same points of their disks.
+    """Gradients of the optical paths behind several pupils, at the same points (x, y) relative to each pupil's radius.
 
     across: number of points across the pupils, see `disk_points`.
     x, y: points in units of the radius, (point,).

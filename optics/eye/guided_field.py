@@ -212,7 +212,7 @@ def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cell
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
     """Return a grid that contains all points x, y, with the margin that a spline needs.
 
-    x, y: sines of the angles of directions, relative to the sines of the source's direction.
+    x, y: sines (x and y components of the unit vectors) of directions, minus the sines of the source's direction.
 
     Raises:
         AccuracyError: the grid needs more samples than the limit.

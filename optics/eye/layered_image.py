@@ -86,10 +86,10 @@ class _Scene:
         return dr.clip(1 - hidden, 0, 1)
 
     def _coverage(self, source: np.ndarray, cells: np.ndarray) -> Array:
-        """Return, for each cell of the retina, the covered fraction of the pupil, an array (band, *shape).
+        """Return the fraction of the pupil that cells of the scene cover, seen from each cell of the retina.
 
-        Seen from this cell, the cells of the scene that `cells` selects lie in front of a part of the pupil and cover
-        it. For the arguments, see `_Scene`.
+        Only cells of the scene that `cells` selects are included. For the arguments, see `_Scene`. The shape is
+        (band, *shape).
         """
         ones = np.ones_like(self.light)
         return self._blurred([ones * share for share in self._shares(source, cells)], self._whole)

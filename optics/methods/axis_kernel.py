@@ -123,8 +123,8 @@ def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, d
 def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
     """Return the diffraction kernel along x (0) or y (1) at all columns or rows of the window, see `axis_kernel`.
 
-    If amplitude and phase of the kernel are smooth, they are computed for only a few directions of points of the pupil
-    and a few positions, and interpolated. The result is a complex array (pupil, column or row, sample).
+    If amplitude and phase of the kernel are smooth, they are computed for only a few points of the pupil and a few
+    positions in the window, and interpolated. The result is a complex array (pupil, column or row, sample).
     """
     at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
     if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):

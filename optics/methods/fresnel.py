@@ -154,10 +154,10 @@ def model_error(problem: Problem, curved: bool) -> float:
 
 
 def _misplaced(problem: Problem) -> float:
-    """Return the relative L2 error of Fraunhofer's integral if it concentrates light in much too small a spot.
+    """Return the relative L2 error of a PSF from Fraunhofer's integral whose spot of light is much too small.
 
-    For example, the integral shrinks the wide shadow of a pupil without a lens to a spot. The error follows from the
-    brightness of the spot, relative to that of the exact PSF.
+    For example, a pupil without a lens casts a wide shadow, but the integral yields a small spot. The error follows
+    from the brightness of the spot, relative to that of the exact PSF.
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None

@@ -175,7 +175,7 @@ class Problem:
 
     @cached_property
     def rays(self) -> Rays | None:
-        """Rays of geometrical optics, from which approximations predict their error; None if pixels scatter light."""
+        """Rays of geometrical optics, which predict the errors of methods; None if the pupil's pixels scatter light."""
         if self.pixelated is not None:
             return None
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)

@@ -81,10 +81,10 @@ class Rays:
         return disk_area(self.to_x, self.to_y)
 
     def densest(self) -> list[tuple[float, float]]:
-        """Return two points (x, y) [m]: the median of all hit points, and the mean of those where they are densest.
+        """Return two points (x, y) [m]: the median of all hit points, and the mean of those in the densest region.
 
-        The area that rays hit is divided into CELLS by CELLS equal rectangles. The second point is the mean of the hit
-        points in the rectangle with the most hit points.
+        The area that rays hit is divided into CELLS by CELLS equal rectangles. The densest region is the rectangle with
+        the most hit points.
         """
         counts, x, y = np.histogram2d(self.to_x, self.to_y, CELLS)
         i, j = np.unravel_index(counts.argmax(), counts.shape)

@@ -126,9 +126,10 @@ class _CheckSums:
     def _interpolation(self) -> tuple[np.ndarray, np.ndarray, RemainingFactor]:
         """Interpolation points in the pupil, errors of the interpolation, and values of the interpolated factor G.
 
-        G is a slowly varying factor of the diffraction kernel (see `_CheckSums`). The first result are the sines of the
-        interpolation points along an axis, (pupil, point). The second are the errors of the interpolation, see `apart`.
-        The third is G for all pairs of these sines, as a `RemainingFactor`.
+        G is a slowly varying factor of the diffraction kernel (see `_CheckSums`). The first result contains the
+        sines of the interpolation points along an axis, (pupil, point). A sine is a component of the unit vector from
+        the window's centre to a point, minus that for the pupil's centre. The second result contains the errors of the
+        interpolation, see `apart`. The third is G for all pairs of these sines, as a `RemainingFactor`.
 
         Increasing numbers of points are tried. For each, the interpolated G is compared with the value that follows
         from the diffraction kernel itself, for rays from the middle and from the rim of the pupil to the corners of the

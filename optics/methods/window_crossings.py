@@ -102,5 +102,5 @@ def _along_axis(root: Array, bright: Array) -> tuple[Array, Array]:
 
 
 def _beams(places: Array) -> Array:
-    """Return the numbers 0, 1, 2, ... that count the PSFs along the first axis of an array, (stack, 1)."""
+    """Return the indices 0, 1, 2, ... of the PSFs, which lie along the first axis of `places`, array (stack, 1)."""
     return library(places).ones_like(places[:, :1]).cumsum(0) - 1

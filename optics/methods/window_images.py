@@ -118,12 +118,12 @@ def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: 
 
 
 def _node_factors(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str) -> np.ndarray:
-    """Return the part of the slow factor that varies along both axes of the window, at nodes (points) of the window.
+    """Return a slowly varying factor of the diffraction kernel at nodes (points) of the window.
 
     The slow factor is the quotient of the diffraction kernel and a Fourier kernel, divided by the value of this
     quotient at the middle of the window. The result is the slow factor at a node, divided by the values of the slow
-    factor on the x axis and on the y axis of the window (see `RemainingFactor`). The shape is
-    (pupil, node along y, node along x, row of samples, column of samples).
+    factor on the x axis and on the y axis of the window (see `RemainingFactor`). It differs from 1 only off these axes.
+    The shape is (pupil, node along y, node along x, row of samples, column of samples).
     """
     s, t = samples.at[:, None, None, None, :], samples.at[:, None, None, :, None]
     u, v = nodes[None, None, :, None, None], nodes[None, :, None, None, None]

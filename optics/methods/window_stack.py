@@ -167,7 +167,10 @@ class _LensLight:
         return replace(self, focal_length=focal, sources=tuple(source.plain for source in self.sources))
 
     def waves(self, x: Array, y: Array, size: Array) -> Array:
-        """Return the waves at points (x, y) [m], with amplitude `size`, (source, y, x)."""
+        """Return the wave of each source at points (x, y) [m], array (source, y, x).
+
+        size: amplitude of the waves.
+        """
         before, behind = self.indices
         found = library(x).stack([source.path(x, y) for source in self.sources]) * (before / self.wavelength)
         if self.focal_length is not None:

@@ -143,9 +143,12 @@ def _at_edge(request: Request) -> Array:
 
 
 def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
-    """Return the fraction of the pupil's light that the relief bends beyond grazing, and its uncertainty.
+    """Return the fraction of the pupil's light that does not propagate according to ray optics, and its uncertainty.
 
-    Diffraction spreads the light of a ray over sines of about √(λ/R), with the wavelength λ and the pupil's radius R.
+    The sine of the angle between a ray and the axis is the slope of the optical path behind the pupil, divided by the
+    refractive index. A ray with a sine of 1 or more does not propagate. Diffraction changes the sine by about √(λ/R),
+    with the wavelength λ and the pupil's radius R. The uncertainty is the fraction of rays with a sine above
+    1 - √(λ/R).
     """
     pupil, problem = request.beam.pupil, request.problem
     slopes = pupil.slopes(request.beam.wavelength, request.beam.source)

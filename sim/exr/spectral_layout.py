@@ -140,7 +140,7 @@ def _attributes(header: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _preview(channels: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the preview (y, x, 3) as the field "rgb" of a `View`; {} if the channel R, G or B is missing."""
+    """Return {"rgb": preview image (y, x, 3)} for a `View`, or {} if the channel R, G or B is missing."""
     if not all(name in channels for name in PREVIEW):
         return {}
     return {"rgb": np.stack([_float32(channels[name]) for name in PREVIEW], axis=-1)}

@@ -59,7 +59,7 @@ def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: flo
 
 
 def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distances of the pixels' centres from a line segment [pixels], (y, x).
+    """Return the distance [pixels] of each pixel's centre from a line segment, array (y, x).
 
     start, end: ends of the segment, (x, y) [pixels]
     size: height and width of the image [pixels]

@@ -25,7 +25,7 @@ from sim.scene.variant import variant as in_variant
 
 
 class MergedMirror(Mirror):
-    """A Mitsuba scene that mirrors all bodies of a model, in the geom groups that MuJoCo shows by default (0 to 2).
+    """A Mitsuba scene with copies of all bodies of a model, in the geom groups that MuJoCo shows by default (0 to 2).
 
     Merged meshes are called "still_<n>", all other shapes "geom_<geom id>_<part>".
 

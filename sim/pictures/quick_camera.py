@@ -116,8 +116,9 @@ class QuickCamera:
     def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[QuickImage, np.ndarray]:
         """Return an image from at most one ray per pixel, and the linear sRGB values along the rays, (3, ray).
 
-        The lattice consists of every fifth pixel. Rays are traced through the middles of its pixels, and of other
-        pixels that may lie on an edge. All remaining pixels have the colour of the nearest pixel of the lattice.
+        The lattice consists of every fifth pixel. Rays are traced through the middles of these pixels. Then, rays are
+        also traced through the middles of other pixels that may lie on an edge. All remaining pixels have the colour of
+        the nearest pixel of the lattice.
         """
         found = self._rays.trace(view, lattice.size, CODES * lattice.pixels)
         linear, planes, ray, shown = found.linear, found.plane, lattice.nearest, _displayed(found.linear)

@@ -86,9 +86,9 @@ class EdgeRays:
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
         """Return a mask that is True for receptors whose signal differs strongly from that of a neighbour.
 
-        An edge between two surfaces may pass unnoticed between the first four rays of such a receptor. Receptors at the
-        rim of the visual field are also compared with squares just outside it, which are as large as a receptor. The
-        mask is a flat array (view, receptor).
+        An edge between two surfaces may pass unnoticed between the first four rays of such a receptor. Each receptor
+        covers a square of the visual field. Further squares of this size lie just outside the field, and receptors at
+        its rim are also compared with them. The mask is a flat array (view, receptor).
 
         light: sums of the light over the first four rays of each square, array (component, view, square). The squares
             are those of the receptors, and those just outside the visual field
@@ -145,10 +145,10 @@ def _sums(components: list[Array], rays: int) -> tuple[Array, ...]:
 def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
     """Return whether adaptive edge sampling is likely to save rays.
 
-    Adaptive edge sampling first traces four rays for every receptor and for every square just beyond the rim of the
-    retina. It then traces the full number of rays, but only for receptors that see an edge. Return True if the first
-    rays are at most half of the rays without adaptive sampling. With more first rays, nothing would be saved once a few
-    receptors need all rays.
+    Adaptive edge sampling first traces four rays for every receptor, and for further squares of a receptor's size just
+    beyond the rim of the retina. It then traces the full number of rays, but only for receptors that see an edge.
+    Return True if the first rays are at most half of the rays without adaptive sampling. If they are more, a few
+    receptors that see an edge may use up what is saved at the others.
 
     resolution: number of rows and of columns of receptors
     rays: number of rays per receptor without adaptive sampling

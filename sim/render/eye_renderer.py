@@ -223,7 +223,7 @@ class EyeRenderer:
         return self.labels.flow(poses, later)
 
     def brightest_in(self, light: np.ndarray) -> float:
-        """Return the value that `brightest` has if all lights are multiplied by the factors `light`, (band,)."""
+        """Return the attribute `brightest` for lights that are brighter by the factors `light`, array (band,)."""
         return float((self.eye.throughput * self.eye.spectral_bands.weights @ (self._white * light)).max())
 
     @property

@@ -125,9 +125,10 @@ class Stages(Protocol):
 def cheapest(stages: Stages) -> Fidelity:
     """Return the cheapest fidelity (accuracy of rendering) whose predicted error is allowed.
 
-    The spectral bands are those of the eye. Depth layers, light and samples are chosen in this order. For each of them,
-    the result is the cheapest option whose predicted error is allowed. If no available option is accurate enough, a
-    FidelityWarning states by how much the allowed error is exceeded.
+    The spectral bands are not chosen, but are those of the eye. The settings `depth`, `light` and `samples` of a
+    Fidelity are chosen one after the other. For each of them, the result is the cheapest option whose predicted error
+    is allowed. If no available option is accurate enough, a FidelityWarning states by how much the allowed error is
+    exceeded.
     """
     allowed, shares = stages.allowed, stages.shares
     depth, depth_level = stages.depth(allowed * (shares.depth if shares else 1))

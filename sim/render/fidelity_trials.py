@@ -95,7 +95,7 @@ class FidelityTrials:
     def have_areas(self, *lights: str) -> bool:
         """Return whether this eye and this world permit area sampling with light of all these kinds.
 
-        lights: "direct", "bounce" and "all" follow one, up to two, and any number of reflections, respectively
+        lights: "direct" (light after one reflection), "bounce" (one or two) or "all" (any number of reflections)
         """
         if self._eye.lattice is not None:
             return False

@@ -29,7 +29,12 @@ def shadowless(light: Description) -> Description:
 
 @cache
 def _register(variant: str) -> None:
-    """Register the emitter "shadowless" in `variant`, the active one. Mitsuba has no classes until a variant is set."""
+    """Register the emitter "shadowless" in Mitsuba's active variant.
+
+    Mitsuba has no classes until a variant is set.
+
+    variant: name of the active variant
+    """
 
     class Shadowless(mi.Emitter):
         """An emitter that has the light of another emitter, but casts no shadow.

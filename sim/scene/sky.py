@@ -19,7 +19,7 @@ MAX_ROWS = 1024  # limit for the rows of the panorama
 
 
 def texture(model: mujoco.MjModel) -> int:
-    """Return the index of the skybox that MuJoCo draws, which is the first; -1 for none."""
+    """Return the index of the model's first skybox texture, the one that MuJoCo draws, or -1 if there is none."""
     found = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     return int(found[0]) if len(found) else -1
 

@@ -182,7 +182,7 @@ class ModelTracer:
         return sent if self._medium is None else self._medium.through(sent, hit.t), hit.t
 
     def _returned(self, hit: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
-        """Return the light that reaches each visible surface along one ray that leaves it in a sampled direction."""
+        """Return the light that each visible surface receives from one direction, which is sampled at random."""
         bounce_ray = lighting.spawn_bounce_ray(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
         second = self._first_hits(bounce_ray, there, hit.seen)
         arrives = self._irradiance(second, axis, there)

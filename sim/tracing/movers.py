@@ -35,10 +35,10 @@ MESH = "mesh"
 
 @dataclass(frozen=True)
 class Hit:
-    """First hit of a ray.
+    """First hit of a ray. Without a hit, `t` is `farthest` (see `Movers.nearest`), and `which` is len(Movers).
 
-    t, which: distance [m] and index in `Movers`; without a hit, `farthest` (see `Movers.nearest`) and len(Movers)
-    normal, uv: unit vector in the world's frame; texture coordinates, which only meshes and planes have
+    t, which: distance of the hit from the ray's origin [m], and index of the mover that is hit in `Movers`
+    normal, uv: normal (a unit vector in the world's frame), and texture coordinates (only for meshes and planes)
     """
 
     t: Array

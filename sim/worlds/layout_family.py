@@ -82,7 +82,7 @@ class LayoutFamily:
 
     @property
     def test(self) -> LayoutSet:
-        """Layouts for final results, which must not be used to select policies or animals."""
+        """Layouts for final results only. These layouts must not be used to select policies or animals."""
         return LayoutSet(self, "test")
 
     def number(self, name: str) -> int:
