@@ -135,7 +135,8 @@ def _images(
     At coarse tolerances, PyTorch computes members with the same pupil and sensor distance as one stack, on the device
     `place`. Dr.Jit computes all other members.
 
-    light, fixed: the light with tensors in place of `numbers`, and without derivatives.
+    light, numbers: pupils, distances and angle, and the tensors in these: {"pupils[0].aperture_radius": tensor}.
+    fixed: the batch `light` with plain numbers instead of tensors, without derivatives.
     """
     convert = partial(on_device, place) if numbers or place.type != "cpu" else np.asarray
     found = light.coarse_images(fixed, wavelengths, view, convert)
@@ -192,7 +193,7 @@ def eye_signals(
 ) -> torch.Tensor:
     """Return the signals of `optics.Eye.see` as a tensor (channel, h, w) with gradients to the tensors in the eye.
 
-    eye: an eye. Its field of view and the numbers of its pupil may be tensors, see `psf`.
+    eye: an eye. Its field of view may be a tensor. The numbers of its pupil that may be tensors are listed in `psf`.
     radiance, samples_per_receptor, rng, z: see `optics.Eye.see`. Of these, only the distance z carries a gradient.
     device: device of the result, see `psf`.
 
@@ -208,7 +209,7 @@ def eye_signals(
 
 
 def _operation(compute: Callable[[Any], Any], element: Any, device: Any) -> torch.Tensor:
-    """Return compute(element) as a tensor, with gradients to the tensors in `element`, such as a pupil."""
+    """Return compute(element) as a tensor with gradients to the tensors that `element`, for example a pupil, holds."""
     numbers = torch_numbers(element)
     place = torch.device(device) if device is not None else common_device(numbers)
     if not numbers or not torch.is_grad_enabled():
@@ -263,7 +264,7 @@ class PointSpread(torch.nn.Module):
     The only learnt parameter is `relief`, which equals heights / unit.
 
     Raises:
-        ValueError: heights or wavelengths are invalid. For other arguments, and in forward(), see `psf`.
+        ValueError: heights or wavelengths are invalid. Other invalid arguments raise the errors of `psf` in forward().
     """
 
     def __init__(

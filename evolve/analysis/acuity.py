@@ -28,7 +28,7 @@ def acuity_vertical_cpd(phenotype: Phenotype) -> float:
 
     It is 1 / (2 Δ), where Δ is the angle between neighbouring rows of receptors: vertical fov / rows. If receptors are
     square, rows are as far apart as columns, fov/columns. Rows of ommatidia are √3/2 times as far apart as columns.
-    Eyes are placed side by side, so their number has no effect.
+    Eyes are placed side by side, so the number of eyes has no effect on the vertical acuity.
     """
     rows, columns = phenotype.resolution
     if phenotype.facet_diameter_um is not None:

@@ -24,7 +24,7 @@ def fitness_label(costs: bool) -> str:
 
 
 def fitness_text(fitness: float, costs: float, shown: Callable[[float], str] = "{:.4g}".format) -> str:
-    """Return a fitness as text, followed by its parts if there are costs.
+    """Return a fitness as text; if there are costs, followed by the mean return (the task fitness) and the costs.
 
     shown: function that returns a number as text
     """
@@ -35,7 +35,8 @@ def fitness_text(fitness: float, costs: float, shown: Callable[[float], str] = "
 def fitness_interval(candidate: Candidate) -> tuple[float, float]:
     """Return the 95 % bootstrap interval of a candidate's fitness, from the returns of its evaluation episodes.
 
-    Costs are exact, so they only shift the interval. The interval is (NaN, NaN) for a single episode.
+    Fitness is the mean return minus the costs of the animal. The costs are known exactly, so they shift the interval
+    but do not change its width. The interval is (NaN, NaN) for a single episode.
 
     Raises:
         ValueError: the candidate failed, so it has no returns.

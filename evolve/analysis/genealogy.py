@@ -27,7 +27,7 @@ def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Cand
 def descent(candidate: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
     """Return a candidate's line of descent, from its earliest recorded ancestor to the candidate itself.
 
-    candidates: candidates on record, among which the ancestors are searched
+    candidates: recorded candidates, in which the ancestors are looked up
     """
     known = {other.id: other for other in candidates}
     line = [candidate]

@@ -119,9 +119,9 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return a quantity over the generations: quantiles in each population, and its value in the best candidate so far.
+    """Return quantiles of a quantity in each generation, and the quantity of the best candidate up to this generation.
 
-    Failed candidates also have a phenotype, so they belong to the populations.
+    Failed candidates also have a phenotype, so the quantiles include them.
 
     value: function that returns the quantity of a phenotype; NaN if the phenotype lacks it
     """
@@ -150,8 +150,9 @@ def _quantiles(values: Floats) -> tuple[float, float, float]:
 def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str, float]:
     """Return the values of all genes that the phenotype expresses, by gene name.
 
-    Genes of a pupil are present only if the animal has one, and spectral genes only if they determine its receptors.
-    For receptor types that the animal lacks, the peak wavelengths are NaN.
+    Genes of a pupil are present only if the animal's eyes have a pupil. Spectral genes are present only if the types of
+    the animal's receptors are determined by genes, not by a setting. For receptor types that the animal lacks, the peak
+    wavelengths are NaN.
 
     eye: settings of a run's eyes. Only values of genes of this run are returned: for a symmetric relief, the heights in
         an eighth of its area, and for a square eye, only one side. None: all values are returned

@@ -50,9 +50,10 @@ UNDEFINED = Vision(math.nan, math.nan, math.nan, math.nan)
 
 
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
-    """Return the measures of an animal's eyes in the run's task.
+    """Return image quality, contrast, PSNR and structural similarity of an animal's eyes in the run's task.
 
-    All measures are NaN for compound eyes, and if the PSF cannot be computed accurately enough.
+    `Vision` defines these measures. All of them are NaN for compound eyes, and if the PSF cannot be computed accurately
+    enough.
 
     Raises:
         ConfigError: the user task was not named when the run was opened, or its module cannot be executed.

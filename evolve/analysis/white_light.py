@@ -18,7 +18,7 @@ __all__ = ["WhiteLight", "eye_image_quality", "white_strehl"]
 
 @dataclass(frozen=True)
 class WhiteLight:
-    """An eye with its PSF in each band (`psf`) and in white daylight (`white`), and measures of the eye.
+    """An eye, its PSF in each band (`psf`) and in white daylight (`white`), its MTF, image quality and contrast.
 
     Raises:
         optics.AccuracyError: the PSF (in `from_eye`) or a measure (on access) cannot be computed accurately enough.

@@ -1,4 +1,4 @@
-"""Values of arguments, which are whole numbers within a range, and error messages in one line."""
+"""Conversion of command-line arguments to whole numbers within a range, and of error messages to one line."""
 
 from __future__ import annotations
 

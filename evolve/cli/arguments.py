@@ -70,8 +70,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the parsed arguments.
 
     Raises:
-        SystemExit: there are no arguments, or help or the version is requested (code 0); or an argument is invalid
-            (code 2, after one line is printed).
+        SystemExit: with code 0 if there are no arguments, or if the arguments request help or the version. With code 2,
+            after one line is printed, if an argument is invalid.
     """
     parser = build_parser()
     if not arguments:
@@ -209,7 +209,7 @@ def _add_watching(commands: Commands) -> None:
 
 
 def _add_products(commands: Commands) -> None:
-    """Add the commands that write files from a run, and the command `see`."""
+    """Add the commands `replay`, `report`, `export` and `demo`, which write results to files, and the command `see`."""
     for name, meaning, out in (
         ("replay", "play an episode of an agent, print the result, and write a page that shows it", "FILE"),
         ("report", "write the HTML report", "FILE"),
@@ -255,7 +255,7 @@ def _add_output(command: argparse.ArgumentParser) -> None:
 
 
 def _add_tables(commands: Commands) -> None:
-    """Add the commands that print lists, settings or a completion script, or check results or the installation."""
+    """Add the commands `validate`, `doctor`, `tasks`, `presets`, `genes`, `config` and `completion`."""
     validate = _command(
         commands, "validate", "validate.validate", "run validation scripts (in a checkout of the repository)"
     )

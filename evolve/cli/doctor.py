@@ -84,7 +84,8 @@ def examine() -> dict[str, object]:
     packages: version of each package, or "not installed"
     llvm: all LLVM libraries that were tested
     variants: state of each tested variant of Mitsuba
-    notes: messages about the operating system, and about files that hide packages of rhabdom
+    notes: messages about the operating system, and about files that Python imports instead of packages of rhabdom,
+        because they have the same name
     good: True if all parts that `evolve run` needs work
     """
     chosen, tried = backend.find(cached=False)

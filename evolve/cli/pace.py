@@ -46,7 +46,8 @@ class Pace:
     steps_per_s: number of agent steps per second at the beginning of training, including updates of the policy
     play_s: time of one evaluation, whose episodes run in parallel [s]
     policy_bytes: size of the file of a trained policy [bytes]
-    pass_s: time per sample (an agent step of the rollout) of one pass over the samples in an update [s]
+    pass_s: duration of one pass over the samples of an update, divided by the number of samples [s]. A sample is an
+        agent step of the rollout
     """
 
     start_s: float
@@ -56,7 +57,11 @@ class Pace:
     pass_s: float = 0.0
 
     def candidate_s(self, config: RunConfig) -> float:
-        """Return the time for one candidate [s] if training is not divided into rungs."""
+        """Return the time for training and evaluating one candidate [s].
+
+        The result assumes that training is not divided into rungs, stages after which only the better candidates
+        continue.
+        """
         return self.rung_s(config.learning, 0, config.learning.total_steps)
 
     def rung_s(self, learning: LearningConfig, begin: int, end: int) -> float:
@@ -74,16 +79,19 @@ class Pace:
 
 
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
-    """Return the pace for each animal, with the slowest of all workers' times. All workers measure at the same time.
+    """Return the pace for each animal, by the animal's name: how fast one worker process trains and evaluates it.
+
+    All workers measure at the same time. If several workers train the same animal, their measurements differ. For each
+    field of `Pace`, the result then contains the measured value from which the longest duration of the run follows.
 
     animals: animals that are trained for the measurement, by name
     workers: number of worker processes
 
     Raises:
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
-        ConfigError: the user task fails or has several mounts that no animal would use, or an animal cannot be
-            evaluated on this machine, for example because its eyes cannot be computed. The message names the animal and
-            the reason.
+        ConfigError: the user task fails, or its method `place` uses only one of several mounts (bodies, sites or
+            cameras that carry eyes). It is also an error if an animal cannot be evaluated on this machine, for example
+            because its eyes cannot be computed. The message states the reason, and names the animal if there is one.
         ExecutorError: a worker process died.
     """
     tried = list(islice(cycle(animals), max(workers, len(animals))))
@@ -139,10 +147,12 @@ def _slowest(paces: list[Pace]) -> Pace:
 def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Path) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
-    The first update has all passes over the samples, and the second update may have only half of them. The time of a
-    pass follows from the difference between the times of the two updates.
+    The first update makes all passes over the samples. The second update makes only half as many, unless the settings
+    keep the number of passes higher. The time of one pass follows from the difference between the times of the two
+    updates.
 
-    policy: path for the trained policy. Its folder belongs to the parent process, which removes it even after Ctrl-C
+    policy: path to which the trained policy is written. The parent process removes the folder of this file, even after
+        Ctrl-C
 
     Raises:
         ValueError: the animal cannot be evaluated; the message states the reason.
@@ -180,9 +190,10 @@ def _timed_training(config: RunConfig, animal: Phenotype, seed: int, policy: Pat
 
 
 def _with_short_rollouts(learning: LearningConfig) -> LearningConfig:
-    """Return the settings with the shortest rollouts that consist of whole batches, if these are shorter.
+    """Return the settings with rollouts shortened to the smallest number of steps that fills whole batches.
 
-    The time per step hardly changes, because an update takes a constant time per batch.
+    Rollouts that are already shorter than this are not changed, unless they have only one step per environment, which
+    becomes two. The measured time per step hardly changes, because an update takes a constant time per batch.
     """
     whole_batches = math.lcm(learning.batch_size, learning.n_envs) // learning.n_envs
     return replace(learning, n_steps=max(2, min(learning.n_steps, whole_batches)))

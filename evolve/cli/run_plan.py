@@ -39,7 +39,8 @@ class RunPlan:
     config: settings of the run
     directory: run directory
     workers: number of worker processes
-    paces: measured paces, by name of the animal in `animals`; {} if they have not been measured
+    paces: how fast a worker trains and evaluates an animal, by the name of the animal: "start", whose genes have their
+        start values, and "middle", whose genes are in the middle of their ranges; {} if this has not been measured
     """
 
     config: RunConfig
@@ -52,7 +53,9 @@ class RunPlan:
         return cls(config, directory, config.workers or cores())
 
     def measured(self) -> RunPlan:
-        """Return the plan with the paces of this machine, which are measured in a few seconds.
+        """Return the plan with measured `paces`: how fast a worker on this machine trains and evaluates an animal.
+
+        The measurement takes a few seconds.
 
         Raises:
             BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -64,16 +67,20 @@ class RunPlan:
 
     @property
     def animals(self) -> dict[str, Phenotype]:
-        """Two animals that represent all others: one with the start values, and one in the middle of all ranges."""
+        """Two animals that represent all others, "start" and "middle".
+
+        The genes of "start" have their start values. The genes of "middle" are in the middle of their ranges.
+        """
         genotype = Genotype(self.config.genome)
         middle = np.full(genotype.dimension, 0.5)
         return {"start": develop(genotype.start, self.config), "middle": develop(middle, self.config)}
 
     @property
     def hours(self) -> dict[str, float]:
-        """Predicted wall time of the run [h] for each animal with a measured pace, by its name.
+        """Predicted wall time of the run [h], by the name of the animal from whose measured speed it follows.
 
-        The prediction assumes that all candidates take the same time as this animal and complete their training.
+        The prediction assumes that all candidates take the same time as this animal, and that they complete their
+        training.
         """
         search, learning = self.config.search, self.config.learning
         if search.steady_state:
@@ -90,9 +97,11 @@ class RunPlan:
 
     @property
     def disk_bytes(self) -> int:
-        """Predicted size of policies, record, report and EXR files [bytes], for the larger of the animals in `animals`.
+        """Predicted size of policies, record, report and EXR files of the run [bytes].
 
-        The prediction requires measured paces.
+        Two animals represent all others: one whose genes have their start values, and one whose genes are in the middle
+        of their ranges. Their policies and EXR files differ in size, and the larger size is used for each kind of file.
+        Sizes of policies are known only after a short training, so the plan must be a result of the method `measured`.
         """
         policy = max(pace.policy_bytes for pace in self.paces.values())
         pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
@@ -106,7 +115,10 @@ class RunPlan:
         return shutil.disk_usage(existing).free
 
     def _rung_lines(self) -> list[str]:
-        """Return a line with the number of candidates and steps of each rung; no line if there is only one rung."""
+        """Return a list of one line with the candidates and steps of all rungs; [] if there is only one rung.
+
+        A rung is a stage of training, after which only the better candidates continue.
+        """
         search = self.config.search
         ends = zip(sizes(search), budgets(search, self.config.learning), strict=True)
         rungs = ", ".join(f"{size} candidates for {steps:,} steps" for size, steps in ends)
@@ -155,7 +167,11 @@ class RunPlan:
         return [*lint(self.config), *(["the disk is too small for this run"] if short else [])]
 
     def record(self) -> dict[str, Any]:
-        """Return the plan as JSON values; predictions are {} or None if the paces have not been measured."""
+        """Return the plan as JSON values by name.
+
+        The predicted time ("hours") and disk space ("disk_bytes") follow from the measured speed of training ("pace").
+        Before this measurement, "hours" and "pace" are {}, and "disk_bytes" is None.
+        """
         config = self.config
         opening = {g.name: config.genome[g.name].opens_at for g in Genotype(config.genome).open_genes}
         return {
@@ -185,7 +201,11 @@ def steps_each(config: RunConfig) -> str:
 
 
 def _gene_lines(config: RunConfig) -> list[str]:
-    """Return lines that list the open genes of each cluster, with the generation in which they open."""
+    """Return lines that list the open genes, which are the genes that the search varies.
+
+    Each cluster (morphological, optical, neural or spectral genes) has its own line. If the search varies some genes of
+    a cluster only from a later generation on, these genes have a separate line, which states the generation.
+    """
     genes = Genotype(config.genome).open_genes
     lines = []
     for cluster in CLUSTERS:

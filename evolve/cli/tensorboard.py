@@ -26,7 +26,9 @@ FOLDER = "tensorboard"
 
 
 class TensorBoardWriter:
-    """Watcher of a run (see `evolve.search.loop`) that writes its scalars. It is used as a context manager.
+    """Writer of a run's scalars (fitness, learning curves and genes) for TensorBoard, a context manager.
+
+    It is a watcher: the search calls its methods while candidates train (see `evolve.search.loop`).
 
     Raises:
         ExecutorError: TensorBoard is not installed.
@@ -53,7 +55,9 @@ class TensorBoardWriter:
         """Do nothing while a candidate trains, because only scalars from the record are written."""
 
     def evaluated(self, candidate: Candidate) -> None:
-        """Write the scalars of a candidate after each rung of its training; a failed candidate has none.
+        """Write the scalars of a candidate that has completed a rung, a stage of its training.
+
+        For a failed candidate, no scalars are written.
 
         Outcome and genes are plotted against the candidate's id, and the learning curve against training steps. If the
         candidate's generation is complete, statistics of its successful candidates are written too.

@@ -27,7 +27,10 @@ class Waiting:
         self._progress: Any = None
 
     def of_one_step(self, text: str) -> Waiting:
-        """Set the text of the only step, which starts when the context is entered. Return this object."""
+        """Set the text for a bar with a single step, and return this object.
+
+        The step starts when the context is entered.
+        """
         self._first = text
         return self
 

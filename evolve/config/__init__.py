@@ -13,10 +13,10 @@ lint           warnings about settings that are allowed but odd
 relief_starts  start values for the genes of a pupil's relief
 formats        formats of config.toml, and conversion of older ones
 square_eyes    settings of square eyes, which have one gene for height and width
-task_choice    TaskChoice: a task, and its code if the user has named it
+task_choice    TaskChoice: a task, with its code if the user has named the task
 task_card      TaskCard: properties of a task that are known without executing it
 task_code      TaskCode: source text of a user task
-task_errors    place of an error in the code of a user task
+task_errors    method, line and file of an error in the code of a user task
 numbering      conversion between a candidate's id and its generation
 tasks/         default settings of the tasks
 """

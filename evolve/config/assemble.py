@@ -88,9 +88,9 @@ def assemble(
 
 
 def _assembled(below: list[Source], above: list[Source]) -> RunConfig:
-    """Return the configuration from the preset's sources `below`, the task's default settings, and the sources `above`.
+    """Return the configuration that follows from default settings of the task and from other sources of settings.
 
-    The sources `above` override the settings of the task and the preset.
+    Sources in `above`, such as files and options, override those in `below`, a preset, and the settings of the task.
     """
     known_task = [source.tree["task"] for source in (*below, *above) if "task" in source.tree]
     if not known_task:
@@ -134,8 +134,8 @@ def _read_back(written: Source) -> RunConfig:
 def _user_settings(source: Source, code: TaskCode | None) -> Source:
     """Return the settings of a user's file or option `--set`. The file may be the config.toml of another run.
 
-    The format of such a file must be one whose settings still have the same meaning. A file cannot select a user task,
-    because only the command line or a call may name code that is executed.
+    The config.toml must have format 2 or a later one, because settings of format 1 can have another meaning. A file
+    cannot select a user task, because the user must name code on the command line or in a Python call.
     """
     if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(
@@ -165,7 +165,7 @@ def to_toml(config: RunConfig) -> str:
 
 
 def _checked(source: Source) -> Tree:
-    """Return the settings of a source after a check of keys and values. Settings of gene groups are expanded to genes.
+    """Return the checked settings of a source, such as a file. A setting of a group of genes becomes one of each gene.
 
     Raises:
         ConfigError: a key or a value is invalid; the message names the source and, if known, the line.
@@ -214,7 +214,7 @@ def _checked_entry(key: str, value: Any) -> Any:
 def _checked_genome(section: Tree) -> Tree:
     """Return the settings of each gene after a check.
 
-    Settings of a cluster or family apply to all its genes. Settings of a smaller group override those of a larger one.
+    Settings of a group of genes apply to each of them. Settings of a smaller group override those of a larger one.
     """
     result: Tree = {}
     for group in sorted(section, key=lambda name: -len(group_members(name))):
@@ -250,7 +250,9 @@ def _merge(below: Tree, above: Tree) -> Tree:
 
 
 def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
-    """Check that animals with these eyes have the genes that a source names individually, not through a group.
+    """Check the genes that a source of settings names individually: animals with these eyes must have them.
+
+    Settings of a group of genes, such as `genome.optical`, are not checked: they apply to those genes that exist.
 
     Raises:
         ConfigError: a gene does not exist for these eyes or in this task.
@@ -278,7 +280,7 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
 
 
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
-    """Return the RunConfig from the checked trees of `layers`. Later trees override earlier ones and the defaults."""
+    """Return the configuration from `trees`, the checked settings of each source; later trees override earlier ones."""
     merged = _merged(trees)
     eye, card = EyeConfig(**merged.get("eye", {})), card_of(merged["task"])
     assert card is not None  # guaranteed by `_checked`

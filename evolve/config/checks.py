@@ -113,7 +113,7 @@ def check_gene_use(gene: Gene, use: GeneConfig) -> None:
 def suggestion(word: Any, known: Iterable[str]) -> str:
     """Return "did you mean X?" if `word` is similar to the known word X; else a list of known words, as text.
 
-    Two words also count as similar if only their parts after the last dot are. The list contains the first 36
+    For words with dots, it is enough that the parts after the last dot are similar. The list contains the first 36
     known words, and states the number of the others.
     """
     known, word = list(known), str(word)

@@ -42,7 +42,7 @@ class CostsConfig:
 def receptor_count(animal: Phenotype, eye: EyeConfig) -> int:
     """Return the number of receptors in all eyes of an animal, each receptor type counted separately.
 
-    Without motion detectors, this is also the number of signals in a frame.
+    Without motion detectors, this is also the number of signals that the eyes deliver at a time.
     """
     rows, columns = animal.resolution
     types = eye.receptors if animal.lambda_max_nm is None else animal.lambda_max_nm
@@ -50,9 +50,10 @@ def receptor_count(animal: Phenotype, eye: EyeConfig) -> int:
 
 
 def neuron_count(animal: Phenotype) -> int:
-    """Return the number of neurons in the hidden layers of the actor.
+    """Return the number of neurons for which an animal pays `costs.per_neuron`.
 
-    The critic has no price, because only training uses it. The encoders have none either, because they belong to the
-    eyes, whose price is `costs.per_eye`.
+    These are the neurons in the hidden layers of the actor, the network that chooses actions. The neurons of the critic
+    cost nothing, because only training uses them. The neurons of the encoders, which process the signals of the eyes,
+    cost nothing, because they belong to the eyes, whose price is `costs.per_eye`.
     """
     return animal.layers * animal.neurons

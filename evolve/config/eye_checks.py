@@ -33,7 +33,8 @@ def check_eye(eye: EyeConfig) -> None:
     """Check the settings of eyes: names, light, compound eyes, rhabdoms and receptors with memory.
 
     Raises:
-        ConfigError: a name is unknown, settings contradict each other, or a changed setting has no effect.
+        ConfigError: a name is unknown, settings contradict each other, or a setting without effect does not have its
+            default.
     """
     names = {"receptors": (*RECEPTORS, INHERITED), "vertical_fov": VERTICAL_FOVS}
     for name, known in {**names, "adaptation": ADAPTATIONS, "motion_detectors": MOTION}.items():
@@ -67,7 +68,10 @@ def _check_light(eye: EyeConfig) -> None:
 
 
 def _check_compound(eye: EyeConfig) -> None:
-    """Check that compound eyes have optics, and that settings are changed only for the kind of eyes that has them.
+    """Check that compound eyes have optics, and that settings for the other kind of eyes have their defaults.
+
+    Eyes are either compound or camera eyes. For camera eyes, `eye.facet_area` must have its default. For compound eyes,
+    all settings that only camera eyes use, such as `eye.sensor_width`, must have their defaults.
 
     Raises:
         ConfigError: one of these conditions is not met.
@@ -88,7 +92,9 @@ def _check_compound(eye: EyeConfig) -> None:
 
 
 def check_wiring(eye: EyeConfig, wiring: WiringConfig) -> None:
-    """Check that settings of the wiring that need rows and columns of receptors are 0 for compound eyes.
+    """Check that `pool_side` and `repeat_side`, settings of the wiring, are 0 for compound eyes.
+
+    These settings need receptors in rows and columns.
 
     Raises:
         ConfigError: one of these settings is not 0.
@@ -135,9 +141,10 @@ def _check_rhabdoms(eye: EyeConfig) -> None:
 
 
 def _check_time(eye: EyeConfig) -> None:
-    """Check that settings of receptors with memory are changed only if they have an effect.
+    """Check the settings of receptors with memory, which also respond to past light.
 
-    Also check that a threshold for events is large enough, and that there is no adaptation in addition to it.
+    Settings without effect must have their defaults. The threshold for events, which are changes of a receptor's
+    signal, must be 0 or large enough. If it is above 0, receptors must not adapt.
 
     Raises:
         ConfigError: one of these conditions is not met.

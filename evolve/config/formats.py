@@ -66,12 +66,13 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
 
 
 def in_own_axes(tree: Mapping[str, Any], number: int) -> Tree:
-    """Return the settings, completed so that pupils keep the axes that the settings' format implies.
+    """Return the settings of a run, extended such that pupils keep the axes that they had when the run was written.
 
-    In formats 1 and 2, pupils are rotated by 180°. Settings of these formats get `eye.pupil_turned` = True, unless they
-    contain this setting.
+    In files of formats 1 and 2, pupils are rotated by 180° relative to the current format. Settings from such a file
+    get `eye.pupil_turned` = True, unless they contain this setting.
 
-    number: format of the settings
+    tree: settings of the run
+    number: number of the format of the file with these settings
     """
     eye = tree.get("eye", {})
     if number > 2 or not isinstance(eye, dict):
@@ -88,5 +89,8 @@ def _learning_then(learning: Tree, number: int) -> Tree:
 
 
 def task_then(task: Any) -> Any:
-    """Return the current name of a task in a file of format 1."""
+    """Return the name that a task from a file of format 1 has now.
+
+    The task that was called "navigation" is now called "maze". All other names are unchanged.
+    """
     return "maze" if task == "navigation" else task

@@ -1,4 +1,4 @@
-"""Checks of the settings of layouts, which are either fixed or a random family."""
+"""Checks of the settings of layouts. The layouts of a run are either all fixed or all random."""
 
 from __future__ import annotations
 
@@ -21,12 +21,14 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 
 
 def check_layouts(world: WorldConfig) -> None:
-    """Check the names and sizes in the settings of layouts, and that settings without effect have their defaults.
+    """Check the settings of layouts, the arrangements of walls in courses and mazes.
 
-    Settings of random families have no effect on fixed layouts, and settings of fixed layouts none on random families.
+    The setting `world.layouts` determines whether layouts are fixed or random. Some settings affect only fixed layouts,
+    and others only random ones. Settings without effect must have their defaults. Choices, such as that of a course,
+    must be known. The numbers of rows and columns and the width of paths must be odd.
 
     Raises:
-        ConfigError: a name is unknown, a size is even, or a changed setting has no effect.
+        ConfigError: one of these conditions is not met.
     """
     for name, known in CHOICES.items():
         if (word := getattr(world, name)) not in known:

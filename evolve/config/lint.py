@@ -24,12 +24,13 @@ def lint(config: RunConfig) -> list[str]:
 
 
 def coarse_bands(config: RunConfig) -> list[str]:
-    """Return a warning if signals have errors above a receptor's noise because there are too few spectral bands.
+    """Return a warning if there are so few spectral bands that errors of receptor signals exceed the receptors' noise.
 
     Errors up to 0.001 of the signal of a white surface are ignored. The result is a list with one line, or [].
 
-    The error is computed for the measured spectra of the task's world, and for white and black in the run's medium.
-    Without a medium, it is not computed for user tasks, whose reflectances are unknown, nor for grey worlds.
+    Errors are computed for the surfaces of the task's world that have a measured spectrum. If the run's medium is not
+    air, errors are also computed for white and black surfaces that are seen through the medium. In air, there is no
+    warning for user tasks, whose reflectances are unknown, nor for worlds in which all surfaces are grey.
     """
     if config.card.grey is not False and config.world.medium == AIR:  # reflectances are unknown, or grey
         return []
@@ -70,16 +71,20 @@ def _most_light(config: RunConfig) -> float:
 
 
 def _doublings(bands: int) -> list[int]:
-    """Return `bands`, and its repeated doublings as long as they are below 64, the reference's number of bands."""
+    """Return `bands`, and all numbers below 64 that follow from it by repeated doubling.
+
+    Errors are computed relative to a reference with 64 bands.
+    """
     return [bands * 2**k for k in range(6) if k == 0 or bands * 2**k < 64]
 
 
 def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
-    """Return the sets of receptors for which the error is computed.
+    """Return the sets of receptor types for which `coarse_bands` computes errors of signals.
 
-    If the spectral genes determine the receptors, each open gene in turn takes values over its range, while the others
-    keep their start values. Other combinations of the genes may cause a larger error. In the preset `ultraviolet`,
-    whose peaks lie far apart, the largest error of all combinations is a third larger.
+    A set is a name such as "rgb", or the peak wavelengths of the types [nm]. If genes determine these peaks, each gene
+    that the search varies takes values over its range in turn, while the others keep their start values. Other
+    combinations may cause larger errors. In the preset `ultraviolet`, whose peaks lie far apart, a test of all
+    combinations would find an error that is a third larger.
     """
     if config.eye.receptors != INHERITED:
         return [config.eye.receptors]
@@ -95,7 +100,10 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
 
 
 def idle_genes(config: RunConfig) -> list[str]:
-    """Return warnings about open genes that have no effect, because of other genes or of the world."""
+    """Return warnings about open genes (genes that the search varies) that have no effect.
+
+    They have no effect because of the values of other genes, or because of the world.
+    """
     uses, table = config.genome, config.genes
     notes = []
     if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
@@ -113,7 +121,13 @@ def idle_genes(config: RunConfig) -> list[str]:
 
 
 def _idle_glass(uses: Mapping[str, GeneConfig], relief: list[str]) -> list[str]:
-    """Return warnings about open genes of a relief that does not refract, and of the material of a flat relief."""
+    """Return warnings about open genes (genes that the search varies) of a pupil's relief that have no effect.
+
+    If the refractive index is fixed at 1, the genes of the heights and of dispersion have no effect. If the relief is
+    fixed and flat, the two genes of its material (refractive index and dispersion) have no effect.
+
+    relief: names of the genes of the heights
+    """
     notes, index = [], uses["refractive_index"]
     if not index.open and index.start == 1 and any(uses[name].open for name in (*relief, "dispersion")):
         notes.append("the relief's open genes have no effect: genome.refractive_index is fixed at 1")

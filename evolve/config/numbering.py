@@ -22,7 +22,10 @@ class Place:
 
     @classmethod
     def from_id(cls, candidate_id: int, population: int) -> Place:
-        """Return the place of the candidate with this id; every generation has `population` candidates."""
+        """Return the place (generation, and index in it) of a candidate.
+
+        population: number of candidates in each generation
+        """
         return cls(candidate_id, *divmod(candidate_id, population))
 
 

@@ -32,7 +32,10 @@ class Source:
     def place(self, key: str) -> str | None:
         """Return the location of `key` in this source, such as "mine.toml, line 7"; None if the source does not set it.
 
-        key: dotted name. A setting of a gene counts as set if the source sets it for the gene's cluster or family
+        A source may contain a setting for a whole group of genes instead of a single gene, for example
+        `genome.optical.open` for all optical genes. The location is then that of the group's setting.
+
+        key: dotted name of the setting, such as "genome.dispersion.open"
         """
         for path in _spellings(key):
             if not _holds(self.tree, path):
@@ -45,8 +48,8 @@ class Source:
 def _spellings(key: str) -> Iterator[list[str]]:
     """Yield the parts of a dotted key.
 
-    If the key belongs to a gene, also yield the parts with the gene's name replaced by each of its groups, the smallest
-    group first.
+    If the key belongs to a gene, also yield parts in which the name of a group that contains the gene, such as
+    "optical", replaces the gene's name. The smallest group comes first.
     """
     path = key.split(".")
     yield path

@@ -1,4 +1,4 @@
-"""Start values for the genes of a pupil's relief, converted to the number of genes that the eyes of a run have."""
+"""Conversion of start values for the genes of a pupil's relief to reliefs that have more points or are symmetric."""
 
 from __future__ import annotations
 
@@ -18,14 +18,18 @@ Tree = dict[str, Any]
 
 
 def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
-    """Return the settings `tree`, with the start values of relief genes converted to the number of genes of the eyes.
+    """Return the settings `tree`, with the start values of relief genes adapted to the reliefs of these eyes.
 
-    The start values in `tree` may describe a whole relief of 4 x 4 points, by all its genes or by the genes of a
-    symmetric relief. If the eyes have more points, these values are converted to the same surface with more points. If
-    reliefs are symmetric, settings that follow from others by symmetry are removed.
+    A relief is defined by its heights at a square grid of points. A gene determines the height of one point or, in a
+    symmetric relief, of several points.
+
+    If `tree` contains the start values of a relief of 4 x 4 points, and the reliefs of the eyes have more points, the
+    values are replaced by those of the same surface with more points. If reliefs are symmetric, settings that follow
+    from others by symmetry are removed.
 
     Raises:
-        ConfigError: `tree` contains start values for more than 4 x 4 genes, and the eyes have even more genes.
+        ConfigError: `tree` contains start values for a relief of more than 4 x 4 points, and the reliefs of the eyes
+            have even more points.
     """
     genes, names = tree.get("genome", {}), doe_names(eye.relief_points)
     side = _spelled_out(genes)
@@ -49,12 +53,16 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
 
 
 def _patches(eye: EyeConfig) -> list[list[str]]:
-    """Return lists of the genes of 4 x 4 heights: without symmetry and, for symmetric reliefs, also with it."""
+    """Return, for each point of a relief of 4 x 4 points, the name of the gene that determines the height there.
+
+    The first list in the result is for a relief without symmetry. If the eyes have symmetric reliefs, there is a second
+    list, in which several points have the same gene.
+    """
     return [representatives(PATCH, symmetric) for symmetric in (False, True)[: 1 + eye.relief_symmetric]]
 
 
 def _spelled_out(genes: Tree) -> int:
-    """Return N if exactly the relief genes of an N x N square have start values, else 0."""
+    """Return N if the relief genes that have start values are those of a relief of N x N points, else 0."""
     given = _with_start(genes)
     return next((side for side in range(PATCH, int(RELIEF_POINTS.high) + 1) if given == set(doe_names(side))), 0)
 
@@ -64,7 +72,10 @@ def _with_start(genes: Tree) -> set[str]:
 
 
 def _same(one: Tree, other: Tree) -> bool:
-    """Return whether the settings of two genes are equal, apart from rounding errors of the start values."""
+    """Return whether two genes have equal settings, apart from rounding errors of their start values.
+
+    one, other: settings of each gene by name, such as "open" and "start"
+    """
     rest, others = ({key: value for key, value in use.items() if key != "start"} for use in (one, other))
     return rest == others and math.isclose(one["start"], other["start"], abs_tol=1e-9)
 

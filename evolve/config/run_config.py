@@ -62,15 +62,15 @@ class RunConfig:
     seed: seed of search, training and evaluation
     workers: number of worker processes; 0: one per core
     task_sha256: SHA-256 of a user task's file; "" for a built-in task
-    genome: settings of each gene of the animals (`GeneConfig`), by name. A run needs at least one open gene
+    genome: settings of each gene of the animals (`GeneConfig`), by name. The search must vary at least one gene
     code: code of the user task, if the user has named the task in the command or call; else None. The code of a task
         that is named only in a file is never executed
 
     The other fields are sections of settings; the classes of the sections describe them.
 
     Raises:
-        ConfigError: a value is invalid or out of range, settings contradict each other, or a changed setting has no
-            effect. The message is one line.
+        ConfigError: a value is invalid or out of range, settings contradict each other, or a setting differs from its
+            default although it has no effect. The message is one line.
     """
 
     task: str
@@ -124,11 +124,11 @@ class RunConfig:
             raise ConfigError(message, *keys)
 
     def _check_task(self) -> None:
-        """Check the genes and settings that only some tasks have, and the number of frames rendered per action.
+        """Check that the run's genes, settings and number of rendered frames per action suit the task.
 
         Raises:
-            ConfigError: the task does not have a gene of the genome or a changed setting, or does not allow this
-                number of frames.
+            ConfigError: the genome contains a gene that the task lacks, or a setting that the task lacks differs from
+                its default, or the task does not allow the number `eye.frames` of rendered frames per action.
         """
         for name in OPTIONAL_GENES:
             if name in self.genome and not self.card.has_gene(name):
@@ -144,7 +144,7 @@ class RunConfig:
             )
 
     def _check_world(self) -> None:
-        """Check the settings of layouts, and that they are changed only for tasks that have them."""
+        """Check the settings of layouts. Those that the task lacks must have their defaults."""
         self._check_settings((*OF_MAZES, *OF_COURSES, *OF_LAYOUTS, PATH_WIDTH))
         check_layouts(self.world)
 
@@ -166,7 +166,9 @@ class RunConfig:
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_clusters(self) -> None:
-        """Check that at least one gene is open, and that the run uses all open genes.
+        """Check that the search varies at least one gene, and no optical or spectral genes that have no effect.
+
+        Optical genes need optics, and spectral genes need receptor types that are inherited.
 
         Raises:
             ConfigError: one of these conditions is not met.
@@ -191,9 +193,10 @@ class RunConfig:
             raise ConfigError("genome: every gene is frozen; open at least one (genome.NAME.open = true)", *keys)
 
     def _check_rungs(self, rollout: int) -> None:
-        """Check the settings of successive halving.
+        """Check the settings of successive halving, in which only the better candidates continue after each rung.
 
-        It requires whole generations, and its first rung must be at least one rollout long.
+        A rung is a stage of training. Successive halving compares the candidates of a generation, so the search must
+        propose candidates generation by generation. The first rung must be at least one rollout long.
 
         rollout: number of steps in a rollout
 
@@ -217,7 +220,9 @@ class RunConfig:
             )
 
     def _check_phases(self) -> None:
-        """Check that every open gene opens before the run ends, and that at least one opens at the start of the run.
+        """Check `opens_at` of the open genes: the first generation in which the search varies the gene.
+
+        This generation must come before the end of the run, and must be 0, the first, for at least one gene.
 
         Raises:
             ConfigError: one of these conditions is not met.
@@ -249,7 +254,10 @@ class RunConfig:
 
     @property
     def choice(self) -> TaskChoice:
-        """Task of the run, with its code if the user has named it."""
+        """Task of the run. It includes the code of a user task only if the user has named this code.
+
+        The user names it in a command or call. Code that is named only in a file is never executed.
+        """
         return TaskChoice(self.task, self.task_sha256, self.code)
 
     @property
@@ -263,7 +271,9 @@ class RunConfig:
         return self.card.name
 
     def with_code(self, named: str) -> RunConfig:
-        """Return this configuration with the code of its task, named as "FILE.py:CLASS".
+        """Return a copy of this configuration that contains the code of the user task.
+
+        named: file and class of the task, "FILE.py:CLASS"
 
         Raises:
             ConfigError: the run has no user task, the class has another name, or the file cannot be read or has

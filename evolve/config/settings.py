@@ -95,16 +95,18 @@ class WorldConfig:
 
     @property
     def test(self) -> dict[str, Any]:
-        """Arguments of `sim.build_world` that define the worlds of final results.
+        """Arguments of `sim.build_world` that define the worlds in which final results are measured.
 
-        These are the test layouts of a family. Without a family, they are the worlds in which fitness is evaluated.
+        If `world.layouts` requests a family of random layouts, the worlds have the layouts of the family's test set,
+        which neither training nor selection uses. If the layouts are fixed, final results are measured in the same
+        worlds as fitness.
         """
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return the height of walls, the medium, and the set `name` of layouts, as arguments of `sim.build_world`.
+        """Return arguments of `sim.build_world`: the height of walls, the medium and a set of layouts.
 
-        name: "training", "selection" or "test"
+        name: name of the set of layouts: "training", "selection" or "test"
         """
         layouts = None
         if self.layouts == FAMILY:

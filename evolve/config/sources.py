@@ -1,4 +1,4 @@
-"""Sources of settings: presets and their scales, tasks, TOML files, `--set key=value`."""
+"""Sources of settings: presets and their versions for short and long runs (scales), tasks, TOML files, `--set`."""
 
 from __future__ import annotations
 
@@ -54,14 +54,16 @@ def preset_about(name: str) -> dict[str, Any]:
 
 
 def preset_sources(name: str | None, scale: str | None) -> list[Source]:
-    """Return the sources of a preset: its settings, then its scale, whose settings override them.
+    """Return the sources of a preset: first its general settings, then those of a scale, which override them.
+
+    Scales are alternative settings of a preset for shorter and longer runs. A preset without them has one source.
 
     name: name of the preset; None: no preset, and the result is []
-    scale: name of the scale; None: "laptop", if the preset has several scales
+    scale: name of the scale; None: "laptop" if the preset has several scales, and no scale otherwise
 
     Raises:
-        ConfigError: the preset or the scale is unknown, or `scale` is given although there is no preset, or the preset
-            has only one scale.
+        ConfigError: the preset is unknown, or none of its scales has this name. It is also an error if `scale` is given
+            without a preset, or for a preset without scales.
     """
     if name is None:
         if scale is not None:
@@ -137,7 +139,7 @@ def _first_line(error: Exception) -> str:
 
 
 def read_assignment(text: str) -> Source:
-    """Return the source for one setting as text: "search.population=8" gives {"search": {"population": 8}}.
+    """Return the setting that a text assigns: "search.population=8" gives {"search": {"population": 8}}.
 
     The value is parsed as TOML. A value that is not valid TOML, such as a word without quotation marks, is text.
 

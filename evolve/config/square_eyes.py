@@ -1,4 +1,8 @@
-"""Settings of square eyes, which have one gene for both sides. Equal settings of both sides apply to this gene."""
+"""Settings of square eyes, which have one gene, "resolution", for the number of receptors along each side.
+
+Other eyes have one gene for the height and one for the width. If the settings of a run contain equal settings for these
+two genes, the settings are converted to settings of "resolution".
+"""
 
 from __future__ import annotations
 
@@ -12,14 +16,15 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """Return the source, with the settings of height and width moved to the single gene of square eyes.
+    """Return settings adapted to square eyes, which have one gene for height and width, `resolution`.
 
-    If eyes are not square, the source is returned unchanged. Equal settings of height and width become settings of the
-    single gene. Unequal settings are kept, and `no_such_side` explains the error that follows from them.
+    If the source has equal settings for the genes `resolution_height` and `resolution_width`, these become settings of
+    the gene `resolution`. Unequal settings are kept, and later cause an error, which `no_such_side` explains. If eyes
+    are not square, the source is returned unchanged.
 
     A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes, the task's
-    settings of height and width are ignored, and the preset's width applies to both sides if the preset does not set
-    the height.
+    default settings of the two genes are removed. If a preset sets only the width, this becomes its setting of
+    `resolution`.
     """
     genes = source.tree.get("genome", {})
     if eye.square and not source.name:
@@ -34,7 +39,12 @@ def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
 
 
 def no_such_side(name: str, eye: EyeConfig) -> str:
-    """Return a message that explains why these eyes lack a gene: that of a single side, or that of both sides."""
+    """Return a message that explains why these eyes lack a gene for their numbers of receptors.
+
+    Square eyes lack the separate genes for height and width. Other eyes lack the common gene for both sides.
+
+    name: name of the missing gene
+    """
     if eye.square:
         return f"genome.{name}: square eyes have the gene {SIDE} for both sides; set it, or eye.square = false"
     return f"genome.{name}: only square eyes have this gene, others have {' and '.join(SIDES)}; set eye.square = true"

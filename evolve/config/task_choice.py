@@ -15,11 +15,12 @@ __all__ = ["TaskChoice"]
 
 @dataclass(frozen=True)
 class TaskChoice:
-    """A task, and its code if the code may be executed.
+    """A task, with its code if the user has allowed the code to run.
 
     label: name of the task in config.toml: the name of a built-in task, or FILE.py:CLASS
     sha256: hash of the file; "" for a built-in task
-    code: code of the user task, if the user has named it; code that the user has not named must not be executed
+    code: code of a user task that the user has named on the command line or in a call. None: a built-in task, or a user
+        task that the user has not named, whose code must not be executed
     """
 
     label: str
@@ -28,9 +29,9 @@ class TaskChoice:
 
     @classmethod
     def named(cls, said: str) -> TaskChoice:
-        """Return the task that a command or call names. The file of a user task is read but not executed.
+        """Return the task with the name that the user gave on the command line or in a call.
 
-        The name of a built-in task is not checked here; see `card`.
+        The file of a user task is read but not executed. The name of a built-in task is not checked here; see `card`.
 
         said: name of a built-in task, or "FILE.py:CLASS"
 
@@ -70,7 +71,8 @@ class TaskChoice:
         """Code of a user task; None for a built-in task, which has none.
 
         Raises:
-            ConfigError: the user has not named the code, so it must not run.
+            ConfigError: the user has not named the user task on the command line or in a call, so its code must not
+                run.
         """
         if self.sha256 and self.code is None:
             raise ConfigError(

@@ -36,7 +36,7 @@ class TaskCode:
 
     @property
     def label(self) -> str:
-        """Name of the task in a run's config, without the folder of the file."""
+        """Name of the task in a run's config: "FILE.py:CLASS", where FILE.py does not include the folder."""
         return f"{self.file.name}:{self.name}"
 
     @property

@@ -34,8 +34,8 @@ class Pictures:
 class Episode:
     """Recording of one episode in mode "evaluation" or "test". In the shapes of arrays, t is the time step.
 
-    Row t of the arrays contains the signals at time t, the action that followed, and the results of this action:
-    rewards, and entries of the next observation other than the signals.
+    Row t of the arrays contains the signals at time t, the action that followed, the reward for this action, and
+    entries of the observation after it other than the signals.
 
     task, candidate_id, seed: name of the task, id of the candidate, and seed of the episode
     phenotype, eye, world: the animal, and the settings of its eyes and of the world
@@ -44,10 +44,10 @@ class Episode:
     action: in [-1, 1], (t, number)
     reward: reward of each action, (t,)
     reward_terms: terms of the reward by name, (t,) each; 0 in steps in which the task did not return the term
-    counted: titles of table rows, by term; a row shows the number of steps in which the term is not 0 (see
-        `sim.BatchTask`)
-    beside: entries of the next observation other than signals and action, by name, (t, number) each, such as "contact"
-        or "feels"
+    counted: titles by name of a reward term. Reports show how often each of these terms is not 0, in a table row with
+        this title (see `sim.BatchTask`)
+    beside: entries of the observation after each action other than signals and action, by name, (t, number) each, such
+        as "contact" or "feels" (proprioception)
     seconds: duration of one action [s]
     solved: True if the episode counts as solved
     failure: message of the failure that ended the episode; None without a failure
@@ -60,7 +60,7 @@ class Episode:
         `sim.scene.lights`
     azimuths [rad], elevations_deg: viewing direction of each eye in the frame of its body, site or camera, (eye,)
     scene: shapes and poses of bodies, and poses of eyes
-    position (t, 2) [m], heading (t,) [rad]: pose of the animal on the ground before the action
+    position (t, 2) [m], heading (t,) [rad]: pose of the animal on the ground before each action
     plan: plan of the world from above; None if the task has none
     pictures: images for display; None if not recorded
     """
@@ -119,7 +119,7 @@ class Episode:
 
     @property
     def objects(self) -> np.ndarray:
-        """Positions of the ground plan's objects before each action [m], (t, object, 3); no objects without a plan."""
+        """Positions of the ground plan's objects before each action [m], (t, object, 3); empty if there is no plan."""
         bodies = () if self.plan is None else self.plan.object_bodies
         return self.scene.positions[:, list(bodies)]
 

@@ -24,7 +24,7 @@ class EpisodeScene:
     positions (t, body, 3), rotations (t, body, 3, 3): poses of the bodies
     eye_positions (t, eye, 3): positions of the pupils
     eye_rotations (t, eye, 3, 3): frames of the eyes, with columns (right, up, ahead)
-    path (t, 3): position of the animal, which is that of the body, site or camera that carries its first eye
+    path (t, 3): position of the animal: the position of the body, site or camera that carries the animal's first eye
     headings (t,): heading of the animal from the world's x axis [rad]
     """
 

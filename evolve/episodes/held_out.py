@@ -1,4 +1,4 @@
-"""Episodes of a run's candidate in the test set of layouts, which neither training nor selection has used."""
+"""Evaluation episodes in a run's test set: layouts that neither training nor selection has used."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def held_out_episodes(
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the run has no test set, or the user task was not named when the run was opened, or its module
-            cannot be executed.
+        ConfigError: the run has no test set, the run was opened without naming its user task, or the module of the user
+            task cannot be executed.
         ValueError: `episodes` is below 1, or `seed` is negative.
         RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.

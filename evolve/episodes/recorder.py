@@ -58,8 +58,8 @@ def record(
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the mode is unknown, the run has no test set, or the user task was not named when the run was
-            opened, or its module cannot be executed.
+        ConfigError: the mode is unknown, the run has no test set, the run was opened without naming its user task, or
+            the module of the user task cannot be executed.
         ValueError: `radiance_every` is not a whole number from 1 to 1,000,000, or `seed` is negative.
         RuntimeError: a method of the user task fails at the start of the episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -94,7 +94,7 @@ def trained_policy(run: Run, candidate: Candidate) -> EyePolicy:
 
 @contextlib.contextmanager
 def damage_named(path: Path) -> Iterator[None]:
-    """Convert errors of a policy inside the context to errors that name the policy's file.
+    """Convert errors of a policy in the body of the `with` statement to errors that name the policy's file.
 
     Raises:
         RunError: the policy belongs to another animal, or its actions are not finite.
@@ -128,7 +128,8 @@ class Recorder:
         Raises:
             UnfitPolicy: the policy was trained with different eyes.
             TrainingDiverged: the policy's actions are not finite.
-            ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+            ConfigError: the run was opened without naming its user task, or the module of the user task cannot be
+                executed.
             RuntimeError: a method of the user task fails at the start of the episode.
             BackendError: Dr.Jit finds no usable LLVM library or GPU.
         """
@@ -167,9 +168,9 @@ class Recorder:
     ) -> dict[str, Any]:
         """Return, by name, the fields of an episode that are rendered behind a perfect lens.
 
-        These are the signals of the same receptors, and the radiance on a finer grid, in the same scenes and the same
-        light. Ommatidia have no counterpart behind a perfect lens. For compound eyes, the signals are those of the
-        ommatidia without noise.
+        These are the signals of the animal's receptors, and the radiance on a finer grid than that of the receptors,
+        both in the scenes and the light of the episode. Ommatidia have no counterpart behind a perfect lens. For
+        compound eyes, the signals are therefore those of the ommatidia without noise.
         """
         own = self.phenotype.eyes(self.config.eye)
         perfect = own.with_perfect_lens()
@@ -222,7 +223,7 @@ class _Beginning:
 
 
 def _model(physics: Any) -> mujoco.MjModel:
-    """Return the MuJoCo model of the single world, with all values that were drawn at the start of the episode."""
+    """Return the MuJoCo model of the only simulated world, with all values drawn at the start of the episode."""
     model: mujoco.MjModel = physics.datas[0].model if hasattr(physics, "datas") else physics.model
     return model
 
@@ -230,7 +231,9 @@ def _model(physics: Any) -> mujoco.MjModel:
 def _play(
     policy: EyePolicy, worlds: EyesVecEnv, begun: _Beginning, pictures: bool
 ) -> tuple[list[Poses], dict[str, Any]]:
-    """Play one episode. Return the poses before each action, and the fields of `Episode` that are then known, by name.
+    """Play one episode, and return the poses before each action and some fields of `Episode`, by name.
+
+    These are the fields that follow from the actions, observations and rewards of the episode.
 
     pictures: True to render images for display
     """
@@ -266,9 +269,12 @@ def _play(
 
 
 def _on_ground(infos: list[Mapping[str, Any]]) -> dict[str, np.ndarray]:
-    """Return positions [m] and headings [rad] before each action by name; {} if the task's `info` lacks them.
+    """Return the animal's "position" [m] and "heading" [rad] before each action; {} if `infos` lack one of the two.
 
-    These values are exact, in contrast to headings that are computed from rotation matrices.
+    These values are exact, in contrast to headings that are computed from rotation matrices. The arrays have the shapes
+    (action, 2) and (action,).
+
+    infos: the task's `info` before each action
     """
     if not all(np.shape(info.get("position", ())) == (2,) and "heading" in info for info in infos):
         return {}

@@ -63,7 +63,7 @@ def tracks(
     Raises:
         UnfitPolicy: the policy was trained with different eyes.
         TrainingDiverged: the policy's actions are not finite.
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without the "FILE.py:CLASS" of its user task, or its code cannot be executed.
         ValueError: `episodes` is below 1, or `seed` is negative.
         RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -82,7 +82,8 @@ class _Watcher:
     """Recorder of the positions of the animal and of objects while episodes are played.
 
     worlds: environments in which the episodes are played
-    mount: place of the animal's first eye, on whose body, site or camera the animal's position is measured
+    mount: place of the animal's first eye; the recorder takes the position of the body, site or camera that carries
+        this eye as the animal's position
     """
 
     def __init__(self, worlds: EyesVecEnv, mount: Mount) -> None:

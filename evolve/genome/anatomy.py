@@ -30,7 +30,7 @@ SLACK = 1e-9  # tolerance for rounding errors: eyes in contact must not count as
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
     """Return the width [m] of a retina with this number of receptors along its width. The eye has the same width.
 
-    sizes: settings of the eyes, here and in the other functions
+    sizes: settings of the eyes; the other functions of this module have the same argument
     """
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
 
@@ -73,8 +73,8 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     If receptors are too narrow, their number along the width is reduced. `_with_high_receptors` repairs receptors that
     are not high enough. If eyes overlap, they are spread over a larger part of the head. If the searched range of their
     placement is too small for this, the number of eyes is reduced. If the width of an eye depends on the number of its
-    receptors, the numbers of eyes and of receptors are instead reduced in about the same proportion. Rhabdoms become at
-    most as wide as the shorter side of a receptor, but at least as wide as the lowest valid value of their gene. All
+    receptors, this number is then reduced as well, in about the same proportion as the number of eyes. Rhabdoms become
+    at most as wide as the shorter side of a receptor, but at least as wide as the lowest valid value of their gene. All
     other genes stay within their searched ranges.
 
     For compound eyes, see `evolve.genome.head_surface`.
@@ -101,11 +101,12 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 
 
 def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
-    """Return new values of genes, by name, with which receptors are at least `eye.receptor_width` high.
+    """Return changed gene values, by name. They make receptors at least `eye.receptor_width` high.
 
     If necessary, the number of rows is reduced. If the lowest number does not fit and the vertical field of view is a
-    gene, this field grows, at most to its highest value. If that is not enough, the horizontal field shrinks, which
-    makes a retina of the same width higher. For square receptors, the result is {}.
+    gene, this field grows, at most to its highest value. If that is not enough, the horizontal field of view shrinks.
+    The width of the retina [m] stays the same, so its height [m] grows in relation to the narrower field. For square
+    receptors, the result is {}.
     """
     vertical = vertical_fov(values, sizes)
     if vertical is None:
@@ -158,12 +159,13 @@ def _degrees(tangent: float) -> float:
 
 
 def _thinned(wanted: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
-    """Return the numbers of eyes and of receptors along the width that fit and are closest to `wanted`.
+    """Return the closest numbers to `wanted` for which eyes do not overlap: eyes, and receptors along an eye's width.
 
-    The distance between two pairs of numbers is the sum of the squared logarithms of their ratios. With this distance,
-    the repair halves both numbers rather than dividing one of them by four. If the repair always reduced the same
-    number, evolution would drift towards animals in which the other number is large. Selection, not the repair, should
-    choose between eyes and receptors.
+    This function is part of the repair of animals whose eyes would overlap: it reduces their numbers of eyes and of
+    receptors. The distance from `wanted` is the sum of two squared logarithms: of the ratio of the two numbers of eyes,
+    and of the ratio of the two numbers of receptors. With this distance, the repair halves both numbers rather than
+    dividing one of them by four. If the repair always reduced the same number, evolution would drift towards animals in
+    which the other number is large. Selection, not the repair, should choose between eyes and receptors.
 
     The required space depends on the number of gaps between eyes, eyes - 1. The ratio of two numbers of eyes is
     therefore computed from eyes - 0.5, the mean of the numbers of eyes and of gaps. This preserves the proportion of
@@ -184,7 +186,10 @@ def _ratio(one: float, other: float) -> float:
 
 
 def contradiction(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
-    """Return None if every genome can be repaired; else a message and the names of the contradicting settings."""
+    """Return None if `fitted` can repair every genome, so that no eyes or receptors overlap.
+
+    Otherwise return an error message and the names of the settings that contradict each other.
+    """
     if sizes.compound:
         return head_surface.contradiction(uses, sizes)
     return _crowded_retina(uses, sizes) or _low_retina(uses, sizes) or _crowded_head(uses, sizes)

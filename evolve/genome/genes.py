@@ -94,8 +94,8 @@ class Gene:
     name: name of the gene in settings, tables and records
     cluster: "morphological", "optical", "neural" or "spectral"
     kind: "real" or "integer"
-    range: valid values in any run
-    default: settings of the gene in a run that does not mention it
+    range: valid values, the same in all runs
+    default: settings of the gene in runs whose configuration does not mention the gene
     unit: unit of the values; "" for a number without a unit
     meaning: description for tables and messages
     """
@@ -114,7 +114,7 @@ class Gene:
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Return the gene's value at a coordinate. Values of an integer gene have coordinate intervals of equal length.
+        """Return the gene's value at a coordinate. An integer gene divides [0, 1] into equal intervals, one per value.
 
         u: coordinate in [0, 1], which is not checked
         use: settings of the gene in a run; the coordinates 0 and 1 correspond to `use.low` and `use.high`
@@ -124,7 +124,7 @@ class Gene:
         return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)
 
     def encode(self, value: float, use: GeneConfig) -> float:
-        """Return the coordinate u of a value, the inverse of `decode`; for an integer, the middle of its interval.
+        """Return the coordinate at which `decode` returns a value; for an integer, the middle of all such coordinates.
 
         use: settings of the gene in a run; real values from `use.low` to `use.high` have coordinates from 0 to 1
 
@@ -164,7 +164,7 @@ def gene_table(
     """Return the genes of animals with these kinds of eyes by name, in the order of the genome.
 
     relief_points: number of points of the relief along one side; without symmetry, there are relief_points² genes
-    relief_symmetric: True if the relief has only the genes of an eighth of its area
+    relief_symmetric: True if the relief is symmetric: genes determine an eighth of its area, and symmetry the rest
     square: True if eyes are square and have one gene for both sides
     optional: names of the genes in OPTIONAL that the animals have
     pupils: True if eyes have a pupil with a relief, and not facets
@@ -261,7 +261,7 @@ def _gene(
     unit: str,
     meaning: str,
 ) -> Gene:
-    """Return a gene that is open by default.
+    """Return a gene that is open by default: the search varies it, unless the settings of a run freeze it.
 
     valid: (low, high) of the valid values
     search: (low, high, start), the default search range and start value
@@ -271,7 +271,7 @@ def _gene(
 
 
 def _frozen(gene: Gene) -> Gene:
-    """Return a copy of the gene that is frozen by default."""
+    """Return a copy of the gene that the search does not vary, unless the settings of a run open the gene."""
     return replace(gene, default=replace(gene.default, open=False))
 
 
@@ -281,13 +281,16 @@ ALL_GENES: Mapping[str, Gene] = _all_genes(int(RELIEF_POINTS.high))  # genes of 
 
 @lru_cache(maxsize=1024)
 def group_members(name: str) -> tuple[str, ...]:
-    """Return the names of the genes in a cluster or family; (name,) for the name of a gene, () for an unknown name."""
+    """Return the names of the genes in a group: a cluster, such as "optical", or a family, "doe" or "lambda_max".
+
+    The result is (name,) for the name of a single gene, and () for an unknown name.
+    """
     return tuple(gene for gene in ALL_GENES if name in (gene, *groups_of(gene)))
 
 
 @lru_cache(maxsize=1024)
 def groups_of(name: str) -> tuple[str, ...]:
-    """Return the family and the cluster of a gene, the smaller group first; () for an unknown name."""
+    """Return a gene's family ("doe" or "lambda_max"), if any, and cluster, such as "optical"; () if it is unknown."""
     if name not in ALL_GENES:
         return ()
     families = tuple(family for family in FAMILIES if name.startswith(f"{family}_"))

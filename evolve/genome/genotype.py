@@ -1,4 +1,4 @@
-"""Encoding of the genes that the search varies (open genes) in a genome: a vector with a number in [0, 1] per gene."""
+"""Genomes: vectors with one number in [0, 1] for the value of each gene that the search varies (open gene)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ __all__ = ["CLUSTERS", "GENES", "Gene", "GeneConfig", "Genotype", "group_members
 
 @dataclass(frozen=True)
 class Genotype:
-    """Encoding of gene values in one run: the open genes, their order in the genome, and their ranges.
+    """Encoding of gene values in one run: the genes that the search varies (open genes), their order and ranges.
 
-    A gene that opens in a later generation has a place in the genome from the first generation, with its start value.
+    The search may vary an open gene only from a later generation on (`opens_at`). A genome of an earlier generation
+    also has a number for this gene, which encodes its start value.
 
     uses: settings of each gene of the animals, by name: open or frozen, search range, start value
     """
@@ -28,23 +29,23 @@ class Genotype:
 
     @cached_property
     def open_genes(self) -> tuple[Gene, ...]:
-        """Open genes, in the order of the genome."""
+        """Genes that the search varies in this run (open genes), in the order of their coordinates in a genome."""
         return tuple(gene for name, gene in ALL_GENES.items() if name in self.uses and self.uses[name].open)
 
     @property
     def dimension(self) -> int:
-        """Number of open genes, which is the length of a genome."""
+        """Length of a genome: the number of genes that the search varies in this run (open genes)."""
         return len(self.open_genes)
 
     @property
     def start(self) -> NDArray[np.float64]:
-        """Genome with the start values of the open genes, (dimension,)."""
+        """Genome in which each gene that the search varies has its start value, (gene,)."""
         uses = self.uses
         return np.array([gene.encode(uses[gene.name].start, uses[gene.name]) for gene in self.open_genes])
 
     @cached_property
     def phases(self) -> tuple[int, ...]:
-        """Generations in which at least one gene opens, in ascending order."""
+        """Generations in which the search begins to vary at least one gene, in ascending order."""
         return tuple(sorted({self.uses[gene.name].opens_at for gene in self.open_genes}))
 
     def varied(self, generation: int) -> NDArray[np.intp]:
@@ -69,7 +70,11 @@ class Genotype:
         return values
 
     def count(self, steps: int) -> float:
-        """Return the number of genotypes if each open real gene has `steps` distinct values."""
+        """Return the number of genotypes if each real gene that the search varies has `steps` distinct values.
+
+        For an integer gene that the search varies, all whole numbers in its search range count. All other genes are
+        fixed.
+        """
         sizes = [
             self.uses[g.name].high - self.uses[g.name].low + 1 if g.kind == "integer" else steps
             for g in self.open_genes

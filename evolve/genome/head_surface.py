@@ -29,12 +29,13 @@ SLACK = 1 + 1e-9  # tolerance for rounding errors
 
 
 def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
-    """Return the gene values after the repair of eyes that are too high, or whose facets do not fit on the head.
+    """Return the gene values after a repair of eyes that are over 180° high, or whose facets do not fit on the head.
 
-    The repair reduces the numbers of eyes, rows and columns and the width of the facets. The distance of a combination
-    of these four quantities from the genes' values is the sum of the squared logarithms of the ratios of new to former
-    values. Among all combinations that fit and lie within the searched ranges, the repair chooses the nearest one. No
-    quantity is therefore reduced in preference to the others. Rhabdoms become at most as wide as a facet.
+    The repair reduces four quantities: the numbers of eyes, of rows and of columns, and the width of the facets. Among
+    all values of the four that fit and lie within the searched ranges, it chooses the nearest to the former values. The
+    distance is the sum of the squared logarithms of the four ratios of new to former value, so that no quantity is
+    reduced in preference to the others. Rhabdoms become at most as wide as a facet. The height of an eye is measured in
+    Mercator's projection.
 
     values: value of each gene, by name
     uses: searched range of each gene, by name
@@ -53,7 +54,10 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 
 
 def contradiction(uses: Uses, sizes: EyeConfig) -> tuple[str, tuple[str, ...]] | None:
-    """Return None if every genome can be repaired; else a message and the names of the contradicting settings."""
+    """Return None if `fitted` can repair every genome, so that eyes are not too high and facets fit on the head.
+
+    Otherwise return an error message and the names of the settings that contradict each other.
+    """
     eyes, rows, columns = (lowest(name, uses) for name in COUNTS)
     width, area = lowest(DIAMETER, uses), sizes.facet_area
     keys = tuple(f"genome.{name}.low" for name in COUNTS)

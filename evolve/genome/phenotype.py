@@ -52,8 +52,8 @@ class Phenotype:
     resolution: numbers of receptors or ommatidia along the height and along the width of an eye
     relative_aperture: pupil diameter / retina width
     relief: N x N heights as fractions of `eye.relief_height`, in [0, 1], row-major (y, x). For N = 4 they are control
-        points of a bicubic B-spline patch; for larger N they are heights at cell centres that a cubic spline
-        interpolates
+        points of a bicubic B-spline patch; for larger N the relief is divided into N x N cells, and a cubic spline
+        interpolates the heights at their centres
     refractive_index: index of the relief's material at 588 nm
     memory_frames: number of frames that the brain sees
     neurons: number of neurons in each hidden layer of actor and critic
@@ -68,11 +68,11 @@ class Phenotype:
     vertical_fov_deg: an eye's vertical field of view [deg]; None: receptors are square, or the eyes are compound eyes
     time_constant_ms: time constant of the receptors [ms]; None: they have no memory
     facet_diameter_um, rhabdom_length_um: width of the facets and length of the rhabdoms of compound eyes [µm]
-    f_number: focal length of a facet in air / its width
+    f_number: focal length that a facet has in air, divided by the facet's width
     acute_zone: density of ommatidia in the middle of a compound eye / mean density
 
-    If eyes have a perfect lens or are compound eyes, `relative_aperture`, `relief` and `refractive_index` are None. The
-    last four fields are None for camera eyes.
+    If eyes have a perfect lens or are compound eyes, `relative_aperture`, `relief` and `refractive_index` are None. For
+    camera eyes, `facet_diameter_um`, `f_number`, `rhabdom_length_um` and `acute_zone` are None.
 
     Methods raise a ValueError if a field is outside the range that `optics` or `sim` allows.
     """
@@ -101,7 +101,7 @@ class Phenotype:
     acute_zone: float | None = None
 
     def ommatidium(self, eye: EyeConfig) -> optics.Ommatidium | None:
-        """Return the ommatidium of compound eyes, whose facet is a lens with a curved front; None for camera eyes.
+        """Return an ommatidium of compound eyes: a facet lens with a curved front, and a rhabdom; None for camera eyes.
 
         eye: settings of the eyes of a run; the other methods have the same argument
         """
@@ -146,9 +146,10 @@ class Phenotype:
         )
 
     def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
-        """Return the waveguide that each receptor of a camera eye forms, at most as wide as the receptor.
+        """Return the waveguide that the rhabdom of each receptor of a camera eye forms; None if there is none.
 
-        It is None for receptors without rhabdoms, which are rectangles, and for compound eyes.
+        The waveguide is at most as wide as the receptor. Receptors that have no rhabdoms form no waveguides: they are
+        rectangles that absorb all incident light. The result is also None for compound eyes; see `ommatidium`.
         """
         if self.rhabdom_diameter_um is None or self.facet_diameter_um is not None:
             return None
@@ -175,7 +176,7 @@ class Phenotype:
         """Return the eyes for the simulation.
 
         Raises:
-            ValueError: a field is outside the range that `sim.Eyes` allows.
+            ValueError: an attribute of this phenotype is outside the range that `sim.Eyes` allows.
         """
         import optics
         import sim
@@ -206,7 +207,7 @@ class Phenotype:
         medium: "air", "clear_ocean", "coastal_water" or "fog"; a camera eye is immersed in it; compound eyes ignore it
 
         Raises:
-            ValueError: the medium is unknown, or a field is outside the range that `sim.Eyes` allows.
+            ValueError: the medium is unknown, or an attribute is outside the range that `sim.Eyes` allows.
         """
         import optics
         import sim
@@ -235,15 +236,16 @@ class Phenotype:
 
 
 def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
-    """Return the phenotype of a genome with the settings of a run. Overlaps of eyes and receptors are repaired.
+    """Return the phenotype that develops from a genome in a run with these settings.
 
+    If eyes would overlap each other, or receptors each other, gene values are changed as little as possible (repaired).
     Every genome with the right number of finite coordinates has a phenotype.
 
-    genome: coordinates of the open genes in [0, 1], (gene,); coordinates outside are clipped
+    genome: coordinate of each gene that the search varies, (gene,); coordinates are clipped to [0, 1]
     config: settings of the run, such as a `RunConfig`
 
     Raises:
-        ValueError: the genome does not contain one finite number for each open gene, or is in half precision.
+        ValueError: the genome does not contain one finite number for each of these genes, or is in half precision.
     """
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics and not config.eye.compound
@@ -274,7 +276,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
 
 
 def repaired(genome: NDArray[np.float64], config: Settings) -> tuple[str, ...]:
-    """Return the names of the genes whose values the repair of overlaps changes; () for a genome without overlaps.
+    """Return the names of the genes that `develop` changes because eyes or receptors would overlap; () for none.
 
     Raises:
         ValueError: the genome is invalid; see `develop`.

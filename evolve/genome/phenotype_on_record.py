@@ -62,7 +62,12 @@ def _checked(name: str, value: Any) -> Any:
 
 
 def _of_gene(gene: str, key: str, value: Any) -> float | int:
-    """Return a value after a check against the range of its gene. A field without a gene must be a count.
+    """Return the value of a phenotype's field after a check against the valid range of a gene.
+
+    If `gene` is not the name of a gene, as for the field "encoder", the value must be a whole number from 1 to 4,096.
+
+    gene: name of the gene that determines the field, or of the field
+    key: name of the field in messages
 
     Raises:
         ValueError: the value has another type or lies outside the range.

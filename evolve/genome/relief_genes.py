@@ -1,4 +1,4 @@
-"""Genes of a pupil's relief, and conversion of its surface to a larger number of genes."""
+"""Names of the genes of a pupil's relief, and a conversion that describes the same relief with more genes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PATCH = 4
 
 
 def doe_names(points: int) -> list[str]:
-    """Return the names of the points x points genes of a relief, row-major (y, x)."""
+    """Return the names of a relief's genes, row-major (y, x); there are `points` genes along each side."""
     return [f"doe_{i}{j}" for i in range(points) for j in range(points)]
 
 
@@ -35,15 +35,17 @@ def representatives(points: int, symmetric: bool) -> list[str]:
 
 
 def refined(relief: Floats, points: int) -> Floats:
-    """Return the surface of a 4 x 4 patch as points x points heights at cell centres, (points²,).
+    """Return a relief as heights at the centres of equal cells, in row-major order (y, x).
 
-    The conversion is exact: the patch is a single bicubic polynomial, which the cubic spline through its heights
-    reproduces. A relief that already has points x points heights is returned unchanged.
+    The given relief may be a B-spline patch of 4 x 4 control points. Its conversion is exact: the patch is a single
+    bicubic polynomial, which the cubic spline through the heights reproduces. A relief that already has one height
+    for each cell is returned unchanged. The result is flat, (points²,).
 
     relief: control points of a 4 x 4 patch, or heights, in row-major order (y, x); the array may be flat
+    points: number of cells along each side of the relief
 
     Raises:
-        ValueError: the relief has neither 4 x 4 nor points x points heights.
+        ValueError: the relief has neither 4 x 4 control points nor one height for each cell.
     """
     side = isqrt(relief.size)
     if side == points:

@@ -28,7 +28,8 @@ def eye_picture(phenotype: Phenotype, config: EyeConfig, medium: str = "air") ->
     The PSF is drawn on a logarithmic scale, with the outline of a receptor. For a perfect lens, only the fields of view
     are drawn. For compound eyes, the acceptance function is drawn instead of relief and PSF.
 
-    phenotype, config: the animal, and the settings of its run's eyes
+    phenotype: animal whose eyes are drawn
+    config: settings of the eyes in the animal's run
     medium: medium of the run's worlds: "air", "clear_ocean", "coastal_water" or "fog"
 
     Raises:

@@ -55,7 +55,7 @@ class OpenedCandidate(Candidate):
         )
 
     def to_line(self) -> str:
-        """Return the line of the record that describes the candidate."""
+        """Return the candidate's line in the record of its run."""
         return Candidate(**{f.name: getattr(self, f.name) for f in fields(Candidate)}).to_line()
 
     def show_eye(self) -> Figure:
@@ -94,15 +94,15 @@ class OpenedRun(Run):
         return OpenedCandidate.of_run(super().candidate(candidate_id), self)
 
     def frozen(self, task: Task, candidate_id: int | None = None) -> Frozen:
-        """Return a candidate as an animal with a fixed policy, which can be listed in the `others` of another task.
+        """Return a candidate as an animal with a fixed policy. The `others` of another task can contain this animal.
 
         task: task of the animal, with the same body as the run's task; a copy of `task` receives the animal's eyes
         candidate_id: id of the candidate; None: the best candidate
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ValueError: `task` is not a `sim.Task`, has no mounts or several kinds of eyes, or its `place` fails or does
-                not return one mount for each eye.
+            ValueError: `task` is not a `sim.Task`, or it defines no mounts, or it defines several kinds of eyes, or its
+                method `place` fails or does not return one mount for each eye.
             OSError: the policy's file cannot be read.
         """
         from evolve.episodes.recorder import trained_policy
@@ -124,8 +124,8 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: the run has no test set, or the user task was not named when the run was opened, or its module
-                cannot be executed.
+            ConfigError: the run has no test set, or was opened without the "FILE.py:CLASS" of its user task, or the
+                task's code cannot be executed.
             ValueError: `episodes` is below 1, or `seed` is negative.
             RuntimeError: a method of the user task fails at the start of an episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -144,8 +144,8 @@ class OpenedRun(Run):
             LockedError: another process is working on the run.
             RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, its
                 format is too old, or the search proposes candidates that differ from those on record.
-            ConfigError: config.toml is invalid, the optimizer is unknown or rejects the settings, the user task was not
-                named when the run was opened or fails in a short trial, or `callbacks` is not a list of functions.
+            ConfigError: config.toml is invalid, the optimizer is unknown or rejects the settings, `callbacks` is not a
+                list of functions, the run was opened without the name of its user task, or a trial of the task fails.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             ExecutorError: no worker can evaluate candidates.
             OSError: a file of the run cannot be read or written.
@@ -166,8 +166,9 @@ class OpenedRun(Run):
     def drift(self, searches: int = 200) -> pd.DataFrame:
         """Return a table that compares the last generations of the run with simulated searches with random fitness.
 
-        Each row is an open gene, an acuity or the number of receptors. It contains the mean of the run, the median and
-        the 95 % range of the searches, and the p-value of the run's mean. Quantities that do not vary are omitted.
+        Each row is a quantity: a gene that the search varies, an acuity or the number of receptors. `run` is its mean
+        in the run. `median` is the median of its means in the searches, and 95 % of these means lie between `low` and
+        `high`. `p` is the p-value of `run`. Quantities that do not vary are omitted.
 
         searches: number of searches with random fitness
 
@@ -208,7 +209,7 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the best candidate's policy is missing or damaged.
-            ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+            ConfigError: the run was opened without the "FILE.py:CLASS" of its user task, or this code cannot be run.
             RuntimeError: a method of the user task fails at the start of an episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
             OSError: a file cannot be read or written.
@@ -231,16 +232,15 @@ class OpenedRun(Run):
 
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
-        every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8. A number
-            requires "rrd" in `also`
+        every: actions from one image of the scene to the next in a Rerun recording; requires "rrd" in `also`; None: 8
         also: formats of additional files next to the page: "rrd" (a recording for Rerun), "gif" and "mp4"
         out: path of the page; None: a name in the run directory
         mode: "evaluation", or "test" for the layouts of the test set
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set,
-                the user task was not named when the run was opened, or its module cannot be executed.
+            ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set
+                or was opened without the "FILE.py:CLASS" of its user task, or the task's code cannot be executed.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
             RuntimeError: a method of the user task fails at the start of the episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -255,16 +255,16 @@ class OpenedRun(Run):
     ) -> list[Path]:
         """Play an episode of a candidate, write the views of its eyes as spectral EXR files, and return their paths.
 
-        The files are those of the command `evolve export`; `sim.read_exr` reads them.
-
         candidate_id: id of the candidate; None: the best candidate
         seed: seed of the episode
         every: number of actions from one file to the next, 1 to 1,000,000
-        out: folder of the files; None: `exr` in the run directory
+        out: folder of the files; None: `exr` in the run directory. The command `evolve export` writes the same files.
+            `sim.read_exr` reads them
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, or the user task was not named on opening the run or fails.
+            ConfigError: an argument is invalid, or the run was opened without the "FILE.py:CLASS" of its user task, or
+                the task's code cannot be executed.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
             RuntimeError: a method of the user task fails at the start of the episode.
             optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.

@@ -38,7 +38,7 @@ def run(
 
     task: task for which eyes evolve: a name, or "FILE.py:CLASS" of a user task; None: the task that the preset or the
         settings name
-    preset: settings to start from: "quick" (minutes), "paper" (a day), or an experiment
+    preset: settings to start from: "quick" (minutes), "paper" (a day), or the name of an experiment (`evolve presets`)
     settings: settings by dotted name, such as {"search.generations": 2, "seed": 1}; they override all other settings.
         Values are numbers, texts, True or False. None: no such settings
     config: path of a TOML file with settings, which override those of the preset; None: no file
@@ -81,7 +81,7 @@ def resume(
     A finished run stays unchanged.
 
     directory: directory of a run that was started with the command or from Python
-    task: "FILE.py:CLASS" if the run has a user task, whose code runs only if you name it here; else None
+    task: "FILE.py:CLASS" if the run has a user task, else None; a user task's code runs only if it is named here
     before_damage: True to continue from the lines of the record before the first damaged line, and to keep a copy of
         the damaged record
     callbacks: functions that are called as callback(run, candidate) after every evaluation of a candidate; an exception
@@ -89,8 +89,8 @@ def resume(
     progress: True to print the progress to stderr
 
     Raises:
-        ConfigError: an argument or the configuration is invalid, or the user task has not been named, has changed or
-            fails; the message is one line.
+        ConfigError: an argument or the configuration is invalid, or `task` does not name the run's user task, or the
+            task has changed or fails; the message is one line.
         RunError: the run does not exist, its format is too old, its record is damaged or cannot be written, or the
             search proposes candidates that differ from those on record.
         LockedError: another process is working on the run; see `evolve.store.lock`.

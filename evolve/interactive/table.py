@@ -1,4 +1,4 @@
-"""Tables of a run's candidates, and of the comparison with searches with random fitness."""
+"""Tables of the candidates of a run, and of a run's comparison with simulated searches whose fitness is random."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
 
 
 def drift_table(drift: Drift) -> pd.DataFrame:
-    """Return a table with one row per quantity, which compares a run with searches with random fitness.
+    """Return a table that compares a run with searches whose fitness is random. Each row is a quantity, such as a gene.
 
-    The columns are the mean in the run's last generations, the median and the 95 % range of the mean in the searches,
-    and the p-value of the run's mean.
+    Column `run` is the quantity's mean in the run's last generations. `median` is the median of its means in the
+    searches, and 95 % of these means lie between `low` and `high`. `p` is the p-value of `run`.
     """
     import pandas as pd
 

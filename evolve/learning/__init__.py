@@ -1,7 +1,7 @@
 """Training run and evaluation of one animal.
 
 fitness           evaluate: training run and fitness of a candidate
-final_figures     returns in episodes that neither training nor selection has used
+final_figures     results of a trained policy in episodes that neither training nor selection has used
 animal_task       a run's task with one animal in it
 training_envs     environments for training, selection and fitness
 task_module       execution of the code of a user task

@@ -30,7 +30,7 @@ def animal_task(
     eyes: eyes that replace the animal's own; None: the animal's own eyes
 
     Raises:
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without the "FILE.py:CLASS" of its user task, or its code cannot be executed.
         ValueError: the eyes cannot be placed in the user task; see `with_phenotype`.
     """
     if (code := config.choice.named_code) is not None:
@@ -59,17 +59,17 @@ def azimuths(phenotype: Phenotype, config: RunConfig) -> np.ndarray:
 
 
 def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes: Eyes | None = None) -> UserTask:
-    """Return a user task with this animal in it.
+    """Return a copy of a user task in which the animal has the eyes of this phenotype.
 
     The eyes are rendered with the run's setting `eye.rays_per_receptor`. If this setting is "auto", the task's own
-    fidelity is used. If this fidelity is a `Fidelity`, its number of bands becomes that of the run. The run's medium
-    replaces the task's own, unless the run's medium is air.
+    attribute `fidelity` is used. If this attribute is a `Fidelity` object, its number of spectral bands is replaced by
+    the run's `eye.bands`. The run's medium replaces the task's own, unless the run's medium is air.
 
     eyes: eyes that replace the animal's own; None: the animal's own eyes
 
     Raises:
-        ValueError: the task's `place` fails or does not return one mount for each eye, or the task has no mounts or
-            several kinds of eyes.
+        ValueError: the task's method `place`, which places the eyes on the body, fails or does not return one place
+            (mount) for each eye, or the task defines no mounts, or it defines several kinds of eyes.
     """
     animal = with_evolved_eyes(task, eyes or phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
     rays, bands = config.eye.rays_per_receptor, config.eye.bands

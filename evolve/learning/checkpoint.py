@@ -39,7 +39,9 @@ class Checkpoint:
 
 
 def save_checkpoint(checkpoint: Checkpoint, path: Path, owner: Mapping[str, Any]) -> None:
-    """Write a checkpoint as safetensors, completely or not at all. Numbers are stored in the file's metadata.
+    """Write a checkpoint as a safetensors file, completely or not at all.
+
+    The file's metadata contain `steps`, `curve`, `unit` and the number of steps of the optimizer.
 
     owner: the training run from which the checkpoint comes, see `TrainingRung.owners`
 
@@ -88,7 +90,7 @@ def load_checkpoint(path: Path, owner: Mapping[str, Any]) -> Checkpoint | None:
 
 
 def _require_possible(checkpoint: Checkpoint) -> None:
-    """Check that training can have ended in this state.
+    """Check that a training run could have produced this checkpoint.
 
     Raises:
         CheckpointError: the steps, the learning curve or the unit of rewards are impossible.

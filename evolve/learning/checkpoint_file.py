@@ -46,14 +46,19 @@ def metadata_of(content: bytes) -> dict[str, str]:
 
 
 def owned(owner: Mapping[str, Any], numbers: Mapping[str, Any]) -> dict[str, str]:
-    """Return a checkpoint's metadata: its owner, `numbers`, and a placeholder for the checksum that `sealed` adds."""
+    """Return a checkpoint's metadata: its owner, its numbers, and a placeholder, which `sealed` replaces by a checksum.
+
+    owner: training run from which the checkpoint comes, see `TrainingRung.owners`
+    numbers: contents of the checkpoint that are not tensors, by name
+    """
     return {ENTRY: json.dumps({**numbers, "owner": owner, "sha256": BLANK})}
 
 
 def sealed(content: bytes) -> bytes:
-    """Return the content of a safetensors file with its checksum in place of the placeholder of `owned`.
+    """Return the content of a checkpoint file, in which a SHA-256 checksum replaces a placeholder.
 
-    content: content with the placeholder, from which the checksum is computed
+    content: content of a safetensors file with the metadata that `owned` returns; they contain the placeholder, 64
+        zeros. The checksum is computed from this content
     """
     return _with_checksum(content, BLANK, hashlib.sha256(content).hexdigest())
 

@@ -30,10 +30,10 @@ class Within(torch.autograd.Function):
 
 
 class Gaussian(DiagGaussianDistribution):
-    """SB3's normal distribution of actions, whose logarithmic standard deviation is created without arithmetic.
+    """SB3's normal distribution of actions. Its tensor of log standard deviations is filled with the initial value.
 
-    SB3 multiplies a tensor of ones by the initial value. On the "meta" device of `load_policy`, arithmetic would import
-    torch's compiler, which takes a second.
+    SB3 instead multiplies a tensor of ones by the initial value. In `load_policy`, on torch's "meta" device, this
+    multiplication would import torch's compiler, which takes a second.
     """
 
     def proba_distribution_net(self, latent_dim: int, log_std_init: float = 0.0) -> tuple[nn.Module, nn.Parameter]:

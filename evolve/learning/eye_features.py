@@ -1,10 +1,10 @@
 """Encoder of the eyes' signals for actor and critic: for each eye, a multilayer perceptron on its last frames.
 
-Each eye has its own weights, unless `wiring.shared_encoder` is set. The same encoder is applied to each frame in
-memory: three layers of width w map the signals of a frame to a code of w numbers. (For a compound eye, the outputs of
-two hexagonal layers take the place of the signals, and all ommatidia count as one eye.) One further layer then maps the
-codes of all frames, `memory` x w numbers, to the w features of the eye. The features of all eyes are joined with the
-other entries of the observation, such as proprioception and the previous action.
+Each eye has its own weights, unless `wiring.shared_encoder` is set. The same encoder is applied to each of the last
+`memory` frames: three layers of width w map the signals of a frame to a code of w numbers. (For a compound eye, the
+outputs of two hexagonal layers take the place of the signals, and all ommatidia count as one eye.) One further layer
+then maps the codes of these frames, `memory` x w numbers, to the w features of the eye. The features of all eyes are
+joined with the other entries of the observation, such as proprioception and the previous action.
 
 Units are leaky rectifiers. With tanh, the agent needed a third more samples to learn the task `detection`, and each
 unit took ten times as long to compute. Receptors adapt: the first layer subtracts the running mean of the signals, and
@@ -63,7 +63,7 @@ class Felt(nn.Module):
 
 
 class EyeFeatures(BaseFeaturesExtractor):
-    """Module that returns the features of observations: `width` numbers for each eye, then the other entries.
+    """Module that returns the features of observations: `width` numbers for each eye, then all other observations.
 
     All layers of the encoders have the same width. An observation may have one of two forms, which give the same
     features. Environments return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers
@@ -159,8 +159,13 @@ class EyeFeatures(BaseFeaturesExtractor):
             self.felt.adapt(felt.reshape(-1, felt.shape[-1]))
 
     def _at_each_step(self, codes: Tensor, age: Tensor) -> Tensor:
-        """Return the features at each step, (eye, feature, sample), from codes (eye, code, memory - 1 + step, segment).
+        """Return the features of each eye at each step, which depend on the codes of the last `memory` frames.
 
+        A code is the encoder's output for a frame of one eye. A segment is a sequence of steps of one world. Its frames
+        are those of its steps, preceded by memory - 1 earlier ones. The result has the axes (eye, feature, sample),
+        where samples are the pairs (step, segment) in row-major order.
+
+        codes: codes of all frames of all segments, (eye, element of the code, frame, segment)
         age: steps since the first frame of the episode, (step, segment)
         """
         layer, unit = self.temporal

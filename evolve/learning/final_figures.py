@@ -19,7 +19,7 @@ __all__ = ["UnfitPolicy", "final_episodes", "require_fit", "require_test_set"]
 
 
 class UnfitPolicy(ValueError):
-    """A policy was trained for an animal whose eyes have signals of another shape."""
+    """The signals of an animal's eyes do not have the shape for which the policy that should control it was trained."""
 
 
 def final_episodes(
@@ -36,12 +36,12 @@ def final_episodes(
     episodes: number of episodes; None: `evaluation.episodes`
 
     Raises:
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without the "FILE.py:CLASS" of its user task, or its code cannot be executed.
         ValueError: `episodes` is below 1, `seed` is negative, or the eyes cannot be placed in the user task.
         RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         TrainingDiverged: the policy's actions, or the returns, are not finite.
-        UnfitPolicy: the policy was trained with eyes whose signals have another shape.
+        UnfitPolicy: the policy was trained with eyes whose signals have another shape than this animal's.
     """
     count = config.evaluation.episodes if episodes is None else episodes
     prepared = PreparedTask(animal_task(phenotype, config, "test"))

@@ -43,14 +43,14 @@ def evaluate(
     seed: seed of the policy's initial weights, of all worlds and of all random numbers in learning
     policy_path: path of the trained policy (safetensors), which is not written if learning diverged
     progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
-    rung: rung at whose end training stops, with the checkpoints of earlier rungs (`evolve.search.successive_halving`);
-        None: train to the end
+    rung: part of the training run at whose end training stops (`evolve.search.successive_halving`); training continues
+        from the latest usable checkpoint that an earlier rung has written; None: train to the end
 
     Warns:
         CheckpointWarning: a checkpoint cannot be used.
 
     Raises:
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without the "FILE.py:CLASS" of its user task, or its code cannot be executed.
         ValueError: the eyes cannot be placed in the user task.
         RuntimeError: a method of the user task fails at the start of an episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
@@ -87,7 +87,7 @@ def _train_to_rung(
 ) -> tuple[Training, Episodes]:
     """Train to the end of this rung, starting from the latest usable checkpoint, and play the evaluation episodes.
 
-    Failures of episodes after this checkpoint are counted in `failures`.
+    `failures` counts the episodes that fail during this call, by reason.
     """
     owners = rung.owners(phenotype, config, seed)
     begun, first = None, 0

@@ -2,9 +2,9 @@
 
 A unit of the first layer receives the signals of seven ommatidia: a central one and its six neighbours. A unit of the
 second layer receives the outputs of seven units of the first layer in the same way. The centres are chosen so that
-every ommatidium is in at least one neighbourhood. On a hexagonal lattice, neighbourhoods are hexagons. Each layer has
-about a quarter as many of them as the previous layer or, for the first layer, as there are ommatidia. Other sets of
-directions are also possible.
+every ommatidium is in at least one neighbourhood. On a hexagonal lattice, neighbourhoods are hexagons. The first layer
+then has about a quarter as many neighbourhoods as there are ommatidia, and the second layer has about a quarter as many
+as the first. The viewing directions of the ommatidia may also form other patterns.
 """
 
 from __future__ import annotations
@@ -27,11 +27,20 @@ WIDTHS = 8, 16  # choice: number of units at each place, in the first and the se
 
 
 class SharedAdaptation(AdaptedLinear):
-    """AdaptedLinear with the same variance at all places, so that noise at dark places is not amplified."""
+    """AdaptedLinear whose normalisation uses the same variance of signals for all neighbourhoods of ommatidia.
+
+    Noise in dark parts of the view is therefore not amplified.
+    """
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
-        """Update the means and the variance with further signals, (place, inputs, sample)."""
+        """Update the running means and the running variance with further signals.
+
+        Each input of each neighbourhood has its own mean. All inputs have the same variance.
+
+        x: signals (neighbourhood, input, sample); a neighbourhood is an ommatidium and its six neighbours, and its
+            inputs are the signals of all their channels
+        """
         super().adapt(x)
         self.variance.copy_(self.variance.mean(dim=0, keepdim=True).expand_as(self.variance))
 
@@ -67,13 +76,19 @@ class HexagonalLayers(nn.Module):
         self.convolution.adapt(self._gathered(frames))
 
     def _gathered(self, frames: Tensor) -> Tensor:
-        """Return the signals of each neighbourhood, (place, neighbour * channel, sample)."""
+        """Return the signals of each neighbourhood of the first layer: an ommatidium and its six neighbours.
+
+        The result has the axes (neighbourhood, input, sample). The inputs are the pairs (ommatidium of the
+        neighbourhood, channel) in row-major order.
+
+        frames: signals of all ommatidia, (..., ommatidium, channel); the leading axes become samples
+        """
         samples = frames.flatten(0, -3).permute(1, 2, 0)
         return samples[self.first].flatten(1, 2)
 
 
 def neighbourhoods(directions: np.ndarray) -> np.ndarray:
-    """Return the indices of the directions in each neighbourhood, (place, 7), with the centre first.
+    """Return the indices of the directions in each neighbourhood, the centre first, (neighbourhood, 7).
 
     The six neighbours are in counter-clockwise order, as the animal sees them, beginning on the right. Every direction
     is in at least one neighbourhood. If there are fewer than seven directions, all belong to a single neighbourhood,

@@ -83,10 +83,12 @@ class AdaptedLinear(PerEyeLinear):
 
 
 class MemoryLinear(PerEyeLinear):
-    """Linear layer on the codes of `memory` frames: (eye, code, memory, sample) -> (eye, outputs, sample).
+    """Linear layer on the codes of the last frames: (eye, code, memory, sample) -> (eye, outputs, sample).
+
+    A frame's code is the encoder's output for the signals of one eye in this frame.
 
     memory: number of frames
-    code: number of elements of a frame's code
+    code: number of elements of a code
     """
 
     def __init__(self, n_eyes: int, memory: int, code: int, outputs: int, shared: bool = False) -> None:
@@ -99,9 +101,10 @@ class MemoryLinear(PerEyeLinear):
     def slide(self, codes: Tensor) -> Tensor:
         """Return the outputs at each step, which depend on the codes of the last `memory` frames.
 
-        The outputs are (eye, outputs, sample), with samples (step, segment) flattened.
+        A segment is a sequence of steps of one world. The result has the axes (eye, output, sample), where samples are
+        the pairs (step, segment) in row-major order.
 
-        codes: codes of the frames, (eye, code, memory - 1 + step, segment)
+        codes: codes of the frames of all segments, (eye, element of the code, memory - 1 + step, segment)
         """
         weight, bias = self.weights
         return _Slide.apply(codes, weight.unflatten(2, (-1, self.memory)), bias)
@@ -118,8 +121,9 @@ class _Slide(torch.autograd.Function):
     def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
         """Return the sum of the weighted codes plus `bias`, (eye, output, sample).
 
-        codes: codes of the frames, (eye, code, frame, segment)
-        weight: weights, (eye, output, code, lag)
+        codes: outputs of the encoder (codes) for the frames of each segment, a sequence of steps of one world, (eye,
+            element of the code, frame, segment)
+        weight: weights, (eye, output, element of the code, lag)
         bias: biases, (eye, output, 1)
         """
         weights = weight.permute(3, 0, 1, 2).contiguous()
@@ -142,7 +146,14 @@ class _Slide(torch.autograd.Function):
 
 
 def _slices(codes: Tensor, memory: int) -> list[Tensor]:
-    """Return, for each lag, a view (eye, code, sample) of codes (eye, code, frame, segment)."""
+    """Return, for each place in memory from the oldest frame to the newest, the codes of the frames at this place.
+
+    Each element of the list is a view without a copy, (eye, element of the code, sample). The samples are the pairs
+    (step, segment) in row-major order, where a segment is a sequence of steps of one world.
+
+    codes: codes of the frames of all segments, (eye, element of the code, frame, segment)
+    memory: number of frames in memory
+    """
     segments, frames = codes.shape[3], codes.flatten(2)
     samples = frames.shape[2] - (memory - 1) * segments
     return [frames[:, :, lag * segments :][:, :, :samples] for lag in range(memory)]

@@ -1,4 +1,4 @@
-"""Policy of an animal: an actor and a critic, whose inputs are features of its eyes and other observations.
+"""Policy of an animal: an actor and a critic. Their inputs are features of the animal's eyes and other observations.
 
 A policy is stored in a safetensors file, with its `PolicyConfig` in the metadata. The file contains no code.
 """
@@ -48,7 +48,7 @@ class Brain:
     """Size and wiring of a brain.
 
     neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each
-    encoder: width of all layers of the eyes' encoders
+    encoder: number of units in each layer of the encoders, the networks that process the signals of each eye first
     wiring: connections between receptors and encoders
     """
 
@@ -80,7 +80,7 @@ class PolicyConfig:
 
     @classmethod
     def from_space(cls, space: spaces.Dict, brain: Brain) -> PolicyConfig:
-        """Return the shape of a policy for an observation space of sim's environments."""
+        """Return the sizes and wiring of a policy for the observations of an environment of `sim`."""
         actions = known_beside_eyes(space)["previous_action"]
         sizes = (brain.neurons, brain.layers, brain.encoder)
         eyes = space["eyes"]
@@ -95,7 +95,7 @@ class PolicyConfig:
         return Brain(self.neurons, self.layers, self.encoder, self.wiring)
 
     def observation_space(self) -> spaces.Dict:
-        """Return the observation space of sim's environments with these eyes."""
+        """Return the space of the observations that an environment of `sim` passes to this policy."""
         eyes = spaces.Box(-np.inf, np.inf, self.eyes, np.float32)
         if self.directions:
             eyes = OmmatidiaBox(-np.inf, np.inf, self.eyes, np.array(self.directions))
@@ -106,11 +106,11 @@ class PolicyConfig:
         return spaces.Dict(known | {entry.name: entry.space for entry in self.beside})
 
     def record(self) -> dict[str, Any]:
-        """Return the shape as JSON values.
+        """Return the fields by name as JSON values.
 
-        The record of a run contains a hash of each policy file. All versions must therefore write a policy as the same
-        bytes. Older versions had neither a list of other entries nor a choice of wiring, so shapes that those versions
-        could describe are still written in their form.
+        The record of a run contains a hash of each policy file. All versions of rhabdom must therefore write the same
+        bytes for a policy. Older versions lacked `wiring` and `beside` (observations other than the eyes' signals and
+        the previous action). Policies that these versions could describe are still written without these fields.
         """
         left_out = {"beside"} | ({"wiring"} if self.wiring == DIRECT else set())
         left_out |= set() if self.directions else {"directions"}
@@ -125,11 +125,11 @@ class PolicyConfig:
 
     @classmethod
     def from_record(cls, stored: Mapping[str, Any]) -> PolicyConfig:
-        """Return the shape from the values that `record` returned.
+        """Return the configuration of a policy from the return value of `record`.
 
         Raises:
             KeyError: an entry is missing.
-            TypeError: an entry has the wrong type, or the wiring has an unknown entry.
+            TypeError: an entry has the wrong type, or an entry of `wiring` is unknown.
             ValueError: an entry has an impossible value.
         """
         return cls(
@@ -154,7 +154,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
     """Actor and critic of stable-baselines3 (SB3), whose inputs are the outputs of EyeFeatures.
 
     brain: size and wiring of the brain
-    first_actions: mean and standard deviation of each element of untrained actions; None: 0 and 0.5
+    first_actions: mean and standard deviation of each element of an action before training; None: 0 and 0.5
     """
 
     def __init__(
@@ -269,7 +269,7 @@ def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
 
 
 def _require_shape(config: PolicyConfig, tensors: Mapping[str, Tensor]) -> None:
-    """Check that a policy of this shape has these tensors, before memory for it is allocated."""
+    """Check that a policy with this `config` has these `tensors`, before memory for the policy is allocated."""
     known = sum(entry.size for entry in config.beside)
     counts = [
         *(config.eyes[::2] if config.directions else config.eyes),

@@ -60,9 +60,11 @@ class Training:
 
 
 class AdaptingPPO(PPO):
-    """PPO with normalised signals and rewards. Training ends with an error if its numbers are not finite.
+    """PPO with normalised signals and rewards.
 
-    Rewards are divided by their unit, which follows the spread of the discounted returns. At the start of training,
+    Training ends with an error if rewards, the loss or weights are not finite.
+
+    Rewards are divided by a number that follows the spread of the discounted returns. At the start of training,
     agents often touch walls, and the costs of contact are about a hundred times larger than all later rewards. Without
     normalisation, these costs would dominate the critic.
     """
@@ -215,7 +217,8 @@ def train(
     it, at the earliest.
 
     seed: seed of initial weights, exploration and mini-batches, and of the evaluation worlds
-    progress: function that is called with (steps trained, steps planned) after every rollout; None: no function
+    progress: function that is called with (steps trained, steps planned) after every rollout; None: training is not
+        reported
     begun: checkpoint from which to continue; its steps count towards `total_steps`
 
     Raises:
@@ -242,15 +245,22 @@ def train(
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
-    """Return whether none of the last `patience` evaluations exceeds the best before them; False if none is before."""
+    """Return whether the mean return has not improved in the last `patience` evaluations.
+
+    It has not improved if none of these evaluations has a higher mean return than the best of the earlier evaluations.
+    Without earlier evaluations, the result is False.
+
+    curve: (training steps, mean return) of each evaluation so far
+    """
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
-    """Return (mean, standard deviation) of each element of untrained actions.
+    """Return (mean, standard deviation) of each element of the actions that an untrained policy draws.
 
-    `learning.first_speed` sets both for the element "speed".
+    For the element "speed", the setting `learning.first_speed` determines both numbers. For the others, they are 0 and
+    0.5.
     """
     speed = (2 * config.first_speed - 1, config.first_speed)
     return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

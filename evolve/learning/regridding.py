@@ -1,7 +1,8 @@
-"""Averaging of an eye's signals on a coarser grid, and repetition on a finer one, before they reach the encoder.
+"""Change of the grid of an eye's signals before they reach the encoder, the part of the brain that processes images.
 
-Both serve as controls in experiments on resolution. An eye of 15 x 15 receptors whose signals are averaged on 4 x 4
-cells and repeated on 15 x 15 has the acuity of 4 x 4 receptors, but still 15 x 15 inputs.
+Signals are averaged on a coarser grid, and the averages are repeated on a finer grid. Both serve as
+controls in experiments on resolution. An eye of 15 x 15 receptors whose signals are averaged on 4 x 4 cells and
+repeated on 15 x 15 has the acuity of 4 x 4 receptors, but still 15 x 15 inputs.
 """
 
 from __future__ import annotations
@@ -32,7 +33,10 @@ class Regridding:
         self._is_identity = all(np.array_equal(one, np.eye(n)) for one, n in zip(maps, retina, strict=True))
 
     def __call__(self, signals: Tensor) -> Tensor:
-        """Return inputs (..., rows, columns) from signals (..., height, width)."""
+        """Return the inputs of the encoder.
+
+        signals: signals of the receptors, (..., height, width); the result is (..., rows, columns)
+        """
         if self._is_identity:
             return signals
         rows, columns = self._rows.to(signals), self._columns.to(signals)
@@ -40,7 +44,10 @@ class Regridding:
 
 
 def _axis(n: int, pool_side: int, repeat_side: int) -> np.ndarray:
-    """Return the matrix (input, n) that maps the signals of `n` receptors to the inputs, both along one axis."""
+    """Return the matrix that maps a line of receptors to a line of inputs of the encoder, (input, receptor).
+
+    A line is a row or a column of the grid, and `n` is its number of receptors.
+    """
     pooled = _averages(n, min(pool_side or n, n))
     return _repeats(len(pooled), max(repeat_side, len(pooled))) @ pooled
 

@@ -1,4 +1,4 @@
-"""Rollout buffer for a learner with memory, which stores each frame once.
+"""Rollout buffer that stores each frame once, for a learner with memory.
 
 The observations of an agent with memory are stacks of the last frames. The buffer of stable-baselines3 (SB3) stores
 these stacks, and thus `memory` copies of each frame, and PPO encodes every copy. For 64 worlds x 64 steps of 2 x 15 x
@@ -27,10 +27,10 @@ SEGMENT_STEPS = 8
 
 
 class FrameRolloutBuffer(RolloutBuffer):
-    """Rollout buffer that yields observations without stacks, for `evolve.learning.eye_features`.
+    """Rollout buffer that yields each frame once instead of in several stacks, for `evolve.learning.eye_features`.
 
-    At the start of an episode, the memory is not yet full. As in the environments, `EyeFeatures` then fills it with
-    copies of the episode's first frame.
+    An agent with memory observes a stack of its last frames. At the start of an episode, there are too few frames for
+    a stack. `EyeFeatures` then adds copies of the episode's first frame, as the environments do.
     """
 
     observation_space: spaces.Dict
@@ -96,7 +96,9 @@ class FrameRolloutBuffer(RolloutBuffer):
         return self.frames[:, self.memory - 1 :]
 
     def get(self, batch_size: int | None = None) -> Iterator[DictRolloutBufferSamples]:
-        """Yield mini-batches of whole segments in random order; every sample of the rollout occurs once.
+        """Yield mini-batches in random order; every sample of the rollout occurs once.
+
+        A mini-batch consists of whole segments (sequences of consecutive steps of one world).
 
         batch_size: approximate number of samples in a mini-batch; None: all
         """

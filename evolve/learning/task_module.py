@@ -25,13 +25,15 @@ __all__ = ["executed_task"]
 def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | BatchTask:
     """Execute the code of a user task, and return the task. Later changes of the file have no effect.
 
-    encoded_textures: see `WorldConfig.encoded_textures`
+    encoded_textures: True to treat colour textures as display colours, except textures for which the model requests
+        linear light. False: MuJoCo's compiler decides which textures contain linear light
 
     Raises:
         ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
-            requires arguments, its model cannot be compiled (for some models only if `encoded_textures` is False), or
-            one of its settings is invalid. The message is one line; it names file and line of an error in the user's
-            code.
+            requires arguments, its model cannot be compiled, or one of its settings is invalid. With
+            `encoded_textures=False`, it is also an error if the task's model is already compiled and has textures that
+            the compiler decided to treat as linear. The message is one line; it names file and line of an error
+            in the user's code.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)
@@ -51,10 +53,13 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
 
 
 def _resolve_textures(task: Task | BatchTask) -> None:
-    """Request linear light explicitly for the colour textures that MuJoCo's compiler resolves to linear light.
+    """Set `colorspace="linear"` for those colour textures of a task's model that MuJoCo would treat as linear light.
+
+    MuJoCo's compiler decides this by itself only for textures whose colour space is "auto". All other textures are
+    unchanged.
 
     Raises:
-        ValueError: the model cannot be compiled with this request.
+        ValueError: the model has such textures but is already compiled, or it cannot be compiled.
     """
     try:
         task.model = with_compiled_color_spaces(task.model)

@@ -1,6 +1,7 @@
-"""Checks before a run starts: random layouts, settings of a user task that would have no effect, and a short trial.
+"""Checks before a run starts.
 
-A fault that these checks find would affect every animal of the run.
+The checks draw the random layouts, search a user task for settings that would have no effect, and try the task for a
+few steps. A fault that these checks find would affect every animal of the run.
 """
 
 from __future__ import annotations
@@ -35,18 +36,18 @@ class UnusedSettingWarning(UserWarning):
 
 
 def check_settings(config: RunConfig) -> None:
-    """Refuse a user task with mounts (places for eyes) that no animal would use; warn about other idle settings.
+    """Refuse a user task with mounts (places for eyes) that no animal would use. Warn about other unused settings.
 
-    The default method `place` of a task spreads an animal's eyes around a single mount. Existing runs are not checked,
-    so they can always be continued and replayed.
+    The default method `place` of a task spreads an animal's eyes around a single mount, so that other mounts would stay
+    empty. Existing runs are not checked, so they can always be continued and replayed.
 
     Warns:
-        UnusedSettingWarning: the task defines a value that the run's genome or settings determine, or auxiliary
-            entries, which evolving eyes lack.
+        UnusedSettingWarning: the task defines `eye` or `fidelity`, but the run's genome or settings determine them. Or
+            it defines `auxiliary` (additional signals of receptors, such as depth), which evolving eyes do not have.
 
     Raises:
-        ConfigError: the task has several mounts and does not define `place`, the user has not named its code, or its
-            module cannot be executed.
+        ConfigError: the task has several mounts and does not define `place`, its module cannot be executed, or the user
+            has not named its file. Code that the user has not named, for example by `--task`, is never executed.
     """
     if (code := config.choice.named_code) is None:
         return
@@ -84,10 +85,10 @@ def _unused(task: TaskSettings, config: RunConfig) -> Iterator[str]:
 
 
 def check_layouts(config: RunConfig) -> None:
-    """Check a run's random layouts by drawing all of them. Runs with fixed layouts pass.
+    """Check a run's random layouts by generating all of them. Runs with fixed layouts pass.
 
     Raises:
-        ConfigError: two layouts have the same walls, or no navigation course of the configured size can be drawn.
+        ConfigError: two layouts have the same walls, or no navigation course of the configured size can be generated.
     """
     if config.world.layouts != FAMILY:
         return
@@ -99,11 +100,13 @@ def check_layouts(config: RunConfig) -> None:
 
 
 def try_task(config: RunConfig) -> None:
-    """Build a user task with an animal of the genes' start values, and take a few random actions; skip built-in tasks.
+    """Build a user task with one animal, and take a few random actions in it. Built-in tasks are skipped.
+
+    Each gene of the animal has its start value.
 
     Raises:
-        ConfigError: the user has not named the task's code, or the task's module, model, eyes or methods fail; the
-            message is one line.
+        ConfigError: the task's module, model, eyes or methods fail, or the user has not named the task's file, for
+            example by `--task`, so that its code must not be executed. The message is one line.
     """
     if config.choice.named_code is None:
         return

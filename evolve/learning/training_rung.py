@@ -21,7 +21,7 @@ __all__ = ["TrainingRung"]
 class TrainingRung:
     """A training run from its start to the end of one of its rungs (the parts into which it is divided).
 
-    ends: number of training steps at the end of each rung up to this rung, in ascending order
+    ends: number of training steps at the end of each rung, from the first rung to this one
     checkpoints: path of the checkpoint at the end of each of these rungs; training continues from the latest usable
         checkpoint of an earlier rung
     candidate: id of the candidate; None if the training does not belong to a run
@@ -54,7 +54,9 @@ class TrainingRung:
         return tuple({**common, "rung": number, "ends": list(self.ends[: number + 1])} for number in numbers)
 
     def set_aside_unusable(self, phenotype: Phenotype, config: RunConfig, seed: int) -> None:
-        """Rename unusable checkpoints of earlier rungs, from the latest rung back to a usable one; see `set_aside`.
+        """Rename unusable checkpoints of earlier rungs; see `set_aside`.
+
+        Checkpoints are checked from the latest earlier rung backwards, until one is usable. It keeps its name.
 
         Raises:
             OSError: a checkpoint is not a regular file, or cannot be renamed.

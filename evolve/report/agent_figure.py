@@ -20,7 +20,9 @@ LARGEST_EYE = math.radians(24)  # maximum half angle of an eye's disk on the hea
 
 
 def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | np.ndarray) -> Html:
-    """Return a drawing of the head, seen from the front and above. Eyes are disks that overlap only at equal azimuths.
+    """Return a drawing of the head, seen from the front and above.
+
+    Eyes are disks on the head, so small that only eyes with the same azimuth overlap.
 
     eyes: design of the eyes
     name: prefix of the ids in the drawing, unique on the page

@@ -100,8 +100,8 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
 def _rows(runs: Sequence[Run]) -> dict[str, list[str]]:
     """Return the rows of the table by name: for each quantity, its value in each run as text.
 
-    Rows that would repeat a simpler row in all runs are omitted: the parts of fitness if no run has costs, and the
-    vertical acuity if it equals the horizontal one.
+    If no run has costs, the rows of task fitness and costs are omitted, because the fitness equals the task fitness. If
+    vertical and horizontal acuity are equal in all runs, the vertical one is omitted.
     """
     columns = [_column(run_summary(run)) for run in runs]
     rows = {name: [column[name] for column in columns] for name in columns[0]}
@@ -113,7 +113,10 @@ def _rows(runs: Sequence[Run]) -> dict[str, list[str]]:
 
 
 def _column(one: Mapping[str, Any]) -> dict[str, str]:
-    """Return the column of a run in the table: the values of its summary as text, by name of the row."""
+    """Return the column of a run in the table that compares runs: name of each row, and its value as text.
+
+    one: the run's summary; see `run_summary`
+    """
     column = {
         "run": one["run"],
         "task": one["task"],

@@ -233,7 +233,9 @@ def _mtf(light: WhiteLight) -> Html:
 
 
 def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
-    """Return the MTF in white daylight of a circular pupil as wide as the eye's, without aberrations, (frequency,).
+    """Return the MTF of a circular pupil without aberrations in white daylight, (frequency,).
+
+    The pupil is as wide as that of the eye.
 
     In each band, the MTF is (2/π)(arccos s - s √(1 - s²)) for s < 1, else 0, where s is the frequency divided by the
     cutoff frequency (Goodman, Fourier Optics, §6.3.3). The bands are weighted by daylight and by the mean sensitivity

@@ -21,9 +21,9 @@ SHOWN = 1e-3  # the image extends to this fraction of the maximum
 def white_acceptance(eye: sim.CompoundEye) -> tuple[np.ndarray, np.ndarray]:
     """Return angles off the axis, and the acceptance function of the first ommatidium in white daylight.
 
-    The angles [degrees] have the shape (n,). They apply to both axes (up, right) of the function's values, which have
-    the shape (n, n) and are fractions of their maximum. Bands are weighted by daylight and by the mean sensitivity of
-    the eye's channels.
+    The angles [degrees] have the shape (n,). The acceptance is given on the grid of these angles in both directions,
+    (up, right), as fractions of its maximum. It has the shape (n, n). Bands are weighted by daylight and by
+    the mean sensitivity of the eye's channels.
     """
     bands, accepted = eye.spectral_bands, eye.acceptance(0)
     weights = bands.weights.mean(axis=0) * daylight(bands.wavelengths)

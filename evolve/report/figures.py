@@ -1,4 +1,6 @@
-"""Figures of a whole run: fitness, costs, success and genes over the generations, descent, and learning curves.
+"""Figures of a whole run: fitness, costs, success and genes over the generations, a family tree, and learning curves.
+
+The family tree shows the candidates and the line of descent of the best one.
 
 Each public function draws one figure, and returns it as an SVG element.
 """
@@ -38,7 +40,9 @@ Generations = Sequence[int] | NDArray[np.int64]
 
 
 def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Candidate]) -> Html:
-    """Draw the fitness of each candidate, quantiles and median of each population, and the best fitness so far.
+    """Draw the fitness of each candidate, and the best fitness so far over the generations.
+
+    For each generation, the figure also shows the median of the fitness, and its 10 % and 90 % quantiles.
 
     rows: statistics of each generation, at least one
     """
@@ -105,9 +109,10 @@ def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> H
 
 
 def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
-    """Draw successful candidates at their generation and fitness, with a line to the nearest parent if that succeeded.
+    """Draw successful candidates at their generation and fitness, connected with their parents by lines.
 
-    The line of descent of the best candidate has the accent colour.
+    A line connects a candidate with the parent whose genome is most similar, if this parent has succeeded. The line of
+    descent of the best candidate has the accent colour.
     """
     known = {candidate.id: candidate for candidate in candidates}
     population = max(candidate.index for candidate in candidates) + 1
@@ -170,7 +175,7 @@ def success_figure(candidates: Sequence[Candidate]) -> Html:
 
 
 def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
-    """Draw the learning curves: mean return in evaluations over the steps of training, for each candidate.
+    """Draw the learning curve of each candidate: mean return of an evaluation against the number of training steps.
 
     The curve of the best candidate has the accent colour.
     """

@@ -1,4 +1,7 @@
-"""Section of the report with fitness, its parts and success over the generations, learning curves, and descent."""
+"""Section of the report on fitness.
+
+It shows fitness, its parts and the success rate over the generations, the learning curves, and the family tree.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,10 @@ POPULATION = html(
 
 
 def fitness_section(run: Run) -> Html:
-    """Return the section with fitness, its parts and success over the generations, learning curves, and descent."""
+    """Return the section on fitness.
+
+    It shows fitness, its parts and the success rate over the generations, the learning curves, and the family tree.
+    """
     if not run.candidates:
         return section("fitness", "Fitness", html("<p>No candidate has been evaluated yet.</p>\n"))
     rows, best = generation_statistics(run.candidates), run.best

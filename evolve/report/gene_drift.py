@@ -57,13 +57,16 @@ class QuantityDrift:
 
 @dataclass(frozen=True)
 class Drift:
-    """Comparison of runs with searches with random fitness.
+    """Comparison of the animals of runs with the animals of searches whose fitness is random.
+
+    Each compared quantity, such as a gene, has one value per run and one per search: its mean over the candidates of
+    the last generations.
 
     of: number of runs
-    generations: generations over which means are computed, counted from 0
-    searches: number of searches
-    moved: quantities, with their values
-    costs: True if the searches subtract costs
+    generations: these last generations, counted from 0
+    searches: number of searches with random fitness
+    moved: the quantities, each with its values in the runs and a summary of its values in the searches
+    costs: True if the searches subtract the costs of eyes and brain from a random task fitness
     """
 
     of: int
@@ -74,17 +77,23 @@ class Drift:
 
     @property
     def random(self) -> str:
-        """Random quantity that the searches maximise, as text: "fitness" or "task fitness minus costs"."""
+        """Name of the quantity that the searches maximise: "fitness" or "task fitness minus costs".
+
+        "fitness" is a random number. If there are costs, only the task fitness is random.
+        """
         return "task fitness minus costs" if self.costs else "fitness"
 
     def as_plain_values(self) -> dict[str, Any]:
-        """Return the comparison as JSON values."""
+        """Return, as JSON values, how the runs compare with searches that have random fitness."""
         first, last = self.generations[0], self.generations[-1]
         moved = [asdict(one) for one in self.moved]
         return {"generations": [first, last], "searches": self.searches, "random": self.random, "moved": moved}
 
     def lines(self) -> list[str]:
-        """Return the comparison as a table for a terminal."""
+        """Return the comparison as the lines of a table, followed by two notes.
+
+        A row compares the values of one quantity in the runs and in the searches with random fitness.
+        """
         rows = [("", "run" if self.of == 1 else f"mean of {self.of} runs", "null model", "95 % of its searches", "p")]
         for one in self.moved:
             numbers = (f"{one.mean:.4g}", f"{one.median:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{one.p:.2g}")
@@ -106,8 +115,9 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
 
     The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical acuity
     unless `eye.vertical_fov` is "receptors", and the number of receptor positions in all eyes. Quantities that do not
-    vary between the searches, or that a run lacks, are omitted. Means are over the last generations that all runs have
-    completed. The searches are those of `evolve.search.null_model`.
+    vary between the searches, or that a run lacks, are omitted. Means are over the last 3 generations that all runs
+    have completed, or over fewer if a gene began to vary in the last 2 of them. The searches are those of
+    `evolve.search.null_model`.
 
     searches: number of searches
     done: function that is called with the completed fraction of the searches

@@ -22,7 +22,8 @@ def lineup(run: Run) -> Html:
     The script lineup.js shows the card of the selected generation. If no candidate has succeeded, the result is empty.
 
     Raises:
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without naming its user task (argument `task`), or the task's module cannot be
+            executed.
     """
     best = _thinned(champions(run.candidates))
     if not best:
@@ -41,9 +42,10 @@ def lineup(run: Run) -> Html:
 
 
 def _heading(generation: int) -> str:
-    """Return the heading of the first animal.
+    """Return the title of the left card, which shows the best animal of a generation.
 
-    generation: generation of the animal; it is not 0 if all candidates of the earlier generations have failed
+    generation: number of the first generation in which a candidate succeeded. If it is above 0, all candidates of
+        generation 0 have failed, and the title adds "the first to succeed".
     """
     return f"Generation {generation}’s best{', the first to succeed' if generation else ''}"
 

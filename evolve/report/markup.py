@@ -99,7 +99,7 @@ def style(declarations: str) -> Html:
 
 
 def key(kind: str) -> Html:
-    """Return a short line for a legend, in the colour of the CSS class `kind`."""
+    """Return a short coloured stroke for a legend, in the colour of the CSS class `kind`."""
     return html('<span class="key {}" aria-hidden="true"></span>', kind)
 
 
@@ -130,7 +130,7 @@ def duration(seconds: float) -> str:
 
 
 def exact(value: float) -> str:
-    """Return a setting or an integer as text, with at most six significant digits."""
+    """Return a number as text, with at most six significant digits: a setting, or an integer below a million."""
     return f"{value:g}".replace("-", "−")
 
 

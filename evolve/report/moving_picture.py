@@ -131,7 +131,12 @@ def _world(episode: Episode, time: int) -> Image.Image:
 
 
 def _from_above(episode: Episode, plan: GroundPlan, time: int) -> Image.Image:
-    """Return the plan of the world at one time, as high as a frame."""
+    """Return an image of the world from above, drawn from its ground plan.
+
+    The image is as high as a frame of the moving picture, 320 pixels.
+
+    time: number of the time step in the episode
+    """
     x0, y0, x1, y1 = plan.bounds
     scale = SMOOTH * HEIGHT / (y1 - y0)
     width = round((x1 - x0) * scale / SMOOTH)

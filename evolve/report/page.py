@@ -91,7 +91,10 @@ def numbers_section(run: Run) -> Html:
 
 
 def genes_section(run: Run) -> Html:
-    """Return the section with curves over the generations: the varied genes, by cluster, and the acuity."""
+    """Return the section with curves of the genes and of acuity over the generations.
+
+    It shows the genes that the search varies, grouped into morphological, optical, neural and spectral genes.
+    """
     if not run.candidates:
         return Html()
     parts = [
@@ -243,14 +246,15 @@ def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
 
 
 def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> bytes:
-    """Return the whole page, encoded as UTF-8.
+    """Return the report of a run as an HTML page, encoded as UTF-8.
 
     episode: an episode of the best candidate; None if no candidate has succeeded
     doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
 
     Raises:
         RunError: the run has a test set of layouts, and the policy of the best candidate is missing or damaged.
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without naming its user task (argument `task`), or the task's module cannot be
+            executed.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file of the run cannot be read.
     """

@@ -1,4 +1,7 @@
-"""Player of a recorded episode on a page: the path from above, images, the signals of each eye, and the reward."""
+"""Player of a recorded episode on a page.
+
+It shows the animal's path on a ground plan, images, the signals of each eye, and the reward.
+"""
 
 from __future__ import annotations
 
@@ -88,9 +91,10 @@ def _from_above(plan: GroundPlan) -> Html:
 
 
 def _sights(episode: Episode) -> Html:
-    """Return a pair of canvases for each eye, which show its signals with noise and the signals without noise.
+    """Return two canvases for each eye, one for its signals with noise and one for signals without noise.
 
-    The signals without noise are those behind a perfect lens or, for compound eyes, those of the same ommatidia.
+    For a lens eye, the signals without noise are those that its receptors would have behind a perfect lens. For a
+    compound eye, they are the signals of its own ommatidia.
     """
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
@@ -135,7 +139,7 @@ def _controls(episode: Episode) -> Html:
 
 
 def _score(episode: Episode) -> Html:
-    """Return the figure of the reward so far, by term."""
+    """Return a plot of the cumulated reward over time, for each term of the reward."""
     names = [*episode.reward_terms, "total"]
     colours = [TERM_COLOURS[i % len(TERM_COLOURS)] for i in range(len(names) - 1)] + ["ink"]
     cells = joined(
@@ -171,9 +175,11 @@ def _film(episode: Episode) -> dict[str, Any]:
 
 
 def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
-    """Return the part of the data for player.js that describes the world: commands, and images if there are any.
+    """Return data of the world for player.js: the animal's commands, and images of the scene if there are any.
 
-    If the task has a ground plan, it also contains positions [m] and angles [rad].
+    If the task has a ground plan, the data also contain positions [m] and angles [rad].
+
+    kept: time steps that the player shows
     """
     plan = episode.plan
     part = _commands(episode, kept) | ({} if episode.pictures is None else film_of_pictures(episode.pictures, kept))
@@ -224,7 +230,9 @@ def _kept(episode: Episode) -> np.ndarray:
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
     """Return (frame, "goal" or "adversary") for each time at which one of these was reached, in order of the frames.
 
-    frame: index in `kept` of the first time step at or after this time
+    A frame is an index in `kept`. It is the first that is shown at or after the event.
+
+    kept: time steps that the player shows
     """
     found = [
         (int(np.searchsorted(kept, time)), name)

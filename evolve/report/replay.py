@@ -34,16 +34,17 @@ def write_replay(
 
     candidate_id: id of the candidate that plays; None: the best candidate
     seed: seed of the episode
-    every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8
+    every: number of actions between two images of the scene in a recording for Rerun; None: 8
     also: formats of additional files next to the page: "rrd" (a recording for Rerun), "gif" and "mp4"
     out: path of the page; None: a name in the run directory
-    mode: "evaluation", or "test" for the layouts of the test set
+    mode: "evaluation", or "test" for the test set, layouts that neither training nor evaluation has used
 
     Raises:
         RunError: the candidate does not exist, no candidate has succeeded, or the policy is missing or damaged.
-        ConfigError: the package `rerun` or ffmpeg is needed but not installed, `out` has the ending of an additional
-            file, a format or the mode is unknown, `every` is given without "rrd", the run has no test set, or the user
-            task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the package `rerun` or ffmpeg is needed but not installed, `out` ends in .rrd, .gif or .mp4, a
+            format or the mode is unknown, `every` is given without "rrd", or the run has no test set. A run with a user
+            task also fails if it was opened without naming the task (argument `task`), or if the task's module cannot
+            be executed.
         StrangeFileError: `out` is not a regular file, for example a directory.
         ValueError: `every` is not a whole number from 1 to 1,000,000, or `seed` is negative.
         RuntimeError: a method of the user task fails at the start of the episode.
@@ -66,10 +67,10 @@ def write_replay(
 
 
 def _require_page(out: Path) -> None:
-    """Check the path of the page. The check precedes the episode, because playing takes time.
+    """Check the path of the page. The check precedes the episode, because playing an episode takes time.
 
     Raises:
-        ConfigError: the path has the ending of an additional file.
+        ConfigError: the path ends in .rrd, .gif or .mp4, as the files next to the page do.
         StrangeFileError: the path is a link, FIFO, device or directory.
     """
     require_file_name(out)

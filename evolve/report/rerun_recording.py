@@ -10,8 +10,8 @@ camera with an image of its signals.
 same receptors behind a perfect lens, or, for compound eyes, of the signals without noise. `scene` contains images of
 the scene in front of each eye, on a finer grid, at the times at which radiance was recorded.
 
-`action`, `reward` with its terms, and other entries of the observation, such as `contact` or `feels`, are numbers over
-time. `outcome` is the outcome of the episode.
+`action`, `reward` with its terms, and the entries of the observation that are not signals of eyes, such as `contact` or
+`feels`, are numbers over time. `outcome` is the outcome of the episode.
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ def _write(to: RerunStream, episode: Episode) -> None:
 
 
 def _log_images(to: RerunStream, episode: Episode) -> None:
-    """Log, for the time before each action, the signals of each eye, and the signals for comparison.
+    """Log the signals of each eye before each action.
 
-    The latter are the signals behind a perfect lens or, for compound eyes, the signals without noise.
+    For comparison, also log the signals behind a perfect lens or, for compound eyes, the signals without noise.
 
     At times at which radiance was recorded, also log the scene in front of each eye.
     """
@@ -105,7 +105,7 @@ def _log_numbers(to: RerunStream, episode: Episode) -> None:
 
 
 def _end(to: RerunStream, episode: Episode) -> None:
-    """Log the outcome at the last action."""
+    """Log the outcome of the episode at the time of the last action."""
     outcome, level = ("solved" if episode.solved else "not solved"), "INFO"
     if episode.failure is not None:
         outcome, level = f"failed: {episode.failure}", "ERROR"

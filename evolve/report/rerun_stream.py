@@ -46,7 +46,7 @@ class RerunStream:
     seconds: float
 
     def always(self, entity: tuple[str, ...], *what: Any) -> None:
-        """Log data of an entity that do not change over time."""
+        """Write those data of an entity that are constant over the recording."""
         self.stream.log(list(entity), *what, static=True)
 
     def log(self, t: int, entity: tuple[str, ...], what: Any) -> None:
@@ -58,7 +58,7 @@ class RerunStream:
     def columns(self, entity: tuple[str, ...], n: int, columns: Any) -> None:
         """Log the states of an entity before each of n actions.
 
-        columns: one state for each action, as columns of the package `rerun`
+        columns: one state for each action, in the format that `rerun.send_columns` takes
         """
         actions, rr = np.arange(n), self.rr
         times = [rr.TimeColumn("action", sequence=actions), rr.TimeColumn("time", duration=actions * self.seconds)]

@@ -73,7 +73,10 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
 
 
 def _best_spread(best: Candidate) -> str:
-    """Return the 95 % interval of the fitness in words, after task fitness and costs if there are costs."""
+    """Return the 95 % interval of the best candidate's fitness in words.
+
+    If the candidate has costs, the text begins with its task fitness and its costs.
+    """
     spread = _spread(best.returns, best.costs)
     if not best.costs:
         return spread
@@ -81,9 +84,9 @@ def _best_spread(best: Candidate) -> str:
 
 
 def _spread(returns: Sequence[float], costs: float = 0.0) -> str:
-    """Return the number of episodes and the 95 % interval of their mean return minus costs, in words.
+    """Return the number of episodes and the 95 % interval of the fitness, in words.
 
-    For a single episode, there is no interval.
+    The fitness is the mean return of the episodes, minus `costs`. For a single episode, there is no interval.
     """
     if len(returns) == 1:
         return "a single episode"
@@ -102,7 +105,10 @@ def best_genes(run: Run, best: Candidate) -> Html:
 
 
 def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str | Html]:
-    """Return a row of the table: for one gene, or for all genes in one row of the relief."""
+    """Return a row of the table of genes.
+
+    The row describes one gene, or several genes that are the heights in one row of the grid of a lens's relief.
+    """
     genes, uses = [ALL_GENES[name] for name in names], [run.config.genome[name] for name in names]
     name, meaning = names[0], genes[0].meaning
     if len(names) > 1:
@@ -151,7 +157,10 @@ def _fields(phenotype: Phenotype) -> str:
 
 
 def acuity_text(animal: Phenotype, unit: str) -> str:
-    """Return the acuity of an animal as text with its unit, for each direction if the two acuities differ."""
+    """Return the acuity of an animal as text with its unit.
+
+    If horizontal and vertical acuity differ, the text contains both.
+    """
     across, up = _both_acuities(animal)
     return f"{across} {unit}" if across == up else f"{across} {unit} horizontally, {up} vertically"
 
@@ -166,7 +175,7 @@ def _acuities(animal: Phenotype) -> str:
 
 
 def _directions(candidates: Sequence[Candidate]) -> str:
-    """Return ", horizontal × vertical" for the heading of acuities; "" if the two are equal in all candidates."""
+    """Return ", horizontal × vertical", for a heading, if these two acuities of any candidate differ, else ""."""
     differ = any(len(set(_both_acuities(candidate.phenotype))) > 1 for candidate in candidates)
     return ", horizontal × vertical" if differ else ""
 

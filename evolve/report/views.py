@@ -22,7 +22,7 @@ MOST_EYES = 6  # maximum number of eyes that are shown
 
 
 def what_it_sees(episode: Episode) -> Html:
-    """Return the images of up to 6 eyes at the time with most detail, with their caption."""
+    """Return the images of up to 6 eyes, with a caption, at the time at which the scene has most detail."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])
     lens, names, gain = episode.eyes.eye(), episode.eyes.names(), episode.gain

@@ -27,7 +27,8 @@ def write(run: Run, episode: Episode | None = None, out: Path | None = None, doi
 
     Raises:
         RunError: the best candidate's policy is missing or damaged.
-        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
+        ConfigError: the run was opened without naming its user task (argument `task`), or the task's module cannot be
+            executed.
         RuntimeError: a method of the user task fails at the start of the episode.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         StrangeFileError: `out` is not a regular file, for example a directory.

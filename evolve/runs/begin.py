@@ -49,7 +49,8 @@ class PreparedRun:
     """Checked settings of a run, which is ready to start. Nothing has been written yet.
 
     config: settings of the run
-    preset: part of the run directory's name: the name of the preset, without the name of the task at its end
+    preset: name of the preset, without the name of the task if the preset ends with it; a part of the name of the run
+        directory
     origin: "RUN:ID", the animal whose genes are the start values; None without such an animal
     """
 
@@ -87,12 +88,13 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
 
     tried: True to build the search, draw random layouts and try the user task in this process. False if the run is
-        only planned: other processes then try the task and measure its pace, and the search is built only if its
-        optimizer is neither "CMA" nor "mutation"
+        only planned. Other processes then try the task and measure the speed of training. The search is then built
+        only if its optimizer is neither "CMA" nor "mutation"
 
     Raises:
         ConfigError: a setting is invalid, the optimizer is unknown, random layouts cannot be drawn or two of them are
-            equal, or the user task fails or has several mounts that no animal would use; the message is one line.
+            equal, the user task fails, or it has several mounts (places for eyes) but no method `place` that would
+            use them; the message is one line.
         RunError: the run or the animal of `start_from` does not exist, or its record is damaged.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
@@ -110,7 +112,9 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
 
 
 def check_task(config: RunConfig) -> list[Warning | str]:
-    """Check the layouts and the user task of a run, try the task, and return the warnings of rhabdom, each once.
+    """Check the layouts and the user task of a run, try the task, and return the warnings of this package.
+
+    A warning that is issued several times is returned once.
 
     A worker process calls this function while a run is planned; see `evolve.cli.pace`.
 

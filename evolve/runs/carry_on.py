@@ -41,14 +41,14 @@ def carry_on(
 
     After an exception, the record is intact, and the run can be resumed.
 
-    watched: function that returns the watcher for a run and a number of workers; it is called after the executor has
-        started
-    workers: function that returns the executor for the settings of a run
+    watched: function that takes the run and the number of workers, and returns a watcher; it is called after the
+        executor has started
+    workers: function that takes the settings of the run, and returns an executor
 
     Raises:
         RunError: the record cannot be written, or the search proposes candidates that differ from those on record.
         ExecutorError: candidates cannot be evaluated.
-        ConfigError: the optimizer is unknown, or cannot be used here.
+        ConfigError: the optimizer is unknown, or rejects the settings of the run.
         OSError: a file of the run cannot be read or written.
     """
     with workers(run.config) as executor, watched(run, executor.count) as watcher:

@@ -1,13 +1,14 @@
 """Safe output of text on a terminal.
 
-Commands print all text through a `Voice`, a stream that escapes control characters, and their results with `say`.
+All text that commands print passes a `Voice`, a stream that escapes control characters. Commands print results with
+`say`.
 
 Messages, settings and names of directories may come from an untrusted source. Escape sequences in them are printed as
 visible text, so that they have no effect on the terminal. Characters that the terminal's encoding lacks are spelt out
 ("sigma"), or printed as numbers. If a reader such as `head` closes the pipe, or the disk is full, a run continues.
 
-In commands other than `validate`, stdout contains only the text that `say` prints. There, `print` writes to stderr; so
-do `print` calls in the code of users' tasks.
+In commands other than `validate`, stdout contains only the text that `say` prints. In these commands, `print` writes to
+stderr, also in the code of users' tasks.
 """
 
 from __future__ import annotations
@@ -68,10 +69,10 @@ class Voice(OwnedStream):
     """A text stream that writes to another stream, with control characters escaped.
 
     stream: the stream that receives the text
-    patient: True to continue without output after a fault
+    patient: True to continue without output after an error of `stream`, such as a full disk; False to raise the error
     obeyed: True to write control characters unchanged, which a progress bar needs
-    name: name of the stream in the error of an impatient stream, and in the note that a patient stream prints on
-        stderr; None: faults other than a closed pipe are ignored
+    name: name of the stream in the error or, if `patient` is True, in a note on stderr; None: errors other than a
+        closed pipe or terminal are ignored
 
     Raises:
         BrokenPipeError: on writing, the pipe or terminal has been closed, and `patient` is False.
@@ -87,11 +88,14 @@ class Voice(OwnedStream):
         return len(text)
 
     def _judge(self, fault: OSError | ValueError) -> None:
-        """Report a fault, or raise it if the stream is not patient.
+        """Handle an error of the stream that receives the text: raise it, print a note on stderr, or ignore it.
+
+        If `patient` is True, nothing is raised, and the command continues without this output. If `name` is None, an
+        error is raised only if the pipe or terminal has been closed. All other errors are then ignored.
 
         Raises:
-            BrokenPipeError: the pipe or terminal has been closed, and the stream is not patient.
-            OSError: another fault has occurred, the stream is not patient, and it has a name.
+            BrokenPipeError: the pipe or terminal has been closed, and `patient` is False.
+            OSError: another fault has occurred, `patient` is False, and `name` is not None.
         """
         number = fault.errno if isinstance(fault, OSError) else errno.EBADF
         if number in (errno.EPIPE, errno.EIO):  # a closed pipe or terminal
@@ -121,9 +125,10 @@ def say(text: str, end: str = "\n", flush: bool = False) -> None:
 
 @contextmanager
 def voices(patient: bool, private: bool = False) -> Iterator[None]:
-    """Replace stdout and stderr by Voices within the context.
+    """Replace stdout and stderr within the context by streams that escape control characters; see `Voice`.
 
-    patient: see `Voice`; stderr is always patient
+    patient: True to continue without output after an error of stdout, such as a closed pipe; False: raise the error.
+        Errors of stderr are never raised
     private: True if only `say` writes to stdout, and all other output goes to stderr. False: `print` writes to stdout,
         too
     """
@@ -158,7 +163,10 @@ def _results_on(stream: TextIO) -> Iterator[None]:
 
 
 def as_it_is(stream: TextIO) -> TextIO:
-    """Return a stream to the same destination, which leaves control characters unchanged; see `Voice.obeyed`."""
+    """Return a stream that writes to the same destination and leaves control characters unchanged.
+
+    See `Voice.obeyed`.
+    """
     if not isinstance(stream, Voice):
         return stream
     return cast(TextIO, Voice(stream.stream, stream.patient, obeyed=True, name=stream.name))

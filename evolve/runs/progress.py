@@ -58,7 +58,7 @@ class Tally:
     def planned(self) -> int:
         """Total number of evaluations in the whole run if no candidate fails.
 
-        A candidate is evaluated after every rung that it reaches.
+        The training of a candidate consists of one or several rungs, and the candidate is evaluated after each of them.
         """
         return evaluations(self._run.config.search)
 
@@ -94,7 +94,10 @@ class Tally:
         return statistics.median(fitness) if fitness else None
 
     def summary(self) -> str:
-        """Return generation (counted from 0) and pace as text and, if known, best and median fitness and time left."""
+        """Return the generation (counted from 0) and the training steps per second as text.
+
+        Best and median fitness, and the time left, are added if they are known.
+        """
         run = self._run
         search = run.config.search
         last = search.generations - 1
@@ -247,7 +250,7 @@ def watcher(run: Run, out: TextIO = sys.stderr, workers: int = 1, as_json: bool 
     """Return the watcher for an output: Events if `as_json` is True, else Bar on a terminal, and Lines elsewhere.
 
     out: stream for the output
-    workers: number of workers, for the utilisation
+    workers: number of workers, needed for the share of time in which they were busy
     """
     if as_json:
         return Events(run, out, workers)

@@ -34,9 +34,10 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
     Raises:
         LockedError: another process is working on the run.
-        RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or its
-            format is too old for the run to be continued.
-        ConfigError: config.toml is invalid, or the user task was not named when the run was opened or fails.
+        RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or
+            config.toml has a format too old for the run to be continued.
+        ConfigError: config.toml is invalid, the run was opened without naming its user task (argument `task`), or the
+            user task fails in a short trial.
         BackendError: Dr.Jit finds no usable LLVM library or GPU.
         OSError: a file of the run cannot be read or written.
     """
@@ -58,7 +59,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
 
 def _changes(run: Run) -> Iterator[str]:
-    """Yield a note if the software has changed since the first start of the run. Numbers may then differ."""
+    """Yield a note if the software has changed since the first start of the run. Results may then differ."""
     then, now = recorded(run.path), present()
     changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
     if changed:

@@ -19,7 +19,7 @@ AXES = ("sensor_width", "receptor_pitch", "relief_height", "pupil_turned")
 
 
 def starts_from(text: str) -> Source:
-    """Return the genes of an animal as start values of a new run, with the settings that they depend on.
+    """Return the genes of an animal as start values of a new run, with the settings on which these genes depend.
 
     Some genes are relative to settings: a relief's heights are fractions of `eye.relief_height`, for example. With
     other settings, the same genes would describe another lens. These settings are therefore returned as well.

@@ -1,4 +1,7 @@
-"""Connection to a Dask scheduler. No call waits longer than `patience_s` for a sign of life."""
+"""Connection to a Dask scheduler.
+
+No call waits longer than `patience_s` for a sign of life of the scheduler or of its workers.
+"""
 
 from __future__ import annotations
 
@@ -34,13 +37,14 @@ class Connection:
     """Connection to a scheduler, from which a list of the connected workers is requested regularly.
 
     scheduler: the scheduler
-    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]
-    note: function that is called with one line if the run waits for a sign of life, or removes a silent worker
+    patience_s: maximum time for which the scheduler, or all workers at once, may be silent [s]
+    note: function that is called with one line if the run waits for an answer or a heartbeat, or removes a silent
+        worker
     topic, events: Dask topic to subscribe to, and the function that receives its events
 
     Raises:
         ExecutorError: the scheduler does not answer, or Dask is not installed. All methods except `close` raise it
-            after `patience_s` without a sign of life.
+            after `patience_s` without an answer or a heartbeat.
         ConfigError: the address of the scheduler requires certificates, but there are none.
     """
 
@@ -104,7 +108,8 @@ class Connection:
         Exceptions of the call are passed on, unless they show that the connection was lost.
 
         call: function that returns an awaitable, which is awaited in the thread of Dask's client
-        timeout: maximum duration of the call [s]; by default, it is unlimited while there are signs of life
+        timeout: maximum duration of the call [s]; by default, it is unlimited while the scheduler answers
+            and a worker sends heartbeats
 
         Raises:
             ConnectionLost: the connection was lost during the call.

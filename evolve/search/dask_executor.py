@@ -32,7 +32,7 @@ def _ignore(note: str) -> None:
 class _Trial:
     """A submitted job.
 
-    counter: variable of the scheduler that counts the attempts
+    counter: a distributed.Variable, stored by the scheduler; its value is the number of attempts so far
     order: the job in the form that is sent to a worker
     """
 
@@ -58,7 +58,8 @@ class DaskExecutor:
     count: number of workers when the context was entered
 
     Raises:
-        ConfigError: the address of the scheduler is malformed; on entry, it requires certificates, but there are none.
+        ConfigError: the address of the scheduler is malformed. On entry: the address begins with tls://, but no
+            certificates for encrypted connections are given.
         ExecutorError: on entry, Dask is not installed, the scheduler does not answer, or no worker is connected.
     """
 
@@ -99,10 +100,9 @@ class DaskExecutor:
         progress: function that is called with (candidate id, steps trained, steps planned); None: no function
 
         Raises:
-            ExecutorError: a worker cannot evaluate candidates or has other software, its machine lacks resources such
-                as disk space, the run's settings cannot be used there, or the scheduler or all workers are silent for
-                `patience_s`.
-            ConfigError: the run has a user task that the user has not named.
+            ExecutorError: a worker has other software than this process, cannot use the run's settings, or lacks
+                resources such as disk space, or the scheduler or all workers are silent for `patience_s`.
+            ConfigError: the run has a user task, and was opened without naming it (argument `task`).
             OSError: a policy or a checkpoint cannot be read or written here.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
@@ -160,7 +160,10 @@ class DaskExecutor:
             raise
 
     def _may_be_repeated(self, trial: _Trial, future: Any) -> bool:
-        """Return whether the scheduler gave up a job because its workers died, although attempts remain."""
+        """Return whether a job that failed because its worker died may be submitted again.
+
+        It may if it has had fewer attempts than the maximum number.
+        """
         from distributed import KilledWorker
 
         if future.status != "error" or not isinstance(future.exception(), KilledWorker):

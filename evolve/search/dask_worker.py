@@ -1,8 +1,8 @@
 """Evaluation of a candidate in a Dask worker. Jobs and results are sent as text and bytes.
 
 A worker and the sender of its jobs share no files and no state; they only connect to the same scheduler. A worker
-process evaluates one candidate at a time, even if Dask gives it several threads. Sums are therefore computed in the
-same order as in a worker of the local executor.
+process evaluates one candidate at a time, even if Dask gives it several threads, and computes in a single thread. A
+worker of the local executor does the same, so both compute floating-point sums in the same order.
 """
 
 from __future__ import annotations
@@ -37,7 +37,11 @@ _prepared = False
 
 
 class UnfitWorker(RuntimeError):
-    """A worker cannot evaluate candidates, or its numbers would differ; the message states the reason in one line."""
+    """A worker cannot evaluate candidates, or its software differs from that of the process that sends the jobs.
+
+    With different software, its results could differ from those of other workers. The message states the reason in one
+    line.
+    """
 
 
 class _Unwanted(Exception):
@@ -52,12 +56,13 @@ class Order:
     id, seed: id of the candidate, and seed of its training and evaluation
     phenotype: the phenotype as JSON
     config: the settings of the run as TOML
-    counter: name of the scheduler's variable that counts the attempts
+    counter: name of the scheduler's variable that counts the attempts to evaluate this candidate
     topic: Dask topic on which the worker reports its progress
-    ends: number of training steps at the end of each rung, up to the last rung of this job; () without rungs
-    begun: number of the last complete rung, and its checkpoint, from which training continues; None: training starts
-        from the beginning
-    software: versions of the sender's software
+    ends: total number of training steps at the end of each rung, up to the last rung of this job. A rung is a part of
+        a training run. () if training is not divided into rungs
+    begun: training continues from the last complete rung, given by its number and the content of its checkpoint file.
+        None: training starts from the beginning
+    software: versions of the software on the machine that sends the job
     code: path and text of a user task's file; None for a built-in task
     """
 
@@ -82,7 +87,7 @@ def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Orde
 
     Raises:
         OSError: a checkpoint cannot be read.
-        ConfigError: the run has a user task that the user has not named.
+        ConfigError: the run has a user task that the user has not named with the option --task.
     """
     phenotype = json.dumps(job.phenotype.to_json())
     task = job.config.choice.named_code
@@ -100,8 +105,9 @@ def evaluate(order: Order) -> Reply:
     The bytes are empty if the candidate has no policy or checkpoint.
 
     Raises:
-        UnfitWorker: the worker cannot evaluate candidates, or has other software than the sender.
-        TimeoutError: the scheduler does not send the counter of attempts in time.
+        UnfitWorker: the worker cannot evaluate candidates, or its software differs from that of the process that sent
+            the order.
+        TimeoutError: the scheduler does not send the number of earlier attempts to evaluate this candidate in time.
     """
     from distributed import Variable, get_worker
 
@@ -131,7 +137,7 @@ def evaluate(order: Order) -> Reply:
 
 
 def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
-    """Return the Evaluation, and the bytes of the policy and of the checkpoint, in a reply of `evaluate`."""
+    """Return the contents of a reply of `evaluate`: Evaluation, bytes of the policy, bytes of the checkpoint."""
     text, policy, checkpoint = reply
     record = json.loads(text)
     record["returns"] = tuple(record["returns"])
@@ -163,9 +169,10 @@ def _content(path: Path) -> bytes:
 
 
 def _prepare(order: Order) -> None:
-    """Compare the versions of the software with the sender's, and prepare Dr.Jit at the first call in this process.
+    """Compare this worker's software versions with those of the process that sent the order, and prepare Dr.Jit.
 
-    A version that is unknown here or there, such as a commit, is not compared.
+    Dr.Jit is prepared only at the first call in this process. A version that is unknown on one side is not compared.
+    For example, the commit is unknown if the code is not in a git repository.
 
     Raises:
         UnfitWorker: a version differs, or Dr.Jit cannot be prepared.

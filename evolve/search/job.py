@@ -1,4 +1,4 @@
-"""Job: a candidate for an executor to evaluate, and the type of progress callbacks."""
+"""The class `Job`, a candidate that an executor evaluates, and `Progress`, the type of progress callbacks."""
 
 from __future__ import annotations
 

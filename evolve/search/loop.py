@@ -1,7 +1,7 @@
 """Main loop of a run: propose candidates, evaluate and record them, and report their fitness to the optimizer.
 
 A resumed run executes the same loop from its start. Candidates that are already on record are not evaluated again,
-but their fitness is reported to the optimizer, which restores the state of the search.
+but their fitness is reported to the optimizer. This restores the state of the search.
 
 The loop has two modes. By default, the optimizer receives the fitness of a whole generation at once, so all candidates
 follow from the settings and the seed. With `search.steady_state`, fitness is reported in the order in which candidates
@@ -74,7 +74,10 @@ def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
 
 
 def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Evaluate one generation after the other, and report a generation's fitness when all its rungs are complete."""
+    """Evaluate one generation after the other, and report a generation's fitness when its training is complete.
+
+    Training may be divided into parts (rungs), after each of which only the better candidates continue.
+    """
     same = SameSearch(run)
     for generation in range(run.config.search.generations):
         proposals = {proposal.id: proposal for proposal in search.propose_generation()}
@@ -142,11 +145,13 @@ def _record(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher
 
 
 def _after(before: Candidate, candidate: Candidate) -> Candidate:
-    """Return a candidate after a rung, with seconds and episode failures summed over this and all earlier rungs.
+    """Return a candidate after a rung (a part of its training), with its wall time and episode failures summed.
 
-    If training failed in this rung, steps and learning curve are taken from the rung before.
+    The sums cover this rung and all earlier rungs. If training failed in this rung, the number of training steps and
+    the learning curve are those of the previous rung.
 
-    before: the candidate as recorded after the rung before
+    before: the record of the candidate after the previous rung
+    candidate: the candidate after this rung
     """
     if candidate.failure is not None:
         candidate = replace(candidate, steps=before.steps, curve=before.curve)

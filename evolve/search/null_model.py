@@ -5,7 +5,8 @@ move away from this end, and selection by random fitness also moves genes. The f
 evidence of selection only if they lie outside the range of the null model.
 
 Costs also select: with a price per receptor, even random task fitness leads to few receptors. The null model therefore
-subtracts the costs from its random task fitness. A result outside its range is evidence that the task selects.
+subtracts the costs from its random task fitness. If the result of a run lies outside the range of the null model, this
+is evidence that the task selects.
 """
 
 from __future__ import annotations
@@ -38,11 +39,12 @@ TIE = 1e-5
 
 @dataclass(frozen=True)
 class NullModel:
-    """Results of searches with random fitness, by name of a quantity.
+    """Results of searches with random fitness: means of measured quantities, such as the number of receptors.
 
-    means: mean of a quantity over the candidates of a generation that have it, (search, generation); NaN if no
-        candidate has it
-    counts: number of candidates that have the quantity, (search, generation)
+    Both fields map the name of a quantity to an array (search, generation). Some candidates lack a quantity.
+
+    means: mean over the candidates of the generation that have the quantity; NaN if no candidate has it
+    counts: number of candidates of the generation that have the quantity
     """
 
     means: Mapping[str, Floats]
@@ -76,9 +78,9 @@ def null_model(
     generations: number of generations of each search
     searches: number of searches, at least 1
     done: function that is called with the completed fraction of the searches
-    spread: standard deviation of task fitness in each generation, from `fitness_spread`. It is needed only if there
-        are costs. Without costs, the standard deviation is 1, because CMA-ES and "mutation" use only the order of
-        fitness values.
+    spread: standard deviation of task fitness in each generation, from `fitness_spread`. Only needed if the settings
+        subtract costs of eyes and brain from the fitness. Without costs, the standard deviation is 1, because CMA-ES
+        and "mutation" use only the order of fitness values.
 
     Raises:
         ValueError: there are costs, and `spread` has fewer values than generations.
@@ -119,11 +121,11 @@ def fitness_spread(runs: Sequence[Run], generations: int) -> list[float]:
 def _search(
     config: RunConfig, measure: Measure, generations: int, spread: Sequence[float]
 ) -> dict[str, tuple[list[float], list[int]]]:
-    """Return, for each quantity, its mean in each generation, and the number of candidates that have it.
+    """Return, for each quantity that `measure` returns, its mean in each generation, and the number of values.
 
-    The mean is NaN if no candidate has the quantity.
+    Candidates for which the value is NaN are not counted. If no candidate has a value, the mean is NaN.
 
-    spread: standard deviation of task fitness in each generation, needed only if there are costs
+    spread: standard deviation of task fitness in each generation; only needed if eyes and brain have costs
     """
     found: dict[str, tuple[list[float], list[int]]] = {}
     for proposals in _proposals(config, generations, spread):
@@ -139,8 +141,8 @@ def _search(
 def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> Iterator[list[Proposal]]:
     """Yield the proposals of one generation after the other, and report a random fitness for each proposal.
 
-    If animals have costs, the fitness is a random task fitness, with the standard deviation `spread` of its generation,
-    minus the costs.
+    Without costs of eyes and brain, the fitness is a standard normal random number. With costs, this number is
+    multiplied by the value of `spread` for the generation, and the costs are subtracted from the product.
 
     With `search.steady_state`, a fitness is reported before each new proposal after the first population, as in a run.
     """
@@ -174,7 +176,8 @@ def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> 
 def last_generations(config: RunConfig, generations: int) -> list[range]:
     """Return the final 3 generations of each phase, or all generations of a shorter phase.
 
-    A phase lasts from one generation in which genes begin to vary to the next such generation, or to the end.
+    A phase begins with a generation in which genes begin to vary. It lasts until the next such generation, or to the
+    end of the search.
 
     generations: number of generations of the search
     """
@@ -185,10 +188,10 @@ def last_generations(config: RunConfig, generations: int) -> list[range]:
 def p_value(values: Sequence[float], ends: Floats) -> float:
     """Return the two-sided p-value of the final values of one or several runs under the null model.
 
-    The value of a single run counts as an additional sample of the null model (Davison and Hinkley 1997, §4.2).
-    Therefore, p is at least 2 / (searches + 1). For several runs, their mean is compared with the means of random
-    groups of searches, drawn with a fixed seed. The number of searches in a group is the number of runs. Here, too, p
-    is at least 2 / (searches + 1).
+    The samples of the null model are searches with random fitness. The value of a single run counts as an additional
+    sample (Davison and Hinkley 1997, §4.2). Therefore, p is at least 2 / (searches + 1). For several runs, their mean
+    is compared with the means of random groups of searches, drawn with a fixed seed. The number of searches in a group
+    is the number of runs. Here, too, p is at least 2 / (searches + 1).
 
     values: final value of a quantity in each run
     ends: final values of the quantity in the searches, from `NullModel.ends`, (search,)

@@ -102,7 +102,7 @@ class Mutation:
 class Named:
     """Any optimizer of nevergrad, by its name in nevergrad's registry.
 
-    The setting `search.sigma` is the standard deviation of nevergrad's mutations, which many optimizers use.
+    The setting `search.sigma` is the standard deviation of nevergrad's mutations. Many optimizers use these mutations.
 
     Raises:
         ConfigError: the name is unknown, or the optimizer cannot be used here.
@@ -151,12 +151,13 @@ class Named:
 class CMA(Named):
     """CMA-ES (Hansen and Ostermeier 2001), implemented by pycma, which is called through nevergrad.
 
-    The initial step size is `search.sigma`. CMA-ES samples candidates around a weighted mean of the better half of the
-    last population with known fitness. The members of this better half are recorded as the parents of each new
-    candidate.
+    The initial step size is `search.sigma`. As soon as the fitness of all candidates of a population is known, CMA-ES
+    computes a weighted mean of the better half of this population. It samples new candidates around this mean. The
+    members of the better half are recorded as the parents of each new candidate.
 
     nevergrad has an option for noisy functions, but its CMA-ES uses this option only to recommend a single best genome.
-    The option is not set, because the best candidate is taken from the record.
+    The option is not set, because the best candidate is taken from the record of the run, which contains every
+    evaluated candidate with its fitness.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
@@ -206,11 +207,11 @@ def _array(space: Space, sigma: float) -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Suppress a warning of pycma, and all warnings of nevergrad, which have no consequences here.
+    """Suppress a warning of pycma and all warnings of nevergrad. All of them are harmless here.
 
     In small populations, pycma adds mirrored samples, which it calls injected solutions. nevergrad reflects them at the
-    bounds. pycma then no longer recognises them, and warns. This is harmless, because pycma receives the samples that
-    were evaluated.
+    bounds. pycma then no longer recognises them, and warns. This is harmless, because the reflected samples are
+    evaluated, and pycma receives them together with their fitness.
 
     nevergrad warns, for example, that some optimizers learn only from complete populations.
     """

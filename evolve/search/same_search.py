@@ -1,10 +1,10 @@
 """Check that a rebuilt search proposes the candidates on record. Only such a search can continue a run.
 
-To continue a run, its search is rebuilt: all proposals are repeated, and the recorded fitness is reported again. On the
-processor and with the libraries that started the run, the proposed genomes equal those on record bit for bit. Another
-processor may round differently, and the difference can grow, because pycma recognises its own solutions by their bits.
-If the last bit of a solution differs, pycma treats the solution as injected from outside, and shortens its step if the
-step is long.
+To continue a run, its search is rebuilt: all proposals are repeated, and the recorded fitness is reported again. If
+processor and libraries are the same as at the start of the run, the proposed genomes equal those on record bit for bit.
+Another processor may round differently, and the difference can grow, because pycma recognises its own solutions by
+their bits. If the last bit of a solution differs, pycma treats the solution as injected from outside. If this solution
+is far from the mean of the search distribution, pycma then moves it closer.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ LIBRARIES = ("nevergrad", "cma", "numpy")
 class SameSearch:
     """Comparison of a search's proposals with a run's record.
 
-    A tolerance is the largest accepted difference of a coordinate in [0, 1].
+    A genome is a vector of coordinates in [0, 1]. The tolerance is the largest accepted difference between a coordinate
+    of the proposed genome and the same coordinate on record.
 
     The first generation follows from the settings alone, so its tolerance is 10⁻⁹. Later generations have the wider
     tolerance 0.02, but only if the optimizer's libraries have the same versions as at the start of the run. With other

@@ -60,11 +60,13 @@ class Scheduler:
 
     @property
     def encrypted(self) -> bool:
-        """True if connections to this address are encrypted."""
+        """True if connections to the scheduler are encrypted, so that its address begins with "tls://"."""
         return self.address.startswith("tls://")
 
     def _require_certificates(self) -> None:
-        """Check the certificates in advance, because Dask would report errors in them only later, in long messages.
+        """Check the PEM files of this object (certificates and private key) before Dask uses them.
+
+        Dask would report invalid files only later, in long messages.
 
         Raises:
             ConfigError: a file is missing or invalid.
@@ -83,10 +85,12 @@ class Scheduler:
             ) from None
 
     def require_answer(self) -> None:
-        """Check that the scheduler answers, with these certificates, before a run starts.
+        """Check, before a run starts, that the scheduler answers.
+
+        If the address begins with tls://, the certificates of this object are used, or those in Dask's own settings.
 
         Raises:
-            ConfigError: the address requires certificates, but there are none.
+            ConfigError: the address begins with tls://, but there are no certificates.
             ExecutorError: the scheduler does not answer within 5 s, or Dask is not installed.
         """
         self.security()

@@ -1,9 +1,9 @@
 """The search, which proposes candidates and receives their fitness.
 
-A gene may begin to vary only in a later generation (its setting `opens_at`). A phase lasts from one generation in which
-genes begin to vary to the next such generation, or to the end of the search. The state of the search follows from the
-settings, the seed and the fitness values received so far. A run is continued by repeating all proposals and reporting
-all recorded fitness values again; no state is stored.
+A gene may begin to vary only in a later generation (its setting `opens_at`). A phase begins with a generation in which
+genes begin to vary. It lasts until the next such generation, or to the end of the search. The state of the search
+follows from the settings, the seed and the fitness values received so far. A run is continued by repeating all
+proposals and reporting all recorded fitness values again; no state is stored.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ LOWEST = -1e9  # fitness of failed candidates before any candidate has succeeded
 class Proposal:
     """A proposed genome.
 
-    place: place of the candidate in the search
+    place: id of the candidate, its generation, and its number in this generation
     genome: coordinates of the genes that vary at any time in the search, in [0, 1]
-    parents: ids of the candidates from which the optimizer derived the genome. At the start of a later
-        phase, the new optimizer names no parents yet; the parent is then the candidate from which the phase started, if
-        there is one.
+    parents: ids of the candidates from which the optimizer derived the genome. When further genes begin to vary, a new
+        optimizer starts from the best candidate so far, if there is one. This candidate counts as the parent until the
+        new optimizer names parents.
     """
 
     place: Place

@@ -53,7 +53,10 @@ class SignsOfLife:
         self._workers_s = 0.0 if alive else self._workers_s + passed
 
     def forget(self, address: str) -> None:
-        """Forget a worker that was removed. If the next answer still contains this worker, it counts as new."""
+        """Forget a worker that was removed from the scheduler.
+
+        If the next list of workers from the scheduler still contains this worker, it counts as a new worker.
+        """
         self._silent_s.pop(address, None)
         self._last_seen.pop(address, None)
 
@@ -64,7 +67,7 @@ class SignsOfLife:
 
     @property
     def silence_s(self) -> float:
-        """Time [s] since the last answer of the scheduler, or since the last heartbeat of any worker if this is longer.
+        """The longer of two times [s]: since the scheduler's last answer, and since the last heartbeat of any worker.
 
         Heartbeats of workers that neither accept nor evaluate candidates do not count.
         """
@@ -72,19 +75,26 @@ class SignsOfLife:
 
     @property
     def exhausted(self) -> bool:
-        """True if the silence has lasted for `patience_s`."""
+        """True if the scheduler, or every worker, has given no sign of life for at least `patience_s`."""
         return self.silence_s >= self.patience_s
 
     @property
     def lost_workers(self) -> tuple[str, ...]:
-        """Addresses of workers that have been silent for at least `patience_s`; () if all workers are silent."""
+        """Addresses of workers that have been silent for at least `patience_s`.
+
+        The result is () if every worker that accepts or evaluates candidates is silent, because then `exhausted` is
+        True.
+        """
         if self._workers_s >= self.patience_s:
             return ()
         return tuple(address for address, silence in self._silent_s.items() if silence >= self.patience_s)
 
     @property
     def missing(self) -> str:
-        """Description of the sign of life that has been missing for the longest time, for messages."""
+        """Part of a message: the sign of life that has been missing for the longest time.
+
+        Signs of life are answers of the scheduler and heartbeats of workers.
+        """
         if self._scheduler_s >= self._workers_s:
             return SCHEDULER
         if not self._silent_s:
@@ -95,7 +105,7 @@ class SignsOfLife:
 
 
 def _usable(worker: Mapping[str, Any]) -> bool:
-    """Return whether a worker accepts candidates, or evaluates one."""
+    """Return whether a worker accepts new candidates or is evaluating a candidate."""
     return worker["status"] == "running" or bool(worker.get("metrics", {}).get("executing"))
 
 

@@ -6,8 +6,8 @@ rung starts from the checkpoint of the previous rung, in new worlds whose seeds 
 The result of a rung therefore depends only on its seeds and its checkpoint. If a run is killed within a rung, the rung
 is repeated, with the same result.
 
-The setting `search.rungs` is the number of rungs. A candidate has one line in the record for each rung that it reaches;
-`rung` is the number of the rung, counted from 0, after which the line was written.
+The setting `search.rungs` is the number of rungs. After each rung that a candidate
+completes, one line is added to the record. The field `rung` of this line is the number of this rung, counted from 0.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
 def evaluations(search: SearchConfig) -> int:
     """Return the number of evaluations in the whole run, if no candidate fails.
 
-    A candidate is evaluated after every rung that it reaches.
+    A candidate is evaluated after every rung (part of the training run) that it reaches.
     """
     return search.generations * sum(sizes(search))
 
@@ -86,7 +86,7 @@ def promoted(search: SearchConfig, rung: int, fitness: Sequence[tuple[int, float
 
 
 def reaching(run: Run, generation: int, rung: int) -> set[int]:
-    """Return the ids of the candidates of a generation that reach a rung.
+    """Return the ids of the candidates of a generation that are trained in a rung (a part of the training run).
 
     All candidates reach the first rung. For a later rung, the set is empty until the previous rung is complete.
     """
@@ -101,7 +101,10 @@ def reaching(run: Run, generation: int, rung: int) -> set[int]:
 
 
 def complete(run: Run, generation: int) -> bool:
-    """Return whether all candidates of a generation have been evaluated after every rung that they reach."""
+    """Return whether the evaluation of a generation is complete.
+
+    A candidate is evaluated after every rung (part of the training run) that it reaches.
+    """
     return all(
         run.on_record(candidate_id, rung) is not None
         for rung in range(run.config.search.rungs)
@@ -110,5 +113,5 @@ def complete(run: Run, generation: int) -> bool:
 
 
 def finished(run: Run) -> bool:
-    """Return whether all candidates of a run have been evaluated after every rung that they reach."""
+    """Return whether the evaluation of all generations of a run is complete."""
     return all(complete(run, generation) for generation in range(run.config.search.generations))

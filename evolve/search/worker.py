@@ -136,8 +136,8 @@ def evaluated(
 ) -> Evaluation:
     """Call `evaluate`, and return the candidate's evaluation.
 
-    If `evaluate` raises an exception, the candidate counts as failed. Only KeyboardInterrupt and errors that do not
-    depend on the animal are passed on to the caller: a full disk, insufficient memory, and invalid settings.
+    If `evaluate` raises an exception, the candidate counts as failed. Exceptions that every animal could cause are
+    instead passed on to the caller: KeyboardInterrupt, a full disk, insufficient memory, and invalid settings.
 
     arguments: positional arguments of `evaluate`
     progress: function that is called with (steps trained, steps planned)
@@ -175,8 +175,9 @@ def _give_back_memory() -> None:
     """Return freed memory to the system after a candidate.
 
     Otherwise, the memory of a worker would grow with every candidate. glibc keeps about 10 MB per candidate, in gaps
-    that are too small for the next arrays. Dr.Jit keeps the kernels of every shape of eye in memory. If a kernel is
-    needed again after its memory has been freed, Dr.Jit reloads it from disk.
+    that are too small for the next arrays. Dr.Jit compiles kernels (machine code)
+    for each new number of eyes and receptors, and keeps all kernels in memory. If a kernel is needed again after its
+    memory has been freed, Dr.Jit reloads it from disk.
     """
     gc.collect()  # this must precede the next call, because it frees frozen functions, which refer to kernels
     if (drjit := sys.modules.get("drjit")) is not None and multiprocessing.parent_process() is not None:

@@ -1,7 +1,7 @@
 """The run directory: storage of a run's settings and results, without any logic of the search.
 
 directory     Run: a run directory with its config, record and other files
-record        Record: the file candidates.jsonl, with one line per evaluated candidate and rung
+record        Record: the file candidates.jsonl, with one line for each evaluation of a candidate
 candidate     Candidate: one line of the record
 evaluation    Evaluation: outcome of a candidate's training and evaluation
 shipped_run   copy_shipped_run: the run that ships with rhabdom

@@ -28,12 +28,12 @@ class Candidate:
     `Evaluation` describes the fields that are not listed here.
 
     id, generation, index: see `Place`
-    genome: coordinates of the open genes in [0, 1], see `Genotype`
+    genome: coordinates in [0, 1] of the genes that the search varies, see `Genotype`
     phenotype: eyes and brain of the animal
     seed: seed of training and evaluation
     fitness: task fitness minus costs; -inf if the candidate failed. The search maximises the fitness.
     parents: ids of the candidates from which the search derived the genome; () if there are none
-    rung: rung after which the candidate was evaluated, counted from 0; steps and seconds include all earlier rungs
+    rung: part of training, from 0, after which the candidate was evaluated; steps and seconds include earlier rungs
     policy: SHA-256 of the trained policy's file; None if there is no policy, or if an older version wrote the record
     costs: costs of eyes and brain (`evolve.config.costs`); 0 for a failed candidate
     """
@@ -66,7 +66,7 @@ class Candidate:
 
     @property
     def place(self) -> Place:
-        """Place of the candidate in the search."""
+        """Id of the candidate, its generation, and its number in this generation."""
         return Place(self.id, self.generation, self.index)
 
     @property
@@ -89,7 +89,7 @@ class Candidate:
         outcome: Evaluation,
         parents: tuple[int, ...] = (),
     ) -> Candidate:
-        """Return the candidate at `place` with its outcome, as a record can store it (see `recordable`).
+        """Return a candidate with this place and outcome; values that cannot be stored are changed (see `recordable`).
 
         A candidate whose fitness is not finite counts as failed. No costs are subtracted yet; see `charged`.
 
@@ -108,10 +108,11 @@ class Candidate:
         return self if free else replace(self, fitness=self.fitness - costs, costs=self.costs + costs)
 
     def recordable(self) -> Candidate:
-        """Return the candidate as a record restores it: with escaped, shortened text, and NaN for infinity in a list.
+        """Return the candidate as it is after it has been written to a run's record and read back.
 
-        If a value of the outcome has the wrong type or is outside the range that a record allows, the candidate counts
-        as failed. Of its outcome, only the reason remains, and seconds and episode failures if they can be recorded.
+        Invalid characters in messages are escaped, long messages are shortened, and infinity in a list becomes NaN. If
+        a value of the outcome has the wrong type or is outside the range that a record allows, the candidate counts as
+        failed. `failure` then states why; `seconds` and `episode_failures` are kept if both can be recorded.
 
         Raises:
             ValueError: another value, such as the genome or the seed, cannot be recorded.
@@ -130,7 +131,7 @@ class Candidate:
         return replace(self, **{**vars(Evaluation.failed(failure)), **kept}, policy=None, costs=0.0)
 
     def _restored(self) -> Candidate:
-        """Return the candidate after writing its line and reading this line back.
+        """Return the candidate that results from converting this one to a line of the record and reading the line.
 
         Raises:
             ValueError: a value cannot be written or read back; the message states the reason.
@@ -163,7 +164,7 @@ class Candidate:
 
     @classmethod
     def from_line(cls, line: str) -> Candidate:
-        """Return the candidate from a line that `to_line` returned, in this or an older version.
+        """Return the candidate from a line that `to_line` of this or an older version of rhabdom returned.
 
         Raises:
             ValueError: the line is invalid; the message states the reason.
@@ -278,7 +279,7 @@ def _text(value: Any, name: str) -> str | None:
 
 
 def _checksum(value: Any) -> str | None:
-    """Return the SHA-256 of a policy's file, or None, after a check.
+    """Return the given value if it is a valid SHA-256 of a policy's file, or None.
 
     Raises:
         ValueError: the value is neither a SHA-256 in hexadecimal digits nor None.
@@ -289,7 +290,7 @@ def _checksum(value: Any) -> str | None:
 
 
 def _json_value(value: Any) -> Any:
-    """Return a value with None in place of infinity and NaN, which JSON cannot represent, and with escaped text."""
+    """Return a value that JSON can represent: infinity and NaN become None, and lone surrogates in text are escaped."""
     if isinstance(value, dict):
         return {key: _json_value(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):

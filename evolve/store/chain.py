@@ -40,7 +40,7 @@ class Chain:
         return body[:-1] + FIELD + self._next(body) + b'"}\n'
 
     def after(self, line: bytes) -> Chain:
-        """Return the state after one more line. The line may end with a line feed.
+        """Return the state of the checksums after one more line. The line may end with a line feed.
 
         Raises:
             ValueError: the checksum of the line does not match, or is missing although earlier lines have checksums.
@@ -77,7 +77,8 @@ def without_checksum(line: bytes) -> bytes:
 def _split(line: bytes) -> tuple[bytes, bytes | None]:
     """Return a line without its checksum, and the checksum, which is None if the line has none.
 
-    Quotation marks in texts are escaped, so the name of the field cannot be part of a text.
+    A line is a JSON object, and its last field "checksum" is found by its name in quotation marks. JSON escapes
+    quotation marks within strings, so a string of another field cannot be mistaken for this name.
     """
     body, field, rest = line.rpartition(FIELD)
     if not field or REST.fullmatch(rest) is None:

@@ -32,7 +32,7 @@ def digest(path: Path) -> str | None:
 
 
 def list_checksums(folder: Path, files: Iterable[Path]) -> None:
-    """Add the checksums of EXR files to the list of their folder. Entries of other files are kept.
+    """Add the checksums of EXR files to the file SHA256SUMS in their folder. Entries of other files are kept.
 
     Raises:
         OSError: a file cannot be read, or the list cannot be written.
@@ -46,8 +46,9 @@ def list_checksums(folder: Path, files: Iterable[Path]) -> None:
 def harmed(folder: Path) -> str | None:
     """Return a message about the EXR files in a folder that do not match their checksums; None if all match.
 
-    Deleted files are not reported, because they can be exported again. If a file or the list cannot be read, or if the
-    files are larger than 4 GiB together, the message says so instead.
+    The checksums are those in the folder's list, the file SHA256SUMS. Deleted files are not reported, because they can
+    be exported again. If an EXR file or the list cannot be read, or if the EXR files are larger than 4 GiB together,
+    the message says so instead.
     """
     try:
         known = {match[2]: match[1] for line in _lines(folder) if (match := ENTRY.fullmatch(line))}

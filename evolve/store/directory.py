@@ -2,9 +2,9 @@
 
 config.toml        every setting
 versions.json      versions of the software at each start of the run
-candidates.jsonl   the record: one line per evaluated candidate and rung, in order of completion
+candidates.jsonl   the record: one line for each evaluation of a candidate, in order of completion
 policies/          trained policies
-trainings/         checkpoints of training runs that may still continue with their next rung
+trainings/         checkpoints of training runs that may continue with their next part (rung)
 lock               file that the process working on the run has locked
 """
 
@@ -48,14 +48,14 @@ class Run:
     _lock: RunLock | None = None
 
     def __repr__(self) -> str:
-        """Return a short description, because a record may be long."""
+        """Return a short description, without the candidates, of which there may be thousands."""
         best = "" if self.best is None else f", best fitness {self.best.fitness:.4g}"
         evaluated = f"{len(self.candidates)} of {self.config.candidates} candidates evaluated"
         return f"<Run {str(self.path)!r}: {self.config.task}, {evaluated}{best}>"
 
     @classmethod
     def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Self:
-        """Create a run in a directory that does not exist, is empty, or contains only remains of a killed creation.
+        """Create a run in a directory that is missing or empty, or has only files of a process killed in this function.
 
         origin: "RUN:ID", the animal whose genes are the start values; None if there is no such animal
 
@@ -91,7 +91,7 @@ class Run:
             RunError: the directory does not exist or contains no run, or the record cannot be read. Without
                 `before_damage`, a damaged line of the record is also an error; the message names the line.
             ConfigError: the config is invalid, or the named task differs from the run's, cannot be read or has changed.
-            StrangeFileError: a file is not a regular file, a folder is not a folder, or config.toml is too large.
+            StrangeFileError: a path of the run is not the file or folder that it must be, or config.toml is too large.
             OSError: config.toml cannot be read.
         """
         path = Path(path)
@@ -178,8 +178,8 @@ class Run:
         """Append a candidate to the record, and synchronise the file with the disk.
 
         Raises:
-            RunError: the candidate is already on record or cannot be restored from it, another process has changed the
-                record, or the record cannot be written; earlier lines remain intact.
+            RunError: the record contains the candidate already, its line could not be read back, another process has
+                changed the record, or the record cannot be written. Earlier lines remain intact.
         """
         if self._lock is not None and not self._lock.stands:
             raise RunError(f"{self.record.path}: was changed by another process; nothing is added")
@@ -252,11 +252,11 @@ class Run:
         return list(self.record.lines.values())
 
     def on_record(self, candidate_id: int, rung: int) -> Candidate | None:
-        """Return the candidate as recorded after a rung; None if it has not been evaluated after this rung."""
+        """Return the record of a candidate after a rung (part of its training); None if there is no such record."""
         return self.record.lines.get((candidate_id, rung))
 
     def steps_of(self, candidate_id: int) -> int:
-        """Return the number of training steps of a candidate after all recorded rungs; 0 if there are none."""
+        """Return the number of steps in the recorded parts (rungs) of a candidate's training; 0 if none is recorded."""
         steps = rung = 0
         while (line := self.on_record(candidate_id, rung)) is not None:
             steps, rung = max(steps, line.steps), rung + 1
@@ -284,7 +284,7 @@ def _require_no_run(path: Path) -> None:
 
 
 def _require_plain(path: Path) -> None:
-    """Check that those files of a run that exist are regular files, and that those folders that exist are folders."""
+    """Check that a run's existing files are regular files, and that its existing folders are directories."""
     for name in (CONFIG, VERSIONS, CANDIDATES, RunLock.NAME):
         require_regular(path / name)
     for name in (POLICIES, TRAININGS, *PRODUCTS):

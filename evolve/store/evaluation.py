@@ -22,8 +22,8 @@ class Evaluation:
     success_rate: fraction of the evaluation episodes that were solved
     steps: number of agent steps in training
     seconds: wall time of training and evaluation [s]
-    curve: learning curve: (training steps, mean return) of each evaluation during training. These evaluations select
-        the policy, and play other episodes than those of `returns`
+    curve: learning curve: (training steps, mean return) of each evaluation during training. The policy with the highest
+        mean return is kept. The episodes of these evaluations are not among those of `returns`
     failure: message in one line; None if the candidate did not fail
     episode_failures: (message in one line, number of episodes that ended with it), the most frequent first. The last
         entry may be the total of all other messages, see `most_frequent`
@@ -65,7 +65,7 @@ def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
 
 
 def total_episode_failures(*parts: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
-    """Sum the episode failures of several parts of a training run, and return the `most_frequent` of them."""
+    """Sum the episode failures over several parts of a training run, and shorten the sums with `most_frequent`."""
     counts: Counter[str] = Counter()
     for part in parts:
         counts.update(dict(part))

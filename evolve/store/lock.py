@@ -66,7 +66,7 @@ class RunLock:
 
     @property
     def stands(self) -> bool:
-        """True if this process holds the lock, and the lock file is still the run's.
+        """True if this process holds the lock, and the locked file is still the file `lock` in the run directory.
 
         It is False if the run directory has been deleted, or deleted and created again.
         """

@@ -1,8 +1,8 @@
-"""The record of a run, candidates.jsonl: one line per evaluated candidate and rung, in the order of completion.
+"""The record of a run, candidates.jsonl: one line for each evaluation of a candidate, in order of completion.
 
-When a record is read, the values of every line are checked, and its checksum if it has one (`evolve.store.chain`).
-Candidates are appended. Only the repair of a run removes lines: an unfinished last line, or a damaged line and all
-lines after it.
+A candidate is evaluated after each part (rung) of its training. When a record is read, the values of every line are
+checked. If a line has a checksum (`evolve.store.chain`), this is also checked. Candidates are appended. Only the repair
+of a run removes lines: an unfinished last line, or a damaged line and all lines after it.
 """
 
 from __future__ import annotations
@@ -100,10 +100,12 @@ class Record:
         return False
 
     def _leave_out(self, damage: str) -> None:
-        """Ignore a damaged line and all lines after it.
+        """Ignore a damaged line and all lines after it, if the field `before_damage` is True.
+
+        damage: message about the damaged line
 
         Raises:
-            RunError: `before_damage` is false.
+            RunError: `before_damage` is False, so that a damaged line is an error.
         """
         if not self.before_damage:
             raise RunError(f"{damage}; --before-damage uses only the {len(self.lines)} lines before it")
@@ -118,8 +120,8 @@ class Record:
         """Append a candidate, and synchronise the file with the disk.
 
         Raises:
-            RunError: the candidate is already on record or cannot be restored from it, another process has changed the
-                record, or the record cannot be written; earlier lines remain intact.
+            RunError: the record contains the candidate already, its line could not be read back, another process has
+                changed the record, or the record cannot be written. Earlier lines remain intact.
         """
         if (candidate.id, candidate.rung) in self.lines:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
@@ -142,7 +144,10 @@ class Record:
         self.candidates = _with(self.candidates, candidate)
 
     def cut_off_unused(self) -> None:
-        """Remove ignored lines from the file. If one of them is damaged, first copy the file to `*.damaged-N`.
+        """Remove from the file the lines that were ignored when it was read.
+
+        These are an unfinished last line, or a damaged line and all lines after it. If there is a damaged line, the
+        file is first copied to `candidates.jsonl.damaged-N`.
 
         Raises:
             RunError: the file cannot be written.
@@ -166,10 +171,14 @@ class Record:
 
 
 def _require_readable(candidate: Candidate, path: Path) -> None:
-    """Check that the line of a candidate restores an equal candidate. Results of `Candidate.recordable` pass the check.
+    """Check that a candidate stays the same if it is written as a line of the record and read back from this line.
+
+    Results of `Candidate.recordable` pass the check.
+
+    path: file of the record, for the message
 
     Raises:
-        RunError: the line would restore a different candidate, or could not be read back.
+        RunError: reading the line back would give a different candidate, or would fail.
     """
     try:
         if candidate == candidate.recordable():
@@ -181,13 +190,23 @@ def _require_readable(candidate: Candidate, path: Path) -> None:
 
 
 def _furthest(lines: Lines) -> tuple[Candidate, ...]:
-    """Return each candidate as recorded after the last rung that it has reached, in the order of ids."""
+    """Return the latest record of each candidate, in the order of ids.
+
+    A record has a line for each rung (part of training) that a candidate has completed; the line of the last rung
+    counts.
+    """
     furthest = {candidate_id: lines[candidate_id, rung] for candidate_id, rung in sorted(lines)}
     return tuple(furthest.values())
 
 
 def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
-    """Return the result of `_furthest` after the line of `new` is added, without a pass over all lines."""
+    """Return the candidates of a run's record, in the order of ids, after `new` has been appended to the record.
+
+    A record has a line for each rung of training that a candidate has reached. The line of the last rung counts.
+    `_furthest` would return the same candidates, but would read all lines again.
+
+    candidates: result of `_furthest` before `new` is appended
+    """
     at = bisect_left(candidates, new.id, key=lambda candidate: candidate.id)
     known = at < len(candidates) and candidates[at].id == new.id
     if known and candidates[at].rung > new.rung:

@@ -108,7 +108,7 @@ def folder(path: Path) -> Path:
 def folders(path: Path, exist_ok: bool = True) -> None:
     """Create a folder and its missing parents, so that they survive a power failure.
 
-    The new entries are synchronised with the disk, except in a parent folder that this process may not read.
+    The new entries are synchronised with the disk, except in a parent folder that this process has no right to read.
 
     exist_ok: False to refuse a path that exists
 

@@ -98,8 +98,8 @@ def machines(run: Path) -> list[str]:
 def run_id(run: Path) -> str:
     """Return the id of a run, which does not depend on its directory: 16 hexadecimal digits of a SHA-256.
 
-    It is computed from all entries of the first start, such as the time, the checksums of the settings, and the
-    versions. If no start is recorded, it is "".
+    The id is computed from everything that versions.json records about the first start of the run, such as the time,
+    the checksums of the settings, and the versions of the software. If no start is recorded, the id is "".
     """
     starts = _starts(run)
     return hashlib.sha256(json.dumps(starts[0], sort_keys=True).encode()).hexdigest()[:16] if starts else ""
@@ -132,7 +132,7 @@ def provenance(run: Path) -> dict[str, Any]:
 def config_change(run: Path, candidates: int) -> str | None:
     """Return a message if a run's config.toml has changed since the last start of the run; None otherwise.
 
-    If an older version of rhabdom made the last start, no checksum of the file is recorded. Only changes of settings
+    If an older version of rhabdom last started the run, no checksum of the file is recorded. Only changes of settings
     that influence training and evaluation are then noticed.
 
     candidates: number of candidates that have been evaluated
@@ -167,12 +167,15 @@ def fingerprint(config: str) -> str:
 
 
 def _checksums(config: bytes) -> dict[str, str]:
-    """Return the fingerprint and the checksum of a config.toml."""
+    """Return the SHA-256 of a config.toml ("config") and its `fingerprint` ("settings").
+
+    The fingerprint covers only the settings that influence training and evaluation.
+    """
     return {"settings": fingerprint(config.decode()), "config": hashlib.sha256(config).hexdigest()}
 
 
 def record_start(run: Path, candidates: int, origin: str | None = None, config: bytes | None = None) -> None:
-    """Record a start of a run, with the present versions, in versions.json.
+    """Add a start of a run to versions.json, with the time, this machine, and the present software versions.
 
     candidates: number of candidates that have been evaluated before this start
     origin: "RUN:ID", the animal whose genes are the start values; None if there is no such animal
@@ -194,13 +197,16 @@ def record_start(run: Path, candidates: int, origin: str | None = None, config: 
 
 
 def origin(run: Path) -> str | None:
-    """Return the animal whose genes were the start values of a run, such as "runs/first:12"; None if there is none."""
+    """Return "RUN:ID" of the animal whose genes were the start values of a run; None if there is no such animal."""
     starts = _starts(run)
     return str(starts[0]["from"]) if starts and "from" in starts[0] else None
 
 
 def _starts(run: Path) -> list[dict[str, Any]]:
-    """Return the recorded starts of a run; [] if versions.json is missing or damaged, since a run does not need it."""
+    """Return one entry of versions.json for each start of a run.
+
+    The result is [] if the file is missing or damaged. This is no error, because a run does not need the file.
+    """
     try:
         starts = json.loads(read(run / FILE, LARGEST_FILE))
         return [start for start in starts if isinstance(start["versions"], dict)]

@@ -1,7 +1,7 @@
-"""Camera eyes of vertebrates and a spider. Each covers a patch of the retina; `goldfish_lens` returns a lens alone.
+"""Camera eyes of vertebrates and a spider. Each eye has only a patch of retina; `goldfish_lens` returns a lens alone.
 
-The receptors of an `optics.Eye` form a square lattice. Its pitch is chosen so that it resolves the same finest grating
-as the animal or its retina, according to the source.
+The receptors of an `optics.Eye` form a square lattice. The distance between receptors is chosen so that the finest
+grating that the lattice resolves is the finest that the source reports, either for the animal or for its retina.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ def human(receptors_across: int = 60, pupil_diameter: float = 3e-3) -> Eye:
 def mouse(receptors_across: int = 40, pupil_diameter: float = 1e-3) -> Eye:
     """Return a patch of a mouse's retina with the acuity found in behavioural tests, 0.5 cycles/degree.
 
-    Source of the receptors, 360 and 508 nm: Abballe & Asari, PLoS ONE 17, e0262763, 2022. The acuity (Prusky et al.
-    2000) and 31 µm of retina per degree (Remtulla & Hallett 1985) are quoted from later articles; the original articles
-    have not been read. Mice pool many receptors, so the patch has one receptor for each pool.
+    The receptors are most sensitive at 360 and 508 nm (Abballe & Asari, PLoS ONE 17, e0262763, 2022). The acuity
+    (Prusky et al. 2000) and 31 µm of retina per degree (Remtulla & Hallett 1985) are quoted from later articles; the
+    original articles have not been read. Mice pool many receptors, so the patch has one receptor for each pool.
 
     receptors_across: pools along each side of the patch, 1 to 1000.
     pupil_diameter: diameter [m] of the pupil.
@@ -80,7 +80,7 @@ def eagle(receptors_across: int = 60) -> Eye:
     """Return the deep fovea of a wedge-tailed eagle, *Aquila audax*.
 
     Source: Reymond, Vision Research 25, 1477, 1985 (abstract): the retina resolves 140 cycles/degree, and the optics
-    resolve 157 at the smallest pupil. A pupil with this cutoff at 550 nm is 4.9 mm wide. No source has been read for
+    resolve 157 at the smallest pupil. A pupil with this cutoff at 550 nm is 4.9 mm wide. No source was consulted for
     the nodal distance of 22 mm, which does not affect any angle. The pigment at 567 nm is that of long-wavelength cones
     of birds, because no pigment of an eagle was found.
 
@@ -138,11 +138,11 @@ SPIDER_EYES = {"principal": (2.4, 780e-6, 1980e-6), "secondary": (42.0, 380e-6, 
 
 
 def jumping_spider(receptors_across: int = 30, eye: str = "principal") -> Eye:
-    """Return an eye of the jumping spider *Portia*, with the receptors "jumping_spider".
+    """Return an eye of the jumping spider *Portia* with a square patch of retina and the receptors "jumping_spider".
 
     Source for the principal eyes, with 2.4 minutes of arc between receptors: Land, in Neurobiology of Arachnids, p. 53,
-    1985, after Williams & McIntyre, Nature 288, 578, 1980. No source has been read for the widths and focal lengths of
-    the lenses, nor for the 0.7° between receptors of the secondary (anterior lateral) eyes.
+    1985, after Williams & McIntyre, Nature 288, 578, 1980. No source was consulted for the widths and focal lengths of
+    the lenses, or for the 0.7° between receptors of the secondary (anterior lateral) eyes.
 
     receptors_across: receptors along each side of the patch, 1 to 1000.
     eye: "principal" or "secondary".

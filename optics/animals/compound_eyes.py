@@ -1,4 +1,7 @@
-"""Compound eyes of insects and of a crustacean. `optics.receptors_of` returns the receptors that a summary names.
+"""Compound eyes of insects and of a crustacean.
+
+The function `optics.receptors_of` returns the receptors of an insect's eye, for example for the name "honeybee". The
+docstring of each insect's eye states the name to use.
 
 All rhabdoms and rhabdomeres have the refractive index 1.363 in a medium of index 1.340. These are values for flies
 (Stavenga, J. Comp. Physiol. A 190, 115, 2004). Measured indices of the other animals are not used.
@@ -74,12 +77,14 @@ HONEYBEES = {
 
 
 def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
-    """Return an eye of a worker honeybee, for the receptors "honeybee".
+    """Return an eye of a worker honeybee.
 
-    Source: Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1. The diameters of
-    rhabdoms follow from the article's acceptance angles, which are diameter / focal length. The mean interommatidial
-    angle of 2.1° is an estimate for all four species. It assumes that the 5432 facets of *Apis mellifera* cover a
-    hemisphere.
+    Its receptors are those that `optics.receptors_of("honeybee")` returns.
+
+    Source: Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1. The article
+    computes acceptance angles as the rhabdom's diameter divided by the focal length. The diameters are derived from
+    these angles. The mean interommatidial angle of 2.1° is an estimate for all four species. It assumes that the 5432
+    facets of *Apis mellifera* cover a hemisphere.
 
     species: "mellifera", "cerana", "florea" or "dorsata".
     rings: rings of ommatidia around the central one.
@@ -91,11 +96,13 @@ def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
 
 
 def fruit_fly(rings: int = 15) -> AppositionEye:
-    """Return an eye of *Drosophila melanogaster* with the rhabdomeres R1-6, for the receptors "fruit_fly".
+    """Return an eye of *Drosophila melanogaster* with the rhabdomeres R1-6.
 
-    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. Typical values, for which no source has
-    been read, are the facet's diameter of 16 µm, the rhabdomere's diameter of 1.9 µm and length of 80 µm, and the
-    interommatidial angle of 5°.
+    Its receptors are those that `optics.receptors_of("fruit_fly")` returns.
+
+    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. The facet's diameter of 16 µm, the
+    rhabdomere's diameter of 1.9 µm and length of 80 µm, and the interommatidial angle of 5° are typical values. No
+    source was consulted for them.
 
     rings: rings of ommatidia around the central one. 15 rings have 721 ommatidia.
 
@@ -106,12 +113,14 @@ def fruit_fly(rings: int = 15) -> AppositionEye:
 
 
 def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
-    """Return the frontal eye of a blowfly, *Calliphora*, with the rhabdomeres R1-6, for the receptors "blowfly".
+    """Return the frontal eye of a blowfly, *Calliphora*, with the rhabdomeres R1-6.
+
+    Its receptors are those that `optics.receptors_of("blowfly")` returns.
 
     Source: Stavenga, J. Exp. Biol. 207, 1703, 2004, fig. 4: facets of 25 µm, an F-number of 2.2, and rhabdomeres with
     tips of 1.4 to 2 µm and a length of 250 µm, which taper to 1 µm at their ends. In the article, the taper is a
-    parabola whose equation has not been read; here it is linear. The interommatidial angle of 1.3° is a typical value,
-    for which no source has been read.
+    parabola. Here it is linear, because the equation of the parabola was not available. The interommatidial angle of
+    1.3° is a typical value, for which no source was consulted.
 
     rings: rings of ommatidia around the central one.
     rhabdomere: diameter [m] of the rhabdomere's tip. Rhabdomeres of at most 1 µm do not taper.
@@ -125,11 +134,13 @@ def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
 
 
 def dragonfly(rings: int = 20) -> AppositionEye:
-    """Return the acute zone of a dragonfly, for the receptors "dragonfly".
+    """Return the acute zone of a dragonfly's eye, the region with the smallest angles between ommatidia.
+
+    Its receptors are those that `optics.receptors_of("dragonfly")` returns.
 
     Source of the interommatidial angle of 0.24°: Land, Annu. Rev. Entomol. 42, 147, 1997. The facet's diameter of 62 µm
-    is quoted from Sherk 1978, which has not been read. No source has been read for the focal length of three diameters,
-    or for the rhabdom of 2 µm by 500 µm.
+    is that of Sherk 1978, which was not consulted itself. No source was consulted for the focal length of three facet
+    diameters, or for the rhabdom's diameter of 2 µm and length of 500 µm.
 
     rings: rings of ommatidia around the central one.
 
@@ -140,12 +151,14 @@ def dragonfly(rings: int = 20) -> AppositionEye:
 
 
 def megalopta(rings: int = 10) -> AppositionEye:
-    """Return an eye of the nocturnal bee *Megalopta genalis*, for the receptors "honeybee".
+    """Return an eye of the nocturnal bee *Megalopta genalis*.
 
-    Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. The facet's diameter of 36 µm, the focal length of
-    97 µm, the rhabdom's diameter of 8 µm and length of 350 µm, and the interommatidial angle of 1.4° are quoted from
-    later articles. Only the abstract has been read: the facets are nearly twice as wide and the rhabdoms four to five
-    times as wide as those of bees that are active by day.
+    Its receptors are those that `optics.receptors_of("honeybee")` returns.
+
+    Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. Only the abstract of this article has been read.
+    It states that the facets are nearly twice as wide and the rhabdoms four to five times as wide as those of bees that
+    are active by day. The facet's diameter of 36 µm, the focal length of 97 µm, the rhabdom's diameter of 8 µm and
+    length of 350 µm, and the interommatidial angle of 1.4° are quoted from later articles.
 
     rings: rings of ommatidia around the central one.
 
@@ -160,8 +173,8 @@ def cirolana() -> Eye:
 
     Source of the facet's diameter of 150 µm and of this angle: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981.
     The rhabdom has too many modes to be modelled as a waveguide, and the focus of the lens lies below the rhabdom's
-    tip. The eye is therefore modelled as a lens in front of a single square receptor of 45°. No source has been read
-    for the focal length of 100 µm, which does not affect the acceptance angle.
+    tip. The eye is therefore modelled as a lens in front of a single square receptor of 45°. No source was
+    consulted for the focal length of 100 µm, which does not affect the acceptance angle.
     """
     focal = 100e-6
     pupil = Pupil(75e-6, thin_lens_focal_length=focal, medium_n=CRUSTACEAN_N)

@@ -12,8 +12,8 @@ pixelated      any shape, divided into pixels
 outline        edges and their crossings with lines
 strips         quadrature over the area inside an outline
 soft_edge      kernel that softens an edge
-curved_disk    curved waves behind disks and rings, convolved with this kernel
-soft_polygon   polygons convolved with this kernel
-soft_outline   straight segments and arcs convolved with this kernel
+curved_disk    converging and diverging waves behind disks and rings with a soft edge
+soft_polygon   polygons with a soft edge
+soft_outline   openings with a soft edge, bounded by straight segments and arcs
 triangulation  polygons as triangles
 """

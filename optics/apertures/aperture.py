@@ -135,12 +135,12 @@ class Aperture(ABC):
         """
 
     def nodes(self, cycles: float, digits: float) -> Nodes:
-        """Return quadrature nodes for integrands with spatial frequencies up to `cycles` cycles per R.
+        """Return quadrature nodes for integrands with spatial frequencies up to `cycles` cycles per pupil radius.
 
         For integrands of at most 1, sums over the nodes have an error of at most 10^-digits times the area.
 
-        The limit `cycles` applies to the local frequency of the integrand at every point and in every direction.
-        Frequencies of a varying amplitude count as well.
+        The limit `cycles` applies to the local frequency of the integrand at every point and in every direction. If the
+        amplitude of the integrand varies, the frequencies of this variation count as well.
 
         Raises:
             ValueError: cycles is outside [0, 1e5], or digits is outside [0, 16].
@@ -155,8 +155,9 @@ class Aperture(ABC):
         """Return the aperture after a low-pass filter.
 
         The filter leaves frequencies up to `passband` [cycles per pupil radius] unchanged, to within `ripple`. The soft
-        edge extends at most `widest_reach` [pupil radii] beyond the aperture. Within this limit, the filter has the
-        transition width that needs the fewest samples.
+        edge extends at most `widest_reach` [pupil radii] beyond the aperture. Within this limit, the
+        width of the filter's transition from pass band to stop band is chosen so that the soft aperture needs the
+        fewest samples.
 
         Raises:
             ValueError: passband is outside [0, 1e90], ripple is outside [1e-13, 0.5], or widest_reach is not positive.
@@ -169,8 +170,8 @@ class Aperture(ABC):
     def with_edge(self, passband: float, stopband: float, ripple: float) -> SoftAperture:
         """Return the aperture after a low-pass filter that falls between two frequencies [cycles per pupil radius].
 
-        Frequencies below `passband` stay unchanged and those above `stopband` vanish, to within `ripple`. `soften`
-        chooses the stopband itself.
+        Frequencies below `passband` stay unchanged and those above `stopband` vanish, to within `ripple`. The method
+        `soften` is given no stopband: it chooses the one that needs the fewest samples.
         """
         return _with_edge(self, SoftEdge(passband, stopband, ripple))
 

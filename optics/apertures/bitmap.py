@@ -64,7 +64,7 @@ class Bitmap(ReadOnlyArrays):
 
 
 def _runs(image: np.ndarray) -> np.ndarray:
-    """Return the edges between open and closed pixels of successive rows as segments (n, 2, 2), with two ends (x, y).
+    """Return the edges along x between open and closed pixels, as positions (x, y) of their ends, array (edge, end, 2).
 
     Adjoining edges are merged.
     """

@@ -34,7 +34,7 @@ Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """Pieces of an edge that separate open from closed areas.
+    """The edge of an opening, in pieces: straight segments and circular arcs.
 
     segments: (n, 2, 2), straight pieces, with the opening on their left.
     arcs: (m, 6), the five numbers of `Outline.arcs`, then 1 if the opening lies on the side of the arc's centre, else
@@ -97,9 +97,13 @@ def boundary(pieces: Outline, contains: Contains) -> Boundary:
 
 
 def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
-    """Compare the outline with `contains` along horizontal lines through the pieces, at most 400 lines.
+    """Compare the computed outline of an opening with `contains`, along at most 400 horizontal lines.
 
-    Area and quadrature use the outline alone, so they would not reveal a missing shape.
+    The area and the quadrature follow from the outline alone. Without this comparison, a shape that is missing in the
+    outline would remain unnoticed.
+
+    pieces: edges of all shapes. The lines pass through them.
+    contains: see `boundary`.
 
     Raises:
         ValueError: outline and `contains` differ at a tested point. Gaps narrower than NARROW are not tested.
@@ -140,7 +144,10 @@ def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Cont
 
 
 def _first_of_coincident(middle: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Return a mask (n,) of the pieces that do not coincide with an earlier piece; arguments as in `_edges`."""
+    """Return a mask (n,) of the pieces of edges that do not coincide with an earlier piece.
+
+    middle, left: midpoints of the pieces, and unit normals that point to their left, (n, 2) each.
+    """
     first = np.ones(len(middle), dtype=bool)
     if len(middle):
         pairs = KDTree(middle).query_pairs(NEIGHBOURS, output_type="ndarray")
@@ -249,7 +256,10 @@ def _of_circles(arc: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _between(places: np.ndarray, low: float, high: float, shortest: float) -> np.ndarray:
-    """Return `low`, `high` and the places between them, in ascending order and at least `shortest` apart."""
+    """Return `low`, `high` and the places between them, in ascending order.
+
+    A place is omitted if it lies within `shortest` of the next lower place, of `low` or of `high`.
+    """
     inside = np.sort(places[(places > low + shortest) & (places < high - shortest)])
     kept = inside[np.diff(inside, prepend=low) > shortest]
     return np.concatenate([[low], kept, [high]])

@@ -122,7 +122,10 @@ class SoftAnnulus(SoftAperture):
 
 @lru_cache(maxsize=512)
 def disk_table(edge: SoftEdge, radius: float) -> Interpolant:
-    """Return the transmittance of a soft disk of this radius across its edge, as a table of `disk_profile`."""
+    """Return a table of the transmittance within the soft edge of a disk, as a function of the distance from its axis.
+
+    `disk_profile` computes the values.
+    """
     ends = radius - edge.reach, radius + edge.reach
     return Interpolant.from_function(
         lambda rho: disk_profile(edge, radius, rho), ends, 2 * edge.cycles, edge.ripple / 4
@@ -133,9 +136,10 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
     """Return the transmittance of a soft disk at distances ρ from its axis, by quadrature. It is an even function of ρ.
 
     A(ρ) = ∫ g(r) r θ(ρ, r) dr, where g is the kernel and R the radius of the disk. θ = 2 arccos((ρ² + r² - R²)/(2ρr))
-    is the angle over which a circle of radius r about the point at ρ lies inside the disk. It varies only for r from
-    |ρ - R| to ρ + R, and like a square root near both ends. Let s be the length of this range within the kernel's
-    reach. The substitution r = |ρ - R| + s sin²(πu/2), with u from 0 to 1, makes the integrand smooth.
+    is the angle over which a circle of radius r about the point at ρ lies inside the disk. The angle θ varies only for
+    r from |ρ - R| to ρ + R. Near both ends of this range, it varies like a square root. Let s be the length of this
+    range within the kernel's reach. The substitution r = |ρ - R| + s sin²(πu/2), with u from 0 to 1, makes the
+    integrand smooth.
     """
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
@@ -154,11 +158,11 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
     """Return nodes over a ring: Gauss-Legendre nodes along the radius, and equidistant nodes around each circle.
 
     Smaller circles have fewer nodes. The rule represents the edge exactly and converges spectrally. Over a full disk,
-    the integrand's mean on the circle of radius r is a smooth function of r². For few cycles, a rule in r² therefore
-    needs fewer nodes.
+    the integrand's mean on the circle of radius r is a smooth function of r². For low spatial frequencies,
+    Gauss-Legendre nodes along r² instead of r are therefore fewer, and are used.
 
     cycles: highest spatial frequency of the integrand [cycles per pupil radius].
-    digits: digits of the integral, relative to the area.
+    digits: number of accurate digits. For integrands of at most 1, the error is at most 10^-digits times the area.
     """
     r, weight, count = _ring_rule(inner, outer, cycles, digits)
     place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)

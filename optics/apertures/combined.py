@@ -105,7 +105,7 @@ def union(*shapes: Shape) -> Combined:
 
 
 def difference(shape: Shape, *closed: Shape) -> Combined:
-    """Return an aperture that is open where the first shape is open and all others are closed, within the pupil.
+    """Return an aperture whose open part is the part of the first shape within the pupil and outside all other shapes.
 
     `difference(Annulus(0.3), Spider(4, 0.02))` is the aperture of a telescope.
 
@@ -134,8 +134,9 @@ def hexagonal_segments(
     rings: number of rings, 0 to 12.
     gap: gap between neighbours, in units of the distance between their centres.
     rotation_deg: counterclockwise rotation of the mirror. At 0 the hexagons have corners in the direction of x.
-    without: numbers of omitted segments. Segment 0 is the central one. Numbers continue ring by ring, counterclockwise
-        from `rotation_deg` + 30 degrees. The mirror of the James Webb telescope has 2 rings without segment 0.
+    without: numbers of omitted segments. Segment 0 is the central one. Numbers continue ring by ring. In each ring,
+        they run counterclockwise from the segment in the direction `rotation_deg` + 30 degrees. The mirror of the James
+        Webb telescope has 2 rings without segment 0.
 
     Raises:
         ValueError: rings is outside 0 to 12, gap is outside [0, 0.999], the angle is not finite, a segment in `without`

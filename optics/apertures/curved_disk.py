@@ -1,8 +1,9 @@
-"""Converging and diverging waves behind disks and rings, convolved with the kernel of a soft edge.
+"""Converging and diverging waves behind disks and rings. The waves are convolved with the kernel of a soft edge.
 
-A curved wave contains all directions from the direction at its centre to the direction at its rim. After the
-convolution, it contains only directions up to the stopband of the kernel. Light that leaves in other directions is
-removed, and light up to the passband, including the light that the hard edge diffracts, stays unchanged.
+A curved wave contains all directions from the direction at its centre to the direction at its rim. Each direction
+corresponds to a spatial frequency, and the convolution acts as a low-pass filter. It removes light in directions beyond
+the stopband of the kernel. In directions up to the passband of the kernel, all light stays unchanged. This includes
+light that the hard edge diffracts into these directions.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def curved_ring(edge: SoftEdge, inner: float, curvature: float, levels: int) -> 
 
     The wave e^{iπ c r²} passes the opening between the radii `inner` and 1, and is convolved with the kernel of the
     soft edge. The result is 1 where the kernel changes nothing. The values of r² lie in the middle of equal steps from
-    0 to (1 + reach)².
+    0 to (1 + reach)², where `reach` is the radius beyond which the kernel is 0.
 
     curvature: c, the local frequency of the wave at the rim in cycles per radius.
     """
@@ -57,7 +58,11 @@ def _rule(first: float, last: float, cycles: float) -> tuple[np.ndarray, np.ndar
 
 @lru_cache(maxsize=16)
 def _weights(levels: int, count: int) -> np.ndarray:
-    """Return the weights (level, point) that interpolate from Chebyshev points to the middle of equal steps."""
+    """Return the weights that interpolate a function on [-1, 1] from Chebyshev points, array (level, point).
+
+    levels: number of equal steps into which [-1, 1] is divided; the function is interpolated in the middle of each
+    count: number of Chebyshev points
+    """
     return chebyshev_basis((2 * np.arange(levels) + 1) / levels - 1, count).astype(np.float32)
 
 

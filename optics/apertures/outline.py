@@ -1,4 +1,4 @@
-"""Edge of an opening, and its crossings with lines. Quadrature rules end exactly at these crossings."""
+"""Edge of an opening, and its crossings with lines. Integrals over the opening run along lines between crossings."""
 
 from __future__ import annotations
 
@@ -62,7 +62,10 @@ class Outline(ReadOnlyArrays):
         )
 
     def clearance(self, points: np.ndarray, least: float) -> np.ndarray:
-        """Return the distance (n,) of each point (n, 2) from the nearest piece, ignoring pieces closer than `least`."""
+        """Return the distance (n,) of each point (n, 2) from the outline.
+
+        Segments and arcs that are at most `least` away from a point are ignored.
+        """
         x, y = points.T
         found = np.full(len(points), np.inf)
         ends = self.ends
@@ -93,9 +96,12 @@ class Outline(ReadOnlyArrays):
         return np.concatenate(found)
 
     def crossings(self, y: np.ndarray) -> np.ndarray:
-        """Return the positions x at which the edge crosses horizontal lines at `y`, ascending, (line, crossing).
+        """Return the ascending positions x at which the edge crosses horizontal lines, array (line, crossing).
 
-        All lines must have the same number of crossings, so no `turning` height may lie between them.
+        All lines must cross the same segments and arcs. Between the lines, there must therefore be none of the heights
+        in `turning`.
+
+        y: heights of the lines, (line,)
         """
         y = np.asarray(y, dtype=np.float64)
         middle = float(y.mean())
@@ -128,7 +134,10 @@ class Outline(ReadOnlyArrays):
 
     @cached_property
     def turning(self) -> np.ndarray:
-        """Heights y at which the crossings of a horizontal line with the edge begin, end or pass a corner."""
+        """Heights y of the ends of all segments and arcs, and of the highest and lowest points of arcs.
+
+        All horizontal lines between two successive heights cross the same segments and arcs.
+        """
         _, cy, radius, begin, end = self.arcs.T
         corners = [cy + radius * np.sin(begin), cy + radius * np.sin(end)]
         tops = [
@@ -140,9 +149,12 @@ class Outline(ReadOnlyArrays):
 
     @cached_property
     def tangent(self) -> np.ndarray:
-        """Heights of the tops and bottoms of the circles to which the arcs belong, even if an arc ends before them.
+        """Heights of the tops and bottoms of the circles to which the arcs belong.
 
-        Near such a height, the position of a crossing changes like a square root.
+        They are included even if an arc does not extend to the top or bottom of its circle.
+
+        Near such a height, the position x at which an arc crosses a horizontal line changes with the height of the line
+        like a square root.
         """
         _, cy, radius, _, _ = self.arcs.T
         return read_only(np.unique(np.concatenate([cy - radius, cy + radius])))

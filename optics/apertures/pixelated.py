@@ -1,13 +1,14 @@
 """Quadrature over an opening that is tiled by pixels, for integrands that jump or bend at the borders between pixels.
 
-The phase of a relief of pixels jumps at their borders. The derivative of a spline with respect to one of its samples
-bends at the knots: it is a different polynomial in every cell between knots. These cells are then the pixels.
+One such integrand contains the phase of a relief of pixels, which jumps at their borders. Another one contains the
+derivative of a spline with respect to one of its samples. This derivative bends at the knots of the spline, because it
+is a different polynomial in every cell between knots. For such an integrand, "pixels" means these cells.
 
 Pixels that lie wholly inside have Gauss-Legendre nodes. Pixels that the opening's edge cuts can be treated in two ways.
-`PixelatedAperture.nodes` divides them into panels at the points where the edge enters and leaves them (see `strips`).
-If the nodes must lie on rows and columns, cut pixels have the same nodes as whole pixels, and
-`PixelatedAperture.weights` returns weights that integrate the interpolating polynomial over the open part of each
-pixel.
+`PixelatedAperture.nodes` divides a cut pixel into panels, which are horizontal bands, at the heights at which the edge
+enters or leaves the pixel (see `strips`). If the nodes must lie on rows and columns, cut pixels have the same nodes as
+whole pixels, and `PixelatedAperture.weights` returns weights that integrate the interpolating polynomial over the open
+part of each pixel.
 """
 
 from __future__ import annotations
@@ -35,11 +36,14 @@ MOST_NODES = 32
 
 @dataclass(frozen=True)
 class PixelatedAperture(Aperture):
-    """An opening tiled by count x count pixels that fill [-1, 1]². The integrand may jump or bend at their borders.
+    """An opening tiled by count x count pixels that fill [-1, 1]², for integrals over the opening.
+
+    The functions that are integrated may jump or bend at the borders between pixels.
 
     borders: ascending borders between pixels, from -1 to 1, the same along x and along y. None: all pixels are squares
         of the same size.
-    fixed: number of nodes along a pixel. None: the number depends on the requested cycles and digits.
+    fixed: number of quadrature nodes along a side of a pixel. None: each call of `nodes` chooses the number according
+        to its arguments `cycles`, the highest spatial frequency, and `digits`, the accuracy.
     """
 
     opening: Aperture
@@ -49,12 +53,20 @@ class PixelatedAperture(Aperture):
 
     @staticmethod
     def squares(opening: Aperture, count: int) -> PixelatedAperture:
-        """Return the opening with square pixels. Many pupils share the result with its masks of cut pixels."""
+        """Return the opening tiled by count x count square pixels of the same size.
+
+        Repeated calls return the same object. It keeps its masks of the pixels that the opening's edge cuts, so they
+        need not be computed for every pupil.
+        """
         return _squares(opening, count)
 
     @classmethod
     def between(cls, opening: Aperture, borders: tuple[float, ...], fixed: int | None = None) -> PixelatedAperture:
-        """Return the opening with pixels between these borders."""
+        """Return the opening tiled by pixels of different sizes.
+
+        borders: ascending borders between pixels, from -1 to 1, the same along x and along y.
+        fixed: see `PixelatedAperture`.
+        """
         return cls(opening, len(borders) - 1, borders, fixed)
 
     @property
@@ -77,9 +89,11 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Return the number of nodes along a pixel for rows and columns of nodes: `fixed`, if it is given.
+        """Return the number of quadrature nodes along a side of a pixel if all nodes lie on common rows and columns.
 
-        Otherwise the rows and columns are as accurate as the result of `nodes`. None: this would need more than 32.
+        The number is the field `fixed` if that is not None. Otherwise the integral over the pupil, a weighted sum over
+        the nodes, is as accurate with this number as with the nodes that `nodes` returns for the same arguments. None:
+        more than 32 nodes would be needed.
         """
         if self.fixed is not None:
             return self.fixed
@@ -101,15 +115,20 @@ class PixelatedAperture(Aperture):
         return float(self._widths.max())
 
     def rows(self, across: int) -> np.ndarray:
-        """Return the ascending positions of the rows (and of the columns) of nodes in pupil radii, (count · across,).
+        """Return the positions [pupil radii] of the rows of nodes, in ascending order, array (count · across,).
 
-        across: number of nodes along a pixel.
+        The columns have the same positions.
+
+        across: number of nodes along a side of a pixel.
         """
         u, _ = gauss_legendre(across)
         return (self._centres[:, None] + (u - 0.5) * self._widths[:, None]).ravel()
 
     def weights(self, across: int) -> np.ndarray:
-        """Return the weights of the nodes [squared pupil radii], (row, column)."""
+        """Return the quadrature weight [squared pupil radii] of each node, array (row, column).
+
+        across: number of nodes along a side of a pixel.
+        """
         return _weights(self, across)
 
     @cached_property
@@ -136,7 +155,7 @@ class PixelatedAperture(Aperture):
 
     @cached_property
     def _cut(self) -> np.ndarray:
-        """Index (row, column) of each pixel that may be cut."""
+        """Row and column of each pixel that the opening's edge may cut, array (pixel, 2)."""
         return np.argwhere(self._near)
 
     def node_count(self, cycles: float, digits: float) -> int | None:
@@ -171,9 +190,14 @@ class PixelatedAperture(Aperture):
     def _pieces(
         self, at: np.ndarray, cycles: float, digits: float, degree: int = 0
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield x, y and weights of the nodes in each panel of a cut pixel's open part: see `strips`.
+        """Yield x, y and weights of the quadrature nodes in one of the pixels through which the opening's edge runs.
+
+        Nodes lie only in the part of the pixel that is within the opening. This part is divided into panels, which are
+        horizontal bands, at the heights at which the edge enters or leaves the pixel, and at the heights of the
+        corners, tops and bottoms of the edge.
 
         at: (row, column) of the pixel.
+        cycles, digits, degree: see `strips`.
         """
         bottom, left = self._centres[at] - self._widths[at] / 2
         height, width = self._widths[at]

@@ -1,4 +1,7 @@
-"""Shapes for combined openings. All may extend beyond the pupil, and disks and rectangles may lie off the axis."""
+"""Shapes from which openings are composed by union, difference or intersection.
+
+All may extend beyond the pupil, and disks and rectangles may lie off the axis.
+"""
 
 from __future__ import annotations
 

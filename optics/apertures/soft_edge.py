@@ -42,10 +42,11 @@ class SoftEdge:
     ) -> SoftEdge:
         """Return the kernel that needs the fewest samples for an aperture with these half widths.
 
-        Let t be the width of the transition, h_x and h_y the half widths, s = h_x + h_y, and b = β/π = reach · t, with
-        Kaiser's parameter β. The number of samples is proportional to (h_x + b/t) (h_y + b/t) (2 passband + t)². It is
-        smallest at the only positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband. If the reach b/t
-        would exceed `widest_reach` at this root, t is b/widest_reach instead.
+        Let t be the width of the transition from passband to stopband, h_x and h_y the half widths, and s their sum.
+        The kernel is 0 beyond its reach b/t, where b = β/π with Kaiser's parameter β. The number of samples is
+        proportional to (h_x + b/t) (h_y + b/t) (2 passband + t)². It is smallest at the only positive root of 2 h_x h_y
+        t³ + b s t² - 2 b s passband t - 4 b² passband. If the reach would exceed `widest_reach` at this root, t is
+        b/widest_reach instead.
         """
         b = _beta(ripple) / pi
         (h_x, h_y), s = half_widths, sum(half_widths)
@@ -65,7 +66,10 @@ class SoftEdge:
 
     @property
     def cycles(self) -> float:
-        """Cycles of the kernel's highest frequency, `stopband`, from its centre to its end."""
+        """Number of cycles of a wave of the frequency `stopband` over the kernel's radius `reach`.
+
+        The kernel contains no frequencies above `stopband`, to within `ripple`.
+        """
         return self.reach * self.stopband
 
     def ring(self, r: np.ndarray) -> np.ndarray:
@@ -77,7 +81,10 @@ class SoftEdge:
         return np.asarray(self._odd_series(np.minimum(r, self.reach)))
 
     def line(self, x: np.ndarray) -> np.ndarray:
-        """Return the kernel along one axis at positions x, in units of 1/R; 0 beyond `reach`. Its integral is 1."""
+        """Return the kernel along one axis [1/R] at positions x [R], where R is the pupil's radius.
+
+        The kernel is 0 beyond `reach`. Its integral is 1.
+        """
         found, inside = np.zeros(np.shape(x)), np.abs(x) < self.reach
         found[inside] = self._bare_line(x[inside]) / self._line_integral
         return found
@@ -107,10 +114,11 @@ class SoftEdge:
 
     @cached_property
     def _odd_series(self) -> Chebyshev:
-        """Chebyshev series of `ring` from -reach to reach, where `ring` is an odd function.
+        """Chebyshev series of `ring`, which is continued as an odd function to radii from -reach to reach.
 
-        The series is used because tables evaluate `ring` at thousands of radii, and each Bessel function would take a
-        hundred cosines. Only odd terms are retained, so the series is exactly 0 on the axis and has the correct slope.
+        `ring` is the kernel's weight on a circle, which contains a Bessel function. The series is used because tables
+        evaluate `ring` at thousands of radii, and the Bessel function at each radius would take a hundred cosines. Only
+        odd terms are retained, so the series is exactly 0 on the axis and has the correct slope.
         """
         degree, domain = 2 * int(24 + 4 * self.cycles + self.beta / 2) + 1, [-self.reach, self.reach]
         series = Chebyshev.interpolate(lambda r: np.sign(r) * self._bare(np.abs(r)), degree, domain)
@@ -126,9 +134,9 @@ class SoftEdge:
 
 
 def _positive_root(a: float, b: float, c: float, d: float) -> float:
-    """Return the positive root of at³ + bt² + ct + d with a, b > 0 >= c, d.
+    """Return the positive root of at³ + bt² + ct + d, where a and b are positive and c and d are negative or 0.
 
-    Newton's iteration starts above the root and descends monotonically.
+    If c and d are 0, the result is 0. Newton's iteration starts above the root and descends monotonically.
     """
     # At this t the positive terms outweigh the negative ones.
     t = max(-2 * c / b, (-4 * c / a) ** 0.5, (-4 * d / a) ** (1 / 3))
@@ -143,12 +151,15 @@ def _positive_root(a: float, b: float, c: float, d: float) -> float:
 
 
 def _beta(ripple: float) -> float:
-    """Return Kaiser's parameter β for a ripple in two dimensions.
+    """Return Kaiser's parameter β for a radially symmetric kernel in the plane, from the ripple of its spectrum.
 
-    Kaiser's rule applies to one dimension. In the plane, side lobes from all directions add up at frequency 0. The sum
-    is up to 7 times a ripple of 0.5, 20 times a ripple of 1e-6, and 50 times a ripple of 1e-12, for the worst width of
-    the passband. The kernel is therefore designed for ripples that are 10, 27 and 82 times smaller (a choice).
-    tests/optics/apertures/test_aperture.py checks that the spectrum stays below the ripple.
+    Kaiser's rule applies to one dimension. In the plane, side lobes from all directions add up at frequency 0. For the
+    worst width of the passband, their sum is up to 7 times a ripple of 0.5, 20 times a ripple of 1e-6, and 50 times a
+    ripple of 1e-12. Kaiser's rule is therefore applied to a ripple divided by a factor. The factors chosen for these
+    three ripples, 10, 27 and 82, leave a margin. tests/optics/apertures/test_aperture.py checks that the spectrum stays
+    below the ripple.
+
+    ripple: largest deviation of the kernel's spectrum from 1 in the passband and from 0 in the stopband.
     """
     return kaiser_beta(ripple**1.08 / 9)
 

@@ -107,10 +107,11 @@ class _Arc:
     def share(self, x: Array, y: Array, radius: Array, begin: Array, end: Array) -> Array:
         """Return the contribution of the arc from `begin` to `end` [rad] to the transmittance at points (x, y).
 
-        The part of the circle within the kernel's reach is centred on the point's direction φ and has the half angle τ.
+        The kernel of the soft edge around a point covers a part of the arc's circle. This part is centred on the
+        point's direction φ, seen from the centre of the circle, and has the half angle τ.
 
-        φ is shifted by whole turns until it lies less than one turn before the arc's middle. The arc may then overlap
-        the part around φ, the part around φ + 2π, or both.
+        Whole turns are added to φ until it lies between the arc's middle and one turn before the middle. The arc may
+        then overlap the part around φ, the part around φ + 2π, or both.
         """
         import drjit as dr
 

@@ -1,17 +1,17 @@
-"""Transmittance at any point of a polygon convolved with the soft edge's kernel.
+"""Transmittance of a polygon with a soft edge, at any point. The polygon is convolved with the kernel of the edge.
 
 Consider the triangle of a point and an edge. The integral of the kernel g over this triangle is
 
     ∫ G(r) dθ,   G(r) = ∫₀^r g(r') r' dr',
 
 where θ runs over the angle that the edge subtends, and r is the distance from the point to the edge in the direction θ.
-The polygon's transmittance is the sum over its edges. Angles, and hence these contributions, are negative if the point
-lies on the outer side of an edge. Let d be the signed distance of an edge from the point, and t the position along the
-edge from the foot of the perpendicular. Then
+The polygon's transmittance is the sum of these integrals over its edges. If the point lies on the outer side of an
+edge, the angle θ, and therefore the edge's integral, counts as negative. Let d be the signed distance of an edge from
+the point, and t the position along the edge from the foot of the perpendicular. Then
 
     G dθ = d H(r) dt,   r² = d² + t²,
 
-where H = G/r² is smooth. Beyond the kernel's reach G = 1/2π, so the contribution depends only on the angle.
+where H = G/r² is smooth. Beyond the kernel's reach G = 1/2π, so the integral depends only on the angle.
 """
 
 from __future__ import annotations
@@ -77,14 +77,19 @@ def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, 
 
 
 class _Line:
-    """Contribution W(d, s) of a piece of a line to the transmittance at a point.
+    """Contribution of a piece of a straight edge to the transmittance of a soft-edged opening at a point.
 
-    The piece extends from the foot of the perpendicular from the point to a distance s along the line. d is the signed
-    length of the perpendicular.
+    The contribution W(d, s) depends on two lengths. The piece begins at the foot of the perpendicular from the point to
+    the edge, and ends at a distance s along the edge. d is the signed length of the perpendicular, positive if the
+    point lies on the inner side.
 
-    The kernel covers a disc around the point, whose radius is the kernel's reach. Parts of the line outside this disc
-    contribute the angle that they subtend. If the piece ends outside, half the chord within the disc contributes a
-    value tabulated for a half-plane. A piece that ends within the disc contributes ∫ d H(r) dt.
+    The kernel that softens the edge covers a disc around the point. If the line of the edge misses this disc, W is the
+    angle that the piece subtends at the point, divided by 2π. Otherwise, W depends on the end of the piece. If the
+    piece ends within the disc, W is the integral ∫ d H(r) dt, where t runs from 0 to s, r² = d² + t², and H is the
+    function that `radial_table` tabulates. If it ends outside the disc, consider the infinite half-line that begins at
+    the foot and contains the piece. The half-line contributes half of T(d) - 1/2, where T is the transmittance of a
+    soft-edged half-plane. T depends only on d and is tabulated. W is smaller by α/(2π), where α is the angle at the
+    point that the part of the half-line beyond the piece subtends.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -102,7 +107,12 @@ class _Line:
         self.count = dr.opaque(types.Index, half)
 
     def between(self, d: Array, start: Array, end: Array) -> Array:
-        """Return the contribution of a line from `start` to `end` at the signed distance d (positive inside)."""
+        """Return the contribution of a piece of a straight edge to the transmittance at points.
+
+        d: signed distance of the line from each point, positive if the point lies on the inner side.
+        start, end: ends of the piece, as positions along the line, measured from the foot of the perpendicular from
+            each point.
+        """
         import drjit as dr
 
         near = dr.abs(d) < self.reach
@@ -112,12 +122,16 @@ class _Line:
         return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
 
     def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
-        """Return the contribution W(d, s) of a line from its foot to the distance s.
+        """Return the contribution W(d, s) of a piece of a straight edge to the transmittance at points.
 
-        near: whether the line's distance from each point is less than the kernel's reach, so that the disc of this
-            radius around the point contains a chord of the line.
+        The piece begins at the foot of the perpendicular from each point to the edge, and ends at the signed distance s
+        along the edge. d is the signed length of the perpendicular, positive if the point lies on the inner side.
+
+        near: True if |d| is less than the kernel's reach. The disc of this radius around the point then contains a
+            chord of the line.
         half: half the length of the chord.
-        chord: contribution of half the chord; 0 if there is no chord.
+        chord: contribution of the infinite half-line that begins at the foot; 0 if there is no chord.
+        zero: zeros, one for each point.
         """
         import drjit as dr
 

@@ -1,7 +1,8 @@
 """Quadrature over the part of a rectangle that an outline encloses.
 
-The rectangle is divided into panels at the heights at which the edge enters, leaves or turns. Within a panel, nodes lie
-on horizontal chords that end exactly at the edge, so the quadrature converges spectrally.
+The rectangle is divided into panels, which are horizontal bands, at the heights at which the outline enters or leaves
+the rectangle, and at the heights of the corners, tops and bottoms of the outline. Within a panel, nodes lie on
+horizontal chords that end exactly at the edge, so the quadrature converges spectrally.
 """
 
 from __future__ import annotations
@@ -28,10 +29,13 @@ Box = tuple[float, float, float, float]
 def strips(
     outline: Outline, box: Box, cycles: float, digits: float, degree: int = 0
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield x, y and weights of the nodes in each panel of the enclosed part of a box (left, right, bottom, top).
+    """Yield quadrature nodes over the part of a rectangle that an outline encloses, as arrays x, y and weights.
 
-    The nodes suit integrands that are a wave of `cycles` cycles per unit of length, times a polynomial of the given
-    degree in x and in y. Integrals have an error of at most 10^-digits times the area.
+    The rectangle is cut into panels, which are horizontal bands. Each panel yields one set of nodes for each part of it
+    that lies inside the outline. The nodes suit integrands that are a wave of `cycles` cycles per unit of length, times
+    a polynomial of the given degree in x and in y. Integrals have an error of at most 10^-digits times the area.
+
+    box: the rectangle (left, right, bottom, top).
     """
     left, right, bottom, top = box
     within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])
@@ -57,9 +61,13 @@ def strips(
 
 
 def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Return the ends of panels that become shorter towards the top or bottom of a circle.
+    """Return the heights of the borders of the panels, the horizontal bands into which a rectangle is divided.
 
-    At the top and the bottom, the length of a chord changes like a square root, which polynomials do not approximate.
+    Borders are added to the given ones, to make the panels thinner towards the top and the bottom of a circle. There,
+    the length of a horizontal chord changes like a square root of the height, which polynomials do not approximate.
+
+    ends: ascending heights of the given borders.
+    tangent: heights of the tops and bottoms of the circles to which arcs of the outline belong.
     """
     more = []
     for at in tangent:
@@ -77,10 +85,14 @@ def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
 def _panel(
     low: float, high: float, tangent: np.ndarray, cycles: float, digits: float, degree: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return heights and weights of the nodes in a panel, for a wave of `cycles` cycles between its ends.
+    """Return heights and weights of the quadrature nodes in a panel, the horizontal band from `low` to `high`.
 
-    At a circle's top or bottom, the length of the chord changes like a square root of the height. A substitution with
-    sin² makes it smooth.
+    At a circle's top or bottom, the length of a horizontal chord changes like a square root of the height. If the panel
+    begins or ends there, the nodes are placed along a new variable u, with the height low + (high - low) sin²(πu/2).
+    The chord's length is a smooth function of u.
+
+    tangent: heights of the tops and bottoms of circles.
+    cycles: cycles of the integrand between `low` and `high`.
     """
     span = high - low
     touching = any(abs(end - at) < ROUNDING for at in tangent for end in (low, high))

@@ -17,7 +17,12 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
-    """Return the indices of the first two edges that intersect elsewhere than at a shared end; None without any."""
+    """Return the indices of two edges of a polygon that cross, touch or overlap; None if there are none.
+
+    Successive edges always share an end. They count only if the second one folds back along the first one.
+
+    vertices: corners of the polygon, array (corner, 2).
+    """
     n = len(vertices)
     along = np.roll(vertices, -1, axis=0) - vertices
     following = np.roll(along, -1, axis=0)

@@ -15,7 +15,7 @@ transmittance     GaussianMask, MaskMap
 human_eye         HumanEye, mean_human_mtf: published models
 exit_pupil        read_exit_pupil: lenses from other programs
 exit_pupils       read_exit_pupils: several fields and wavelengths
-converging_wave   rays and samples of other programs as a wave near its image
+converging_wave   wave that converges on an image point, from rays or samples of other programs
 pupil_rim         circle, ellipse or polygon around the samples of a pupil
 turbid_medium     TurbidMedium: water and fog between surfaces and eyes
 ball_lens         BallLens: gradient-index ball lenses
@@ -28,7 +28,7 @@ beam              light of one wavelength between source and sensor plane
 light_geometry    sources, lenses and media of several beams
 light_stack       light of several beams at once
 pupil_polynomials reliefs and wavefronts as sums of powers
-derivative_knots  cells in which derivatives with respect to samples of maps are polynomials
+derivative_knots  parts of the pupil in which derivatives with respect to a map's samples are polynomials
 torch_numbers     tensors of PyTorch in a pupil
 ray_field         polarised light along rays
 """

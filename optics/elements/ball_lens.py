@@ -1,4 +1,7 @@
-"""Gradient-index ball lenses, such as those of fish: their focus, and the pupil with their wavefront."""
+"""Gradient-index ball lenses, such as those of fish: their focus, and a pupil that has the same effect on light.
+
+The wavefront of this pupil is that of the light behind the lens.
+"""
 
 from __future__ import annotations
 
@@ -69,8 +72,9 @@ class BallLens:
 
     @classmethod
     def luneburg(cls, radius: float, medium_n: float, focal_ratio: float = 1.0) -> BallLens:
-        """Return a lens that focuses parallel light perfectly, `focal_ratio` times its radius R behind its centre.
+        """Return a lens that focuses parallel light perfectly.
 
+        The focus lies behind the centre of the lens, at a distance of `focal_ratio` times the radius R of the lens.
         With focal_ratio = 1 it is Luneburg's lens, with n = n_medium √(2 - (r/R)²) at the distance r from the centre. A
         ratio of about 2.5 describes the lenses of fish (Matthiessen, Pflügers Archiv 27, 510, 1882).
 
@@ -94,7 +98,7 @@ class BallLens:
         return cls(radius, 2 * medium, medium, medium, lambda u: (1 - u * u) / (1 + u * u))
 
     def index(self, r: Any, wavelength: float = MIDDLE) -> np.ndarray:
-        """Return the refractive index at distances r [m] from the centre, an array of any shape.
+        """Return the refractive index at distances r [m] from the centre, in an array of the shape of r.
 
         Raises:
             ValueError: a distance is above the radius or NaN, or the wavelength is invalid.
@@ -119,7 +123,7 @@ class BallLens:
     def deviation(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
         """Return the angle [rad] by which the lens bends rays towards the axis: ψ + 2 arcsin(h/R) - π.
 
-        ψ is the angle of `turning`, and R the radius of the lens.
+        ψ is the angle about the centre between a ray's entry and its exit, see `turning`. R is the radius of the lens.
 
         height: distance h [m] of parallel rays from the axis.
 
@@ -144,7 +148,7 @@ class BallLens:
     def focal_length(self, wavelength: float = MIDDLE) -> float:
         """Return the paraxial focal length [m], measured from the centre of the lens.
 
-        It is a closed-form expression with one integral, which is computed numerically.
+        It is computed from a formula that contains one integral. The integral is evaluated numerically.
 
         Raises:
             ValueError: the lens does not focus, or the wavelength is invalid.
@@ -155,10 +159,11 @@ class BallLens:
         return self.radius / power
 
     def pupil(self, aperture_radius: float, wavelength: float = MIDDLE) -> Pupil:
-        """Return the pupil on the plane through the lens's centre, with the wavefront of parallel light behind it.
+        """Return a pupil that has the same effect on parallel light as the lens.
 
-        The wavefront refers to a sphere about the paraxial focus, where sensors are by default. The pupil's amplitude
-        is uniform over its plane, although rays are denser or sparser towards the rim of a thick lens.
+        The pupil lies on the plane through the lens's centre. Its wavefront is that of the light behind the lens,
+        relative to a sphere about the paraxial focus, where sensors are by default. The pupil's amplitude is uniform
+        over its plane, although rays are denser or sparser towards the rim of a thick lens.
 
         aperture_radius: largest distance [m] of parallel rays from the axis, below the lens's radius R.
         wavelength: vacuum wavelength [m]. The focal length and `medium_n` of the pupil are those for this wavelength.

@@ -22,7 +22,8 @@ __all__ = ["Beam"]
 class Beam:
     """Light of one vacuum wavelength [m] from a source through a pupil to a plane at `distance` [m].
 
-    The numbers of the pupil, all distances and the source's angle may carry derivatives.
+    The distance, the source's distance and angle, and the pupil's radius, focal length, relief, refractive index n,
+    wavefront and mask may carry derivatives.
     """
 
     pupil: Pupil
@@ -45,12 +46,19 @@ class Beam:
 
     @property
     def aperture(self) -> Aperture:
-        """Aperture of the pupil, divided into the pixels of its relief if they bend the light."""
+        """Aperture of the pupil.
+
+        If the pupil has a relief of square pixels that bends the light, the aperture is divided into these pixels.
+        """
         pixels = self.pupil.pixels if self.pupil.bends(self.wavelength) else 0
         return PixelatedAperture.squares(self.pupil.aperture, pixels) if pixels else self.pupil.aperture
 
     def waves(self, x: Array, y: Array) -> Array:
-        """Return the optical path at points (x, y) [m], in vacuum wavelengths. For the arrays, see `Relief.height`."""
+        """Return the optical path from the source through points (x, y) [m] of the pupil, in vacuum wavelengths.
+
+        It is relative to the path through the centre without relief and wavefront. For the types of the arrays, see
+        `Relief.height`.
+        """
         return self.pupil.path(x, y, self.wavelength, self.source) * like(x, 1 / self.wavelength)
 
     def behind(self, soft: SoftAperture, grid: Grid, types: Precision) -> Field:

@@ -1,4 +1,4 @@
-"""A wave that converges on a point of an image plane, read from the objects of other programs."""
+"""A wave that converges on a point of an image plane. Its samples come from objects of other optics programs."""
 
 from __future__ import annotations
 
@@ -27,12 +27,16 @@ ON_Z = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class ConvergingWave:
-    """Samples of a wave near a sphere around a point of the image plane.
+    """Samples of a wave that converges on a point of the image plane.
 
-    sines: unit vectors from this point to the samples, as components along the image plane's axes x and y, (2, n).
-    ahead: distance [m] by which the wavefront is ahead of the sphere, times the refractive index, (n,).
-    rim: rim of the pupil, in sines.
-    on_plane: rim [m] of the pupil on its plane, which lies `distance` in front of the image.
+    The samples were read from an object of another optics program. The wavefront is compared with the reference sphere,
+    whose centre is this point.
+
+    sines: directions from the point to the samples, as the components of unit vectors along the axes x and y of the
+        image plane, array (axis, sample).
+    ahead: distance [m] by which the wavefront is ahead of the sphere, times the refractive index, array (sample,).
+    rim: rim of the pupil as seen from the point, in the same coordinates as `sines`.
+    on_plane: rim [m] of the pupil on the pupil's plane, which lies `distance` in front of the image.
     distance: radius of the sphere [m].
     wavelength: vacuum wavelength [m].
     position: the point (x, y) [m] on the image plane; None if the other program's object does not contain it.
@@ -61,10 +65,11 @@ class ConvergingWave:
 
         shift: distance [m] by which the image plane is moved along the light.
         medium_n: refractive index behind the pupil.
-        position: the point (x, y) [m] on the image plane. None: the point on the ray through the pupil's centre.
+        position: the new point (x, y) [m] on the image plane. None: the point at which the ray from the pupil's centre
+            to the old point crosses the moved plane.
 
         Raises:
-            ValueError: a position is given, and the present one is unknown.
+            ValueError: a position is given although the position of the old point is unknown.
         """
         if position is not None and self.position is None:
             raise ValueError("the position of the image is unknown: this object does not contain it")
@@ -82,9 +87,12 @@ class ConvergingWave:
         return replace(self, position=position, height=height, **moved)
 
     def _seen_from(self, to: np.ndarray, sines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return sines (2, n) of the directions from another point to points of the sphere, and their distances [m].
+        """Return the directions and the distances [m] from another point to points of the reference sphere.
 
-        to: the other point (x, y, z) [m] relative to the centre, with z along the light, (3, 1).
+        The directions are components of unit vectors along x and y, array (axis, point).
+
+        to: the other point (x, y, z) [m] relative to the sphere's centre, with z along the light, (3, 1).
+        sines: the directions from the sphere's centre to the points, array (axis, point).
         """
         away = self.distance * np.stack([*sines, -np.sqrt(1 - np.sum(sines**2, axis=0))]) - to
         apart = np.linalg.norm(away, axis=0)
@@ -100,16 +108,19 @@ def is_of_samples(system: Any) -> bool:
 
 
 def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave:
-    """Return the wave of an object with pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves].
+    """Convert the rays in a pupil, which an object of another optics program contains, to a converging wave.
 
+    system: the object, such as optiland's WavefrontData. Its attributes are pupil_x, pupil_y, pupil_z and radius [mm],
+        and opd [waves].
     wavelength: vacuum wavelength [m].
     image_normal: normal of the image plane in the object's coordinates. None: the z axis. The x axis of the image plane
         is the projection of the object's x axis.
 
     Raises:
         ValueError: a number of the object or the normal is invalid, the attributes have different lengths, no ray has
-            light, the samples lie on another sphere than `radius` or on a line, the pupil is obscured or not convex, or
-            a pupil that is neither a circle nor an ellipse is sampled too coarsely.
+            light, the sphere through the samples has a radius other than the attribute `radius`, the samples lie on a
+            line, the pupil is obscured or not convex, or a pupil that is neither a circle nor an ellipse is sampled too
+            coarsely.
     """
     normal = _unit(ON_Z if image_normal is None else image_normal)
     x, y, z, opd, intensity = _alike(system)
@@ -138,10 +149,11 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
 
 
 def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWave:
-    """Return the wave of an object with the attributes data (complex), dx [mm] and wavelength [µm].
+    """Convert the samples on a grid in a pupil, which an object of another program contains, to a converging wave.
 
-    system: the object. Its samples lie on a plane that is parallel to the image plane.
-    wavelength: vacuum wavelength [m]. The wavelength of the object must be equal to it.
+    system: the object, such as prysm's Wavefront. Its attributes are data (complex), dx [mm] and wavelength [µm]. The
+        samples in `data` lie on a plane that is parallel to the image plane.
+    wavelength: vacuum wavelength [m], which must be equal to the object's wavelength.
     distance: distance [m] of the samples from the image plane.
 
     Raises:

@@ -1,10 +1,10 @@
-"""Inputs of a PSF that carry derivatives, and the cells in which these derivatives are polynomials.
+"""Inputs of a PSF that carry derivatives, and cells of the pupil in which these derivatives are smooth.
 
 The derivative of the light behind the pupil with respect to one sample of a map is proportional to a cardinal spline
-times the light (for a mask, the light without it). This spline is a different cubic polynomial in every cell between
-two knots, whatever the values of the map are. Derivatives with respect to samples of a flat map therefore have the same
-detail as derivatives for a rough map. Samples of the pupil that resolve only the light give wrong derivatives.
-Quadrature nodes in each cell are used instead.
+times the light. If the map is a mask, this is the light that would pass the pupil without the mask. The spline is a
+different cubic polynomial in every cell between two knots, whatever the values of the map are. Even if a map is flat,
+derivatives with respect to its samples therefore contain the fine detail of these splines. Samples of the pupil that
+resolve only the light give wrong derivatives. Quadrature nodes in each cell are used instead.
 """
 
 from __future__ import annotations
@@ -31,14 +31,18 @@ APART = 1e-9  # rounding: borders that are closer, in pupil radii, are the same
 
 @dataclass(frozen=True)
 class DerivativeKnots:
-    """Cells between the knots of all maps that carry derivatives.
+    """Rectangular cells of the square around the pupil. In each cell, derivatives by the samples of maps are smooth.
 
-    borders: ascending borders of the cells along x and along y, in units of the pupil's radius, from -1 to 1. They
-        include the borders of a relief of pixels.
-    splines: number of cubic splines, 1 or 2, by which the derivatives multiply the light in each cell. It is 2 if a
-        mask and a relief or wavefront carry derivatives.
-    maps: names, rows and columns of the maps, such as "height: 32 x 32".
-    names: names of these maps, as arguments of `Pupil`.
+    A map is a relief, wavefront or mask that is given by samples and interpolated by cubic splines. Each row and each
+    column of samples is a knot, at which a spline changes from one polynomial to another. The knots of all maps that
+    carry derivatives divide the square into the cells.
+
+    borders: ascending borders of the cells, the same along x and along y, in units of the pupil's radius, from -1 to 1.
+        If the relief consists of pixels, the borders between them are included.
+    splines: number of cubic splines, 1 or 2, by which the light from the rest of the pupil is multiplied in a
+        derivative. The number is 2 if the mask carries derivatives and the relief, the wavefront or both do as well.
+    maps: text with the name, rows and columns of each map that carries derivatives, such as "height: 32 x 32".
+    names: names of these maps, which are names of arguments of `Pupil`.
     """
 
     borders: tuple[float, ...]
@@ -47,19 +51,26 @@ class DerivativeKnots:
     names: tuple[str, ...]
 
     def without_maps(self, pupil: Pupil) -> Pupil:
-        """Return the pupil without the maps.
+        """Return the pupil without the maps (relief, wavefront or mask) that carry derivatives.
 
-        The cells between knots resolve the maps, so the bandwidth of the other parts determines the nodes in a cell.
+        The rows and columns of these maps' samples divide the pupil into rectangular cells. In each cell, the maps are
+        polynomials of low degree. The number of quadrature nodes in a cell therefore depends on the bandwidth of the
+        pupil that is returned, and not on these maps.
         """
         without: dict[str, Any] = dict.fromkeys(self.names)
         return replace(pupil, **without)
 
 
 def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
-    """Return the cells that derivatives with respect to samples of maps require; None if no derivative requires any.
+    """Return the cells into which knots of maps divide the pupil; None if no map carries derivatives.
 
-    A derivative with respect to the refractive index is proportional to the height, so it requires the cells of the
-    relief, too.
+    A map is a relief, wavefront or mask that is given by samples. Its knots are the rows and columns of samples. The
+    derivative of the light with respect to a sample is proportional to a cubic spline, which is a single polynomial
+    only in each cell between two knots. Only knots of maps that carry derivatives are used. This includes a relief
+    whose refractive index carries a derivative, because that derivative is proportional to the height.
+
+    wavelength: vacuum wavelength [m]. A relief is ignored if its index at this wavelength equals that of the medium
+        around it and carries no derivative.
     """
     maps = dict(_maps(pupil, wavelength))
     if not maps:
@@ -76,7 +87,11 @@ def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
 
 
 def carries_derivatives(beam: Beam) -> bool:
-    """Return whether any number of the beam's pupil or source, or its distance, carries a derivative."""
+    """Return True if a derivative is requested with respect to any input of the beam.
+
+    Such inputs are the distance of the sensor plane, the distance and angle of the source, and the radius, focal
+    length, relief, refractive index, wavefront and mask of the pupil.
+    """
     pupil = beam.pupil
     numbers: list[Any] = [pupil.aperture_radius, pupil.thin_lens_focal_length, beam.distance, beam.source.distance]
     numbers += beam.source.angle
@@ -90,7 +105,10 @@ def carries_derivatives(beam: Beam) -> bool:
 
 
 def _maps(pupil: Pupil, wavelength: float) -> Iterator[tuple[str, tuple[tuple[int, int], np.ndarray]]]:
-    """Yield names, shapes and knots, in units of the pupil's radius, of the maps whose derivatives are requested."""
+    """Yield the name, shape (rows, columns) and knots of each map whose derivatives are requested.
+
+    The knots are positions in units of the pupil's radius.
+    """
     relief, wavefront, mask = pupil.height, pupil.wavefront, pupil.mask
     bent = isinstance(relief, HeightMap) and pupil.bends(wavelength)
     if bent and (carries_derivative(relief.samples) or _index_carries(pupil)):

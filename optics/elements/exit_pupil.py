@@ -30,14 +30,17 @@ RMS_DIGITS = 8.0
 
 @dataclass(frozen=True, eq=False)
 class ExitPupil:
-    """An exit pupil with its wavefront.
+    """The exit pupil and the wavefront of a lens that was computed by another optics program.
+
+    Both were read from an object of that program, such as optiland's WavefrontData or prysm's Wavefront. The wavefront
+    is relative to the reference sphere, whose centre is the image point in that program.
 
     pupil: an ideal lens focused on the centre of the reference sphere, with the wavefront as Zernike modes. Its PSF at
-        `distance` has the axes of the image plane, and its origin is the centre of the sphere.
-    distance: radius [m] of the reference sphere, whose centre is the image position in the other program.
-    residual: root mean square [m] of the difference between wavefront and fit.
-    position: centre (x, y) [m] of the sphere, in coordinates along the image plane from the origin of the object's
-        coordinates; None if the object does not contain it (prysm).
+        `distance` has the axes of the image plane, and the PSF's origin is the centre of the sphere.
+    distance: radius [m] of the reference sphere.
+    residual: root mean square [m] of the difference between the wavefront and the fitted Zernike modes.
+    position: centre (x, y) [m] of the sphere, along the axes of the image plane from the origin of coordinates in the
+        other program; None if the program's object does not contain this position, as with prysm's Wavefront.
     sines: components (x, y) along the image plane of the direction of the light at the pupil's centre. (0, 0):
         perpendicular to the image plane.
     wave: the samples from the other program.
@@ -67,7 +70,8 @@ class ExitPupil:
     def spot_radius(self) -> float:
         """Largest distance [m] from the origin at which a ray of the fitted wavefront hits the image plane.
 
-        A ray is displaced by the gradient of the wavefront, times the distance and divided by the refractive index.
+        A ray is displaced by the gradient of the wavefront, times the radius of the reference sphere and divided by the
+        refractive index.
         """
         waves, step = self.pupil.wavefront, 1e-4
         assert isinstance(waves, Zernike)
@@ -80,12 +84,13 @@ class ExitPupil:
 
     @property
     def image_height(self) -> float:
-        """Position [m] of the image plane relative to the origin of the object's coordinates.
+        """Distance [m] of the image plane from the origin of coordinates in the optics program that computed the lens.
 
-        It is measured perpendicular to the plane, and is positive in the direction of the light.
+        The distance is measured perpendicular to the plane. It is positive if the plane lies behind the origin, in the
+        direction of the light. It is read from an object of that program, such as optiland's WavefrontData.
 
         Raises:
-            ValueError: the object does not contain it (prysm).
+            ValueError: the object does not contain this distance, as with prysm's Wavefront.
         """
         if self.wave.height is None:
             raise ValueError("the position of the image plane is unknown: this object does not contain it")
@@ -95,7 +100,7 @@ class ExitPupil:
         """Return the exit pupil for a parallel image plane, `shift` [m] farther along the light.
 
         To compute PSFs out of focus, move the image plane in this way. Light that arrives at an angle then also moves
-        along the plane, which `optics.psf` at another sensor distance would ignore.
+        along the plane. `optics.psf` at another sensor distance would ignore this movement.
 
         origin: point (x, y) [m] of the image plane that becomes the origin of the PSF. Exit pupils of several
             wavelengths with a common origin include lateral colour. None: the point that the ray through the pupil's
@@ -123,15 +128,16 @@ def read_exit_pupil(
 
     The pupil is a circle, an ellipse or, if a lens mount cuts off part of the light, a convex polygon. The light may
     reach the image plane at an angle. The PSF then refers to this plane. For this purpose, a position in the pupil is
-    given by the unit vector of its ray: by the components parallel to the plane, minus those of the ray through the
-    pupil's centre.
+    given by the direction of its ray. The coordinates are the components of the ray's unit vector along the plane,
+    minus those of the ray through the pupil's centre.
 
     system: an object of one of two kinds. The first has pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like
         optiland's WavefrontData with any distribution of rays. The second has data (complex), dx [mm] and wavelength
         [µm], like prysm's Wavefront in a pupil. Its phase must change by less than half a wave between samples.
     wavelength: vacuum wavelength [m].
     medium_n: refractive index of the image space.
-    focal_length: distance from pupil to image [m], required for objects of the second kind. The first kind contains it.
+    focal_length: distance from pupil to image [m], required for objects of the second kind. Objects of the first kind
+        contain this distance.
     order: highest radial order of the fitted Zernike modes.
     image_normal: normal (x, y, z) of the image plane in the object's coordinates. None: the z axis, which is the axis
         of the lens. Objects of the second kind contain no directions; their image plane is parallel to the pupil.

@@ -20,7 +20,7 @@ FLAT = 1e-9  # choice [m]: largest distance of images from a common plane
 
 @dataclass(frozen=True, eq=False)
 class ExitPupils(ReadOnlyArrays):
-    """Exit pupils of a lens whose images lie on one plane.
+    """Exit pupils of a lens for several fields and wavelengths. All images of the lens lie on one plane.
 
     fields: points of the field, in the order and units of the program that computed the pupils.
     wavelengths: vacuum wavelengths [m], ascending.
@@ -37,18 +37,22 @@ class ExitPupils(ReadOnlyArrays):
 
     @property
     def positions(self) -> np.ndarray:
-        """Positions (x, y) [m] of the images on the image plane, (field, wavelength, 2)."""
+        """Positions (x, y) [m] of the images of the field points on the image plane, array (field, wavelength, 2)."""
         return np.array([[pupil.position for pupil in row] for row in self.pupils])
 
     @property
     def lateral_colour(self) -> np.ndarray:
-        """Positions [m] of the images relative to those at the middle wavelength, (field, wavelength, 2)."""
+        """Positions [m] of the images of the field points relative to those at the middle wavelength.
+
+        Array (field, wavelength, 2).
+        """
         return self.positions - self.positions[:, [len(self.wavelengths) // 2]]
 
     def at(self, field: int, shift: float = 0.0) -> tuple[ExitPupil, ...]:
         """Return the exit pupils of a field at all wavelengths, with one origin on the image plane.
 
-        Sums over the PSFs of these pupils include lateral colour. The origin is the image at the middle wavelength.
+        Sums over the PSFs of these pupils include lateral colour. The origin is the image of the field point at the
+        middle wavelength.
 
         field: number of the field, counted from 0.
         shift: distance [m] by which the image plane is moved along the light.
@@ -71,8 +75,9 @@ def read_exit_pupils(
     medium_n, order, image_normal: see `read_exit_pupil`.
 
     Raises:
-        ValueError: the mapping is incomplete, the tilt was removed, an object does not contain the position of its
-            image, or the images do not lie on one plane with this normal. See also `read_exit_pupil`.
+        ValueError: the mapping is incomplete, the tilt of the wavefronts was removed (optiland's `remove_tilt`), an
+            object does not contain the position of its image, or the images do not lie on one plane with the normal
+            `image_normal`. See also `read_exit_pupil`.
     """
     held = getattr(system, "data", system)
     if not isinstance(held, Mapping) or not held or not all(isinstance(k, tuple) and len(k) == 2 for k in held):

@@ -1,6 +1,7 @@
-"""Spatial frequencies that samples over a square contain.
+"""Highest spatial frequencies of a map that is sampled over a square, such as a relief, wavefront or mask.
 
-They determine the resolution of grids and the extent of scattered light.
+They determine how fine a grid must be and how far light is scattered. The unit is one cycle per half the side of the
+square. If the square encloses the pupil, half its side is the pupil's radius.
 """
 
 from __future__ import annotations
@@ -13,10 +14,13 @@ CUBIC = 4  # coefficients of a cubic polynomial along an axis; slopes alone desc
 
 
 def band_of(samples: np.ndarray, level: float) -> float:
-    """Return the frequency [cycles per half a side], at least 1, above which the samples vary by less than `level`.
+    """Return the frequency above which a map's variation has a root mean square of less than `level`.
 
-    The variation is a root mean square. Interpolation by cubic splines repeats a component of frequency f around
-    multiples of the sampling rate. A copy at the frequency F is weaker by the factor (f/F)⁴.
+    The map is sampled over a square. The unit is one cycle per half the side of the square. The result is at least 1.
+    Interpolation by cubic splines repeats a component of frequency f around multiples of the sampling rate. A copy at
+    the frequency F is weaker by the factor (f/F)⁴.
+
+    samples: values of the map, array (row, column).
     """
     if max(samples.shape) < 4:
         return 1.0
@@ -33,14 +37,17 @@ def band_of(samples: np.ndarray, level: float) -> float:
 
 
 def power_beyond(samples: np.ndarray) -> np.ndarray:
-    """Return the power (mean square) of the samples' components from each frequency upwards, (entry,).
+    """Return, for each frequency, the power (mean square) of a map's components at this frequency and above.
 
-    Entry k contains all components whose frequency along x or along y is at least k/4 cycles per half a side. There is
-    one entry for each sample along the longer side.
+    The map is sampled over a square. Half the side of the square is the unit of length. Entry k of the result is the
+    total power of all components with a frequency along x, along y or both of at least k/4 cycles per unit of length.
+    The result has one entry for each sample along the axis with more samples.
 
     The best-fitting bicubic polynomial is subtracted first, because a polynomial bends light and does not scatter it.
     The cosine transform continues the samples by their mirror images, without jumps. The ends of the samples therefore
     add no high frequencies.
+
+    samples: values of the map, array (row, column).
     """
     from scipy.fft import dctn
 
@@ -56,9 +63,11 @@ def power_beyond(samples: np.ndarray) -> np.ndarray:
 
 
 def reach_of(beyond: np.ndarray, level: float) -> float:
-    """Return the frequency [cycles per half a side] beyond which the samples vary by less than `level` (rms).
+    """Return the frequency above which a map's variation has a root mean square of at most `level`.
 
-    beyond: result of `power_beyond`.
+    The map is sampled over a square. The unit is one cycle per half the side of the square.
+
+    beyond: result of `power_beyond` for the map.
     """
     more = np.flatnonzero(beyond > level**2)
     return float(more[-1]) / 4 if more.size else 0.0

@@ -1,4 +1,4 @@
-"""Published models of the human eye: an eye with chromatic aberration and a measured wavefront, and a mean MTF."""
+"""Published models of human eyes: the mean MTF, and an eye with chromatic aberration and a measured wavefront."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ class HumanEye:
     wavefront: additional wavefront. "standard_observer" (Autrusseau, Thibos & Shevell 2011, known up to a radius of 3
         mm), a Zernike, or None.
     centered: True to add the tilt that centres the image of a point on the axis. A wavefront known over a wider circle
-        than the pupil usually contains a tilt: cropped coma shifts the image. If centered is False, the centroid of
-        the standard observer's image lies 1.4 arc minutes off the axis for a pupil of 3 mm.
+        than the pupil usually contains a tilt, because coma that is cropped by the pupil shifts the image. If centered
+        is False, the centroid of the standard observer's image lies 1.4 arc minutes off the axis for a pupil of 3 mm.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -94,7 +94,7 @@ class HumanEye:
 
     @cached_property
     def pupil(self) -> Pupil:
-        """Pupil of the eye, for `optics.psf` and other functions. Use `focal_length` as their sensor distance."""
+        """Pupil of the eye, for functions such as `optics.psf`. Pass them `focal_length` as the sensor's distance."""
         humour = medium("chromatic_eye")
         paraboloid = BSplineRelief.paraboloid(0.0, 1 / SURFACE, self.aperture_radius)
         reported = self._reported

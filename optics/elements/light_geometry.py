@@ -1,7 +1,7 @@
-"""Sources, ideal lenses and media of several beams: the part of the light that reliefs and wavefronts do not change.
+"""Sources, ideal lenses and media of several beams. Reliefs and wavefronts of the pupils are not included.
 
-Users often compute many PSFs that differ in the relief or wavefront only. Their geometry is then cached, together with
-the results of planning that depend on nothing else.
+Users often compute many PSFs that differ in the relief or wavefront only. The sources, lenses and media of these PSFs
+are then cached, together with those results of planning the computation that depend only on them.
 """
 
 from __future__ import annotations
@@ -53,9 +53,10 @@ class LightGeometry:
 
     @cached_property
     def spheres(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Spherical waves of lenses and sources: index of the medium, and distance [m] of the centre, (beam,) each.
+        """Spherical waves of lenses and sources, each given by a refractive index and a distance [m], arrays (beam,).
 
-        The index of a wave that converges is negative.
+        The index is that of the wave's medium, and negative if the wave converges. The distance is that of the wave's
+        centre from the pupil.
         """
         *_, behind, before, focal, source = self.arrays
         known = (-np.sign(focal) * behind, np.abs(focal)), (before, source)
@@ -76,7 +77,10 @@ class LightGeometry:
         return total
 
     def slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the slopes of the spherical waves' total path along x and along y at `disk_points`, (beam, point)."""
+        """Return the slopes along x and along y of the optical path, at `disk_points`, arrays (beam, point).
+
+        Only the spherical waves of ideal lenses and of sources on the axis are included.
+        """
         if across not in self._slopes:
             _, x, y = disk_points(across)
             radius = self.arrays[0][:, None]
@@ -104,9 +108,13 @@ def _kept(beam: tuple[float, ...]) -> LightGeometry:
 
 @lru_cache(maxsize=4)
 def disk_points(across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return positions along an axis, and points (x, y) of the square grid inside the unit disk.
+    """Return the points of a square grid that lie inside the unit disk.
 
-    across: number of points across the disk. RIM: points on the rim instead, and no positions along an axis.
+    The result contains the positions of the grid's columns (or rows) from -1 to 1, array (column,), and the coordinates
+    x and y of the points, arrays (point,).
+
+    across: number of points along a diameter. If it is RIM (0), the points lie evenly spaced on the rim of the disk,
+        and the array of positions is empty.
     """
     if across == RIM:
         angle = 2 * np.pi * np.arange(ANGLES) / ANGLES

@@ -28,7 +28,7 @@ TILT_STEP = 1e-3  # choice: step [radii] of the slopes of oblique waves
 
 @dataclass(frozen=True, eq=False)
 class StackSlopes(ReadOnlyArrays):
-    """Gradients of the optical paths behind several pupils, at the same points of their disks.
+    """Gradients of the optical paths behind several pupils, at the same points (x, y) relative to each pupil's radius.
 
     across: number of points across the pupils, see `disk_points`.
     x, y: points in units of the radius, (point,).
@@ -43,7 +43,7 @@ class StackSlopes(ReadOnlyArrays):
 
     @cached_property
     def steepest(self) -> np.ndarray:
-        """Largest slope at these points, (beam,)."""
+        """Largest gradient of each beam's optical path at the points (`x`, `y`), as a magnitude, array (beam,)."""
         found: np.ndarray = np.sqrt((np.square(self.along_x) + np.square(self.along_y)).max(axis=1))
         return read_only(found)
 
@@ -105,9 +105,10 @@ class LightStack:
 
     @cached_property
     def _indices(self) -> list[tuple[float, float, float]]:
-        """Refractive indices behind and before the pupils, and the index step of the relief, for each beam.
+        """Refractive indices behind and before the pupil, and the index step of the relief, for each beam.
 
-        Pupils of a population often have the same media, whose curves are then evaluated once.
+        The index step is the index of the relief minus that of the medium around it. Beams often have the same media
+        and wavelength. The dispersion curves of the media are then evaluated once for all of them.
         """
         known: dict[Any, tuple[float, float, float]] = {}
         found = []
@@ -146,7 +147,10 @@ class LightStack:
 
     @cached_property
     def smooth_points(self) -> int | None:
-        """Number of Chebyshev points across the pupils that determine the paths; None with maps or oblique light."""
+        """Number of Chebyshev points along a pupil's diameter that is enough to interpolate the optical paths.
+
+        None if light is oblique, or if a relief or wavefront is not a polynomial (for example, a map of samples).
+        """
         coefficients, others = self._polynomials
         if others or any(self._tilted):
             return None
@@ -182,7 +186,10 @@ class LightStack:
         return np.asarray((coefficients @ powers.reshape(len(powers), coefficients.shape[2], -1))[:, 0])
 
     def _other_path(self, place: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the part of the path [m] of one beam that is neither a polynomial nor a wave centred on the axis."""
+        """Return the part of one beam's optical path [m] that neither polynomials nor `geometry` describe.
+
+        It is due to oblique light, and to the relief and the wavefront unless both are polynomials.
+        """
         beam, total = self.beams[place], np.zeros(np.broadcast_shapes(x.shape, y.shape))
         pupil = beam.pupil
         if self._tilted[place]:
@@ -195,7 +202,7 @@ class LightStack:
         return total
 
     def amplitude(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the amplitudes that masks transmit at points (x, y) [m], (beam, y, x)."""
+        """Return the amplitude transmittances of the pupils' masks at points (x, y) [m], array (beam, y, x)."""
         found = np.ones(x.shape)
         for place, (beam, radius) in enumerate(zip(self.beams, self.radius, strict=True)):
             if beam.pupil.mask is not None:
@@ -203,7 +210,12 @@ class LightStack:
         return found
 
     def mask_cycles(self, levels: np.ndarray) -> np.ndarray:
-        """Return the cycles per radius above which the masks vary by less than these levels, (beam,)."""
+        """Return for each beam the frequency above which the mask varies by less than a level, array (beam,).
+
+        The unit is one cycle per radius of the beam's pupil. The frequency is 0 for a pupil without a mask.
+
+        levels: level of each beam, as an amplitude, array (beam,).
+        """
         return np.array([
             0.0 if beam.pupil.mask is None else beam.pupil.mask.bandwidth(level, radius) * radius
             for beam, radius, level in zip(self.beams, self.radius, levels.tolist(), strict=True)
@@ -211,7 +223,10 @@ class LightStack:
 
     @cached_property
     def slopes(self) -> StackSlopes:
-        """Slopes of the wavefronts at some points of the disks, which may miss the steepest point."""
+        """Slopes of the optical paths behind the pupils, at the points of a grid over the disk of each pupil.
+
+        A slope between these points may be larger than the largest one at the points.
+        """
         others = self._polynomials[1]
         pieces = {place: self.beams[place].pupil.pieces(self.beams[place].wavelength) for place in others}
         across = MANY if any(4 * count > FEW for count in pieces.values()) else FEW
@@ -231,9 +246,10 @@ class LightStack:
 
     @cached_property
     def rim_slopes(self) -> StackSlopes | None:
-        """Slopes at points on the rim, where polynomials of high order are steepest.
+        """Slopes of the optical paths at points on the rims of the pupils.
 
-        None if there are no such polynomials. Slopes of maps are omitted.
+        Reliefs and wavefronts that are polynomials of high order are steepest there. None if no pupil has such a
+        polynomial. The slopes of reliefs and wavefronts that are not polynomials, such as maps of samples, are omitted.
         """
         if self._polynomials[0].shape[1] < STEEP_POWERS:
             return None
@@ -247,7 +263,11 @@ class LightStack:
         return StackSlopes(RIM, x, y, along_x, along_y)
 
     def _smooth_slopes(self, across: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the slopes of polynomials and of spheres about the axis at `disk_points`, along x and along y."""
+        """Return the slopes along x and along y of the optical path, at `disk_points`, arrays (beam, point).
+
+        Only reliefs and wavefronts that are polynomials are included, and the spherical waves of ideal lenses and of
+        sources on the axis.
+        """
         coefficients = self._polynomials[0]
         by_x, by_y = _power_slopes(across, coefficients.shape[1])
         flat, scale = coefficients.reshape(len(coefficients), -1), (self.vacuum_wavelength / self.radius)[:, None]

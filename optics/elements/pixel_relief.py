@@ -55,21 +55,21 @@ class PixelRelief(Relief):
         return 0.0 if self._level else math.inf
 
     def detail(self, level: float) -> float:
-        """Return 0, because `scatter` accounts for all detail."""
+        """Return 0, because `scatter` already includes all light that the pixels scatter."""
         return 0.0
 
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
         """Return the frequency [cycles per radius] beyond which at most a fraction `share` of the light is scattered.
 
-        The result is 0 if all heights within the aperture are equal, and infinity if more than `share` / 2 of the light
-        may lie beyond 32 repetitions of the spectrum.
-
-        The limit holds for frequencies along x and along y. The power spectrum behind the pupil is that of the samples
-        (a discrete Fourier transform), repeated periodically and multiplied by sinc², the power spectrum of one pixel.
+        The limit holds for frequencies along x and along y. The power spectrum of the light behind the pupil is that of
+        the samples (a discrete Fourier transform), repeated periodically and multiplied by sinc², the power spectrum of
+        one pixel. The spectrum is computed up to its 32nd repetition on either side. The result is infinity if the
+        frequencies beyond this range contain more than `share` / 2 of the light along x or along y. It is 0 if all
+        heights within the aperture are equal.
 
         turns: phase in waves per metre of height [1/m].
         opening: aperture of the pupil.
-        share: this fraction, relative to the light that passes the opening.
+        share: the fraction, relative to the light that passes the opening.
         """
         n = len(self._heights)
         centres = (np.arange(n) + 0.5) * 2 / n - 1
@@ -103,7 +103,11 @@ class PixelRelief(Relief):
 def _reach(power: np.ndarray, share: float) -> float:
     """Return the frequency [cycles per radius] beyond which at most the fraction `share` of the power lies.
 
-    Infinity: the frequency lies beyond REPETITIONS repetitions of the spectrum.
+    The power spectrum is that of the samples, repeated periodically and multiplied by sinc², the power spectrum of one
+    pixel. It is computed up to its 32nd repetition (REPETITIONS) on either side. The result is infinity if more than
+    `share` of the power lies beyond this range.
+
+    power: power spectrum of the samples, from a discrete Fourier transform.
     """
     n = len(power)
     order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)

@@ -54,8 +54,8 @@ class Pupil:
     mask: M, the transmitted amplitude: GaussianMask or MaskMap. A PSF is relative to the light that falls on the open
         aperture, so absorption in a mask reduces the PSF's sum.
 
-    Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (tensors for maps) or tensors of
-    PyTorch that carry derivatives. Tensors of PyTorch are for `optics.torch.psf`.
+    Radius, height, n, focal length, coefficients or samples of W, and waist or samples of M may carry derivatives: as
+    Dr.Jit arrays (maps: Dr.Jit tensors) or, for `optics.torch.psf`, as PyTorch tensors.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -148,7 +148,7 @@ class Pupil:
         return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
     def amplitude(self, x: Array, y: Array) -> Array:
-        """Return the mask's amplitude at points [radii], arrays as in `Relief.height`; 1 without a mask."""
+        """Return the mask's amplitude at x, y [units of the radius], arrays as in `Relief.height`; 1 without a mask."""
         if self.mask is None:
             return like(x, 1.0)
         radius = like(x, self.aperture_radius)
@@ -156,7 +156,7 @@ class Pupil:
 
     @property
     def pixels(self) -> int:
-        """Number of the relief's square pixels across the pupil; 0 if it has none or all heights are equal."""
+        """Number of square pixels across the pupil; 0 unless the relief consists of such pixels of unequal height."""
         return 0 if self.height is None else int(self.height.pixels)
 
     def image_distance(self, source_distance: float) -> float:
@@ -209,11 +209,11 @@ class Pupil:
         return replace(self, height=None)
 
     def index_step(self, wavelength: float) -> Scalar:
-        """Return the relief's index n(λ) minus the index in front of the pupil, which surrounds the relief."""
+        """Return the relief's refractive index n(λ) minus the index of the medium in front of the pupil."""
         return self.n.step(wavelength, self.index_before(wavelength))
 
     def bends(self, wavelength: float) -> bool:
-        """Return whether there is a relief whose index differs from its surroundings or carries a derivative."""
+        """Return True if there is a relief and its `index_step` is not 0 or carries a derivative."""
         step = self.index_step(wavelength)
         return self.height is not None and (is_differentiable(step) or step != 0)
 
@@ -244,7 +244,7 @@ class Pupil:
         return total if (ahead := wavefront_ahead(self, x, y)) is None else total - ahead
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
-        """Return the gradient of the path over the disk and its soft edge. Square pixels of a relief count as flat."""
+        """Return the gradient of `path` over the pupil's disk and soft edge; reliefs of square pixels count as flat."""
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
@@ -262,14 +262,14 @@ class Pupil:
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
-        """First requested wavelength for each set of refractive indices; equal indices give equal slopes."""
+        """The first wavelength passed to `slopes` for each set of refractive indices. The set determines the slopes."""
         return {}
 
     def scatter(self, wavelength: float, share: float) -> float:
         """Return the frequency [1/m] along x and y beyond which at most a fraction `share` of the light is scattered.
 
-        Square pixels, masks and fine detail of maps scatter light away from geometrical rays. The result is the sum of
-        their frequencies. Callers add the frequency that corresponds to the slopes of the rays (Carson's rule).
+        It is the sum of such frequencies for the pixels or fine detail of the relief, the wavefront's fine detail, and
+        the mask. By Carson's rule, the whole bandwidth is this sum plus the largest ray slope divided by wavelength.
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))
@@ -287,9 +287,9 @@ class Pupil:
         return found if self.mask is None else found + self.mask.detail(light, self.radius)
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
-        """Return the frequency [1/m] above which phase [rad] and mask amplitude vary by less than `tolerance`.
+        """Return f [1/m] so that components of phase [rad] and mask amplitude above f are smaller than `tolerance`.
 
-        Jumps between pixels are excluded, because they are sampled separately.
+        A relief of square pixels is ignored, because its jumps are sampled separately.
         """
         level, step = tolerance * wavelength / (2 * np.pi), abs(number(self.index_step(wavelength)))
         found = 0.0

@@ -37,7 +37,7 @@ def relief_height(pupil: Pupil, x: Array, y: Array) -> Array | None:
 
 
 def wavefront_ahead(pupil: Pupil, x: Array, y: Array) -> Array | None:
-    """Return the length [m] by which the wavefront is ahead at points (x, y) [m]; None without an aberration."""
+    """Return the length [m] by which the wavefront is ahead of the ideal one at (x, y) [m]; None without aberration."""
     if pupil.wavefront is None:
         return None
     own = pupil.aperture_radius if pupil.wavefront.radius is None else pupil.wavefront.radius

@@ -28,10 +28,11 @@ FEW_WAVES = 50.0  # choice: sum of all coefficients [waves] up to which float32 
 
 
 def powers_of(pupil: Pupil, wavelength: float, step: float) -> np.ndarray | None:
-    """Return coefficients of the phase of relief and wavefront [waves], (power of y, power of x), without the constant.
+    """Return the polynomial coefficients of the phase [waves] of relief and wavefront, (power of y, power of x).
 
-    Positions are in units of the pupil's radius. The result is None for reliefs other than a B-spline patch (unless
-    `step` is 0), and for wavefronts other than Zernike polynomials of orders up to HIGHEST_ORDER.
+    The constant term is set to 0. Positions are in units of the pupil's radius. The result is None if the relief is not
+    a B-spline patch, or if the wavefront does not consist of Zernike polynomials of orders up to HIGHEST_ORDER. If
+    `step` is 0, the relief is ignored.
 
     wavelength: wavelength [m] in vacuum.
     step: difference of refractive indices at the relief.

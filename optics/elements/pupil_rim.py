@@ -1,4 +1,4 @@
-"""Rim of a pupil that is known from samples: a circle, an oval (nearly an ellipse), or a convex polygon."""
+"""Rim of a pupil, found from samples of the pupil: a circle, an oval (nearly an ellipse), or a convex polygon."""
 
 from __future__ import annotations
 
@@ -55,21 +55,25 @@ class Rim:
         return self.aperture.contains((x - self.middle[0]) * scale, (y - self.middle[1]) * scale)
 
     def onto_plane(self, distance: float) -> Rim:
-        """Convert this rim from sines of directions to positions on a plane at a distance [m] from the image.
+        """Return this rim in positions [m] on a plane, if its coordinates are sines of directions.
 
         The result is centred on the origin.
+
+        distance: distance [m] of the plane from the image.
         """
         return self._scaled(lambda r: distance * r / math.sqrt(1 - r * r))
 
     def in_sines(self, distance: float) -> Rim:
-        """Convert this rim from positions on a plane at a distance [m] from the image to sines of directions.
+        """Return this rim in sines of directions, if its coordinates are positions [m] on a plane.
 
         The result is centred on the origin.
+
+        distance: distance [m] of the plane from the image.
         """
         return self._scaled(lambda r: r / math.hypot(r, distance))
 
     def _scaled(self, of_radius: Callable[[float], float]) -> Rim:
-        """Return this rim around the origin; `of_radius` maps distances of points from the middle to new distances."""
+        """Return this rim moved to the origin, with its points at new distances from its middle, by `of_radius`."""
         radius = of_radius(self.radius)
         if self.vertices is None:
             return Rim(np.zeros(2), radius)
@@ -81,11 +85,13 @@ class Rim:
 def rim_around(lit: np.ndarray, dark: np.ndarray | None = None) -> Rim:
     """Return the rim of a convex pupil from the positions (2, n) of its illuminated samples.
 
-    Circle and oval are least-squares fits to all corners of the convex hull. If a grid has an even number of samples
-    and one at the centre, it extends farther to one side, where a single sample may lie on the rim. This sample must
-    not determine the fit. If neither fits, the rim is the hull. If there are also dark samples, each edge of the hull
-    is moved outwards: half way to the nearest dark sample or, if none is near, to the circle or oval around all
-    samples.
+    The rim is a circle or an oval if one of them fits the corners of the samples' convex hull. The fit is by least
+    squares to all corners, so that no single corner determines it. A single sample may lie on the rim, for example, if
+    the grid has an even number of samples, one of them at the centre: the grid then extends farther to one side.
+
+    If neither fits, the rim is the hull. If `dark` samples are also given, each edge of the hull is moved outwards. If
+    a dark sample is near the edge, the edge is moved half way to the nearest one. Otherwise it is moved to the circle
+    or oval around all samples, with and without light.
 
     dark: positions (2, m) of samples without light. None: unknown.
 
@@ -123,10 +129,16 @@ def _hull(points: np.ndarray) -> Any:
 
 
 def _cut(hull: Any, dark: np.ndarray, apart: float) -> np.ndarray:
-    """Return the hull's corners after its edges were moved half way to dark samples or out to the rim of all samples.
+    """Move the edges of the hull outwards, and return the corners of the resulting polygon, (corner, 2).
 
-    apart: distance between samples. A dark sample limits an edge if it lies in front of the edge (not beyond its ends),
-        and less than NEXT times this distance away.
+    A dark sample, which is one without light, is near an edge if it lies in front of the edge, less than NEXT (3) times
+    `apart` away, and less than `apart` beyond the ends of the edge. An edge is moved half way to the nearest of the
+    dark samples that are near it. If there is none, the edge is moved to the circle or oval around all samples, with
+    and without light.
+
+    hull: convex hull of the illuminated samples of a pupil.
+    dark: positions of the dark samples, array (sample, 2).
+    apart: distance between neighbouring samples.
     """
     from scipy.spatial import HalfspaceIntersection
 
@@ -166,7 +178,9 @@ def _round(hull: Any) -> tuple[np.ndarray, float, np.ndarray | None, float]:
 
 
 def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Return the centre of a fitted circle, the radius that includes all corners, and the relative residual of the fit.
+    """Return the centre of a circle fitted to a hull's corners, the largest distance of a corner from it, and residual.
+
+    The residual of the fit is relative to this distance.
 
     Source: Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976.
     """
@@ -177,11 +191,11 @@ def _circle(corners: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 
 def _oval(corners: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return a polygon with the area of an oval around the corners of a hull, and the relative residual of the fit.
+    """Return a polygon for an oval that encloses the corners of a hull, and the relative residual of the oval's fit.
 
-    The oval is an ellipse. Its radius is multiplied by a Fourier series of the angle if this improves the fit much,
-    because the image of a round stop is an ellipse only to first order. The residual is infinite if the best conic is
-    not an ellipse.
+    The polygon has approximately the area of the oval. The oval is an ellipse that is fitted to the corners. Its radius
+    is multiplied by a Fourier series of the angle if this improves the fit much, because the image of a round stop is
+    an ellipse only to first order. The residual is infinite if the best conic is not an ellipse.
     """
     origin = corners.mean(axis=0)
     x, y = (corners - origin).T

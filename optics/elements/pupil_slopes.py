@@ -20,7 +20,7 @@ MOST = 1025  # choice, limited by memory: largest number of points along a side 
 
 
 class HasPath(Protocol):
-    """Interface of a pupil whose slopes are computed from its optical path."""
+    """Interface of a pupil for `all_slopes`, which computes the gradient of the optical path."""
 
     @property
     def radius(self) -> float: ...
@@ -30,9 +30,11 @@ class HasPath(Protocol):
 
 @lru_cache(maxsize=64)
 def all_slopes(pupil: HasPath, wavelength: float, distance: float, angle: tuple[float, float], pieces: int) -> Slopes:
-    """Return slopes on a grid that resolves `pieces` polynomial pieces across the pupil, with at most 1025² points.
+    """Return the slopes of the optical path at the points of a square grid over the pupil and its soft edge.
 
     distance, angle: distance [m] of the source and direction of its light, as in `PointSource`.
+    pieces: number of polynomial pieces of the relief or wavefront across the pupil. The grid has about four points for
+        each piece, but at most 1025 points along a side.
     """
     n = int(min(MOST, max(MANY if pieces else FEW, 4 * pieces + 1)))
     grid = _grid(pupil, n)

@@ -1,4 +1,6 @@
-"""Field of polarised light just behind a pupil, computed for its rays and expressed as masks of the pupil.
+"""Field of polarised light just behind a pupil, from the rays that leave the pupil.
+
+A component of the field is used as the amplitude transmittance of a mask in the pupil.
 
 A ray is perpendicular to the wavefront, so its direction is s = ∇L/n, where L is the path from the source through the
 pupil, and n the refractive index behind it. The electric field is rotated together with the ray, along the shortest
@@ -41,7 +43,11 @@ def turned(field: Vector, before: Vector, after: Vector) -> Vector:
 
 
 def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
-    """Return the direction of a source's light, and its field: the unit vector x (0) or y (1), turned with it."""
+    """Return the direction of a source's light in front of the pupil, and its electric field, as unit vectors.
+
+    Light along the z axis would have its field along x (`axis` = 0) or along y (`axis` = 1). The field is turned by the
+    shortest rotation that turns the z axis into the direction of the light.
+    """
     x, y = (math.tan(angle) for angle in source.angle)
     length = math.hypot(x, y, 1)
     along = (x / length, y / length, 1 / length)
@@ -86,7 +92,7 @@ class RayField(Mask):
 
     @property
     def pupil(self) -> Pupil:
-        """The pupil with this mask."""
+        """The pupil of `beam`, with this `RayField` as its mask."""
         return replace(self.beam.pupil, mask=self)
 
     def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
@@ -101,9 +107,12 @@ class RayField(Mask):
         return found if own is None else found * own.amplitude(x, y, radius)
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return a bandwidth that includes the path, the pupil's own mask and, behind a lens, the rays' directions.
+        """Return f [1/m] so that components of this mask's amplitude above the spatial frequency f are below `level`.
 
-        These directions have singularities at the imaginary distances ±i f from the axis, with the focal length f.
+        It is the sum of up to three such frequencies. The first is that of the optical path through the pupil, doubled
+        because the field depends on products of the path's slopes. The second is that of the mask in `beam.pupil`, if
+        there is one. With a lens, the third is that of the ray directions as functions of the distance from the axis:
+        these functions have singularities at the imaginary distances ±i f₀, where f₀ is the focal length.
         """
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)

@@ -38,7 +38,7 @@ class Dispersion(ABC):
         return n
 
     def step(self, wavelength: float, before: float) -> Scalar:
-        """Return n minus the index of the medium in front, `before`, at a vacuum wavelength [m]."""
+        """Return this material's index at a vacuum wavelength [m] minus `before`, the index of the medium in front."""
         return self.at(wavelength) - before
 
     @property
@@ -84,7 +84,8 @@ class RefractiveIndex(Dispersion):
         """Return the Cauchy curve with index n_d at 587.562 nm and the given Abbe number (infinite: no dispersion).
 
         Raises:
-            ValueError: n_d or A of the curve is outside [1, 10], or the Abbe number is not positive.
+            ValueError: n_d is outside [1, 10], or so is the curve's limit A at long wavelengths, or the Abbe number is
+                not positive.
         """
         in_range("n_d", n_d, 1.0, 10.0, carried=True)
         number = positive("abbe_number", abbe_number, "1", infinite=True)
@@ -187,8 +188,8 @@ def medium(name: str) -> Dispersion:
     """Return the dispersion of a medium of eyes.
 
     name: "water", "cornea", "aqueous", "vitreous", or "chromatic_eye", the single medium of Thibos' reduced human eye.
-        The curve of water was measured from 182 to 1129 nm. Those of cornea, aqueous and vitreous hold from 400 to 900
-        nm. Beyond these ranges they are extrapolated.
+        The curve of water was measured from 182 to 1129 nm. The curves of cornea, aqueous and vitreous hold from 400 to
+        900 nm. Beyond these ranges, the curves are extrapolated.
 
     Raises:
         ValueError: the medium is unknown.
@@ -197,7 +198,7 @@ def medium(name: str) -> Dispersion:
 
 
 def index_of(name: str, value: Any) -> Dispersion:
-    """Return the dispersion curve for a number or a curve, without derivatives.
+    """Return a dispersion curve without derivatives: `value` itself, or a constant curve if it is a number.
 
     name: name of the argument, for error messages.
 
@@ -214,7 +215,7 @@ def index_of(name: str, value: Any) -> Dispersion:
 
 @lru_cache(maxsize=64)
 def _constant(n: float) -> RefractiveIndex:
-    """Return the curve of a medium without dispersion. Many pupils have the same medium, so it is cached."""
+    """Return the curve of a medium without dispersion. Curves are cached, because many pupils have the same medium."""
     return RefractiveIndex(n)
 
 

@@ -1,7 +1,8 @@
 """Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
 
 A relief is a function of (x, y) in units of the aperture radius. Inside the pupil, x and y lie in [-1, 1]. Rows ascend
-with y, columns with x. `Pupil.path` converts heights to paths, and `Beam.waves` paths to phases.
+with y, columns with x. `Pupil.path` converts heights to optical paths, and `Beam.waves` converts optical paths to
+phases.
 """
 
 from __future__ import annotations
@@ -48,10 +49,10 @@ class Relief(ABC):
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Return the frequency [cycles per aperture radius] above which the relief varies by less than `level` [m]."""
+        """Return f [cycles per aperture radius] so that components of the relief above f are below `level` [m]."""
 
     def detail(self, level: float) -> float:
-        """Return the frequency [cycles per radius] above which detail that scatters light is below `level` [m]."""
+        """Return f [cycles per radius] so that light-scattering detail of the relief above f is below `level` [m]."""
         return self.bandwidth(level)
 
     @property
@@ -61,12 +62,12 @@ class Relief(ABC):
 
     @property
     def span(self) -> float:
-        """Difference between the largest and smallest height [m] that define the relief."""
+        """Difference [m] between the largest and the smallest of the samples or control points; 0 if there are none."""
         return 0.0
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbouring samples if a smooth relief cannot represent it, else 0."""
+        """Largest step [m] between neighbouring samples if it is too steep for a smooth relief; otherwise 0."""
         return 0.0
 
     @property
@@ -90,7 +91,7 @@ class BSplineRelief(Relief):
     """One uniform bicubic B-spline patch, h(x, y) = Σ_ij c[i, j] B_i(v) B_j(u), u = (x/a + 1)/2, v = (y/a + 1)/2.
 
     control_points: c, (4, 4) heights [m], (y, x); the knots are -3 ... 4. a is the pupil's radius. The patch can
-    represent every bicubic polynomial, so paraboloids are exact (`paraboloid`). Outside the square the polynomial
+    represent every bicubic polynomial, so paraboloids are exact (`paraboloid`). Outside [-a, a]² the polynomial
     continues. Source: Piegl & Tiller, The NURBS Book, ch. 2.
 
     A Dr.Jit or PyTorch tensor may carry derivatives.
@@ -119,11 +120,12 @@ class BSplineRelief(Relief):
     def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
         """Return h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
 
-        With curvature = medium_n / ((n - object_n) f), where the indices are those of a `Pupil`, it is a lens of the
-        focal length f, exp(-ik medium_n r²/2f).
+        If curvature = medium_n / ((n - object_n) f), the relief acts as a lens of the focal length f,
+        exp(-ik medium_n r²/2f). n is the index of the relief, medium_n the index behind it, and object_n the index in
+        front of it, as in `Pupil`.
 
-        On uniform knots the polar form of x² has the control values X_i² - δ²/3, with the Greville abscissae X_i = (2i
-        - 3) a, the knot spacing δ = 2a and the radius a.
+        The control values of x² are X_i² - δ²/3. Here X_i = (2i - 3) a are the Greville abscissae, δ = 2a is the
+        spacing of the uniform knots, and a is the radius.
 
         Raises:
             ValueError: an argument is outside its valid range, which the message states.
@@ -154,9 +156,10 @@ class BSplineRelief(Relief):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True for a constant height or a paraboloid on the axis: c[i, j] is then c₀ + c₁ ((2i - 3)² + (2j - 3)²).
+        """True for a constant height or a paraboloid on the axis; False if the control points carry derivatives.
 
-        False if the control points carry derivatives.
+        The control points are then c[i, j] = c₀ + c₁ ((2i - 3)² + (2j - 3)²) for i and j from 0 to 3, with two
+        constants c₀ and c₁.
         """
         if is_differentiable(self.control_points):
             return False  # a derivative depends on every control point
@@ -181,7 +184,8 @@ class HeightMap(Relief):
     A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: the array has another number of axes, is empty, of half precision, or not of finite real numbers.
+        ValueError: the array is not two-dimensional, is empty, is of half precision, or contains anything other than
+            finite real numbers.
     """
 
     samples: np.ndarray | Array
@@ -199,7 +203,11 @@ class HeightMap(Relief):
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbours if it exceeds half the span of at least 16 x 16 samples; else 0."""
+        """Largest difference [m] between neighbouring samples if the map has jumps; otherwise 0.
+
+        A map has jumps if this difference is more than half of `span`, the range from the lowest to the highest sample,
+        and if there are at least 16 rows and 16 columns of samples.
+        """
         many = min(self._heights.shape) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0
@@ -233,14 +241,20 @@ class HeightMap(Relief):
         return sparse_product(weights, self._values(like_array).reshape(-1))
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
-        """Return heights (y, x) at the same positions [radii] along both axes; NumPy arrays without derivatives."""
+        """Return heights at the points of a square grid, a NumPy array (y, x) without derivatives.
+
+        at: positions in units of the radius, which are used both as x and as y.
+        """
         return np.asarray(self.height(at[None, :], at[:, None]))
 
     def bandwidth(self, level: float) -> float:
         return band_of(self._heights, level)
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return `Relief.detail` of a central square, in cycles per half side; `part`: half side [radii], up to 1."""
+        """Return the result of `Relief.detail` for a square in the middle of the map, in cycles per half side of it.
+
+        part: half side of this square in units of the radius. Values above 1 count as 1.
+        """
         return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
     @property

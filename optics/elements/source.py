@@ -16,12 +16,13 @@ STEEPEST = 1.5  # choice [rad]: largest angle of the light to the axis
 
 @dataclass(frozen=True)
 class PointSource:
-    """A point source. Its wave on the pupil is exp(ik(ρ(x, y) - ρ(0, 0))), with the distance ρ from the source.
+    """A point source. Its wave on the pupil is exp(ik(ρ(x, y) - ρ(0, 0))), where ρ is the distance from the source.
 
     distance: distance [m] in front of the pupil, along the axis. An infinite distance gives a plane wave, and ρ is then
-        the path along its direction.
+        measured along the direction in which the wave travels.
     angle: (θx, θy) [rad], the direction in which the light travels at the pupil's centre. A thin lens of focal length f
-        focuses parallel light near f (tan θx, tan θy), with the off-axis aberrations of a single stigmatic lens.
+        focuses parallel light near the point x = f tan θx, y = f tan θy. The focus has the off-axis aberrations of a
+        single stigmatic lens.
 
     These numbers may carry derivatives.
 

@@ -1,13 +1,13 @@
 """Rays through a sphere whose refractive index depends on the distance from the centre.
 
-Lengths are relative to the sphere's radius, and indices n relative to the medium. A ray that would pass the centre at a
-distance h if it were straight keeps n r sin i = h, where i is its angle to the radius (Bouguer's theorem). Between
-entry and exit, it turns about the centre by
+Lengths are relative to the sphere's radius, and indices n relative to the medium. The height h of a ray is the distance
+of the incident ray's straight line from the centre. Along the ray, n r sin i = h is constant, where i is the angle
+between the ray and the radius (Bouguer's theorem). Between entry and exit, the ray turns about the centre by
 
     ψ(h) = 2 ∫ h dr / (r √(n² r² - h²)),
 
-integrated from the turning point, n r = h, to the surface. Its optical path is 2 ∫ n² r dr / √(n² r² - h²). Both
-integrals become smooth with r² = a² + y², where a is the radius of the turning point.
+integrated from the turning point, where n r = h, to the surface. Its optical path is 2 ∫ n² r dr / √(n² r² - h²) with
+the same limits. The substitution r² = a² + y², where a is r at the turning point, makes both integrands smooth.
 
 Source: Luneburg, Mathematical Theory of Optics, 1964, §27.
 """
@@ -35,17 +35,23 @@ ROUNDING = 1e-9  # margin for n r in the check of a profile
 
 @dataclass(frozen=True, eq=False)
 class SphericalIndex:
-    """The index of a sphere of radius R, relative to its medium, as a polynomial in (r/R)², with the distance r."""
+    """The index of a sphere relative to its medium, as a polynomial in (r/R)².
+
+    R is the radius of the sphere, and r the distance from its centre.
+    """
 
     index: Chebyshev
 
     @classmethod
     def from_function(cls, relative: Callable[[np.ndarray], np.ndarray]) -> SphericalIndex:
-        """Interpolate a relative index, a function of the relative distance r/R, at Chebyshev points in (r/R)².
+        """Interpolate the index n of a sphere relative to its medium, at Chebyshev points in (r/R)².
+
+        relative: function that returns n for an array of r/R, the distance from the centre divided by the radius.
 
         Raises:
-            ValueError: n r decreases somewhere, at values below 1 (that just outside the sphere) and below that at the
-                surface. Light could then stay inside.
+            ValueError: light could stay inside the sphere, because n r/R decreases outwards somewhere. A decrease is
+                allowed only where n r/R exceeds 1 or exceeds n(R). These are the values of n r/R just outside and just
+                inside the surface.
         """
         found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
         t = np.linspace(0, 1, 20 * TERMS)
@@ -78,10 +84,10 @@ class SphericalIndex:
         return np.asarray(2 * end * ((n * n * y / radial) @ gauss_legendre(NODES)[1]))
 
     def power(self) -> float:
-        """Return R/f of rays near the axis, with the sphere's radius R and the focal length f.
+        """Return R/f for rays near the axis, where R is the sphere's radius and f its focal length.
 
-        It is the limit, for small heights, of a ray's deviation divided by its height relative to R: 2 (1 - 1/n(R)) - 4
-        ∫ (dn/dt)/n² d(r/R), with the index n at the distance r and t = (r/R)².
+        A ray at a small height h is deviated by the angle (h/R)(R/f). The result is 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n²
+        d(r/R), where n is the index at the distance r from the centre, and t = (r/R)².
         """
         u, weights = gauss_legendre(NODES)
         bend = self.index.deriv()(u * u) / self.index(u * u) ** 2

@@ -1,7 +1,8 @@
 """Cubic splines through the samples of a map, at positions from -1 to 1 across the map's square.
 
-The spline is a sum of B-splines. Their coefficients follow from the samples, also beyond both ends. Values at fixed
-points are the product of a sparse matrix and these coefficients.
+The spline is a sum of B-splines. Their coefficients are computed from the samples. Along each axis there is one
+coefficient for each sample, and there are further ones beyond the first and the last sample, where the spline is
+extrapolated. Values at fixed points are the product of a sparse matrix and these coefficients.
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ FEW = 128  # choice: number of samples up to which a product with `spline_matrix
 
 
 def is_open_grid(x: Array, y: Array) -> bool:
-    """Return whether x is a NumPy row and y a NumPy column. The map's values are then a product of matrices."""
+    """Return True if x and y are NumPy arrays, x a row of the shape (1, column) and y a column of the shape (row, 1).
+
+    Such arrays describe the points of a rectangular grid. A spline's values at these points are a product of matrices.
+    """
     return library(x) is np and x.ndim == y.ndim == 2 and len(x) == 1 and y.shape[1] == 1
 
 
@@ -48,7 +52,10 @@ def spline_cell(position: Array, n: int) -> tuple[Array, list[Array]]:
 
 
 def spline_basis(at: np.ndarray, n: int) -> np.ndarray:
-    """Return the B-splines of all coefficients at positions along an axis of n samples, (position, coefficient)."""
+    """Return the values of all B-splines at positions along an axis of n samples, (position, coefficient).
+
+    There is one B-spline for each spline coefficient.
+    """
     return _basis(np.asarray(at, np.float64).tobytes(), n)
 
 
@@ -106,9 +113,11 @@ def _basis(at: bytes, n: int) -> np.ndarray:
 
 
 def _coefficients(samples: np.ndarray) -> np.ndarray:
-    """Return B-spline coefficients c = s - s''/6 of the cubic spline s through samples, along axis 0.
+    """Return the B-spline coefficients c = s - s''/6 of the cubic spline s through samples, along axis 0.
 
-    Beyond both ends, the first two coefficients have the same form, and the others continue linearly.
+    There is one coefficient for each sample, and there are further ones beyond the first and the last sample. At either
+    end, the two coefficients just beyond the samples follow from the same equation, where s is the spline extrapolated
+    beyond its samples. The coefficients farther out lie on the straight line through these two.
     """
     from scipy.interpolate import make_interp_spline
 

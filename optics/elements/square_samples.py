@@ -31,7 +31,7 @@ def square_samples(samples: Any, name: str = "height", what: str = "heights [m]"
 
 
 def map_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
-    """Return rows and columns of samples without derivatives, as a read-only array.
+    """Return samples as a read-only NumPy array (row, column), without derivatives.
 
     name, what: name of the argument, and description of its values, for error messages.
 

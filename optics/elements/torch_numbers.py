@@ -1,4 +1,4 @@
-"""Numbers of pupils and other objects that are tensors of PyTorch and require a gradient."""
+"""Search pupils and other objects for attributes that are tensors of PyTorch and require a gradient."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ def torch_numbers(element: Any) -> dict[str, Any]:
 
 
 def with_numbers(element: Any, numbers: Mapping[str, Any]) -> Any:
-    """Return the element with some attributes replaced; `numbers` has the keys of the result of `torch_numbers`."""
+    """Return a copy of `element` with some attributes replaced.
+
+    numbers: new values by paths of attributes, {"height.samples": value}, as in the result of `torch_numbers`.
+    """
     return _replaced(element, "", numbers)
 
 

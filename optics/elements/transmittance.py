@@ -32,12 +32,16 @@ class Mask(ABC):
 
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return the spatial frequency [1/m] above which the mask's amplitude varies by less than `level`."""
+        """Return f [1/m] so that components of the mask's amplitude above the spatial frequency f are below `level`.
+
+        radius: radius of the pupil [m].
+        """
 
     def detail(self, light: float, radius: float) -> float:
         """Return the frequency [1/m] along x and y beyond which the mask scatters at most a given amount of light.
 
-        light: this amount, averaged over the disk of the pupil, in units of the incident light.
+        light: amount of light that may be scattered beyond this frequency, averaged over the disk of the pupil, as a
+            fraction of the incident light.
         radius: radius of the pupil [m].
         """
         return self.bandwidth(math.sqrt(light), radius)
@@ -49,7 +53,10 @@ class Mask(ABC):
 
     @property
     def radius(self) -> float | None:
-        """Radius [m] over which the mask is known. None: it equals the pupil's radius, or is unlimited."""
+        """Radius [m] of the area in which the mask's amplitude is defined; for a square, half of its side.
+
+        None: the area is as wide as the pupil, or unlimited.
+        """
         return None
 
     @property
@@ -64,7 +71,7 @@ class GaussianMask(Mask):
 
     At r = w the intensity is 1/e².
 
-    waist: w [m]; a number of Dr.Jit or PyTorch may carry a derivative.
+    waist: w [m]. It may carry a derivative, as a Dr.Jit number or a PyTorch tensor.
 
     Raises:
         ValueError: waist is not positive.
@@ -87,11 +94,13 @@ class GaussianMask(Mask):
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """Return the frequency f [1/m] beyond which the mask sends at most a given amount of light.
+        """Return the frequency f [1/m] along x and y beyond which the mask scatters at most a given amount of light.
 
-        The fraction exp(-2π²w²f²) of the transmitted light lies beyond f, for the waist w.
+        If the waist is w, the fraction exp(-2π²w²f²) of the transmitted light lies beyond f.
 
-        light: this amount, averaged over the disk of the pupil, in units of the incident light.
+        light: amount of light that may be scattered beyond f, averaged over the disk of the pupil, as a fraction of the
+            incident light.
+        radius: radius of the pupil [m].
         """
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)
@@ -142,7 +151,10 @@ class MaskMap(Mask):
             )
 
     def _most(self) -> float:
-        """Return the largest magnitude of the amplitude within the circle that the square encloses."""
+        """Return the largest magnitude of the spline through the samples.
+
+        Only points within the circle that is inscribed in the square of the samples are considered.
+        """
         n = FINER * self._map.knots
         at = (np.arange(n) + 0.5) * 2 / n - 1
         return float(np.abs(self._map.on_grid(at)[np.hypot(*np.meshgrid(at, at)) <= 1]).max())

@@ -87,10 +87,10 @@ class TurbidMedium:
     def in_bands(self, bands: SpectralBands, receptors: Any) -> BandMedium:
         """Return the medium in spectral bands.
 
-        The coefficient of a band is a mean, weighted by the receptors' quantum catch in daylight. If there are at least
-        as many bands as receptor types, the change of every receptor's signal per metre is then exact for a white
-        surface at short distances. At longer distances, the true transmission of a band is not an exponential function,
-        and `band_error` returns the error.
+        The coefficient of a band is a mean, weighted by the receptors' quantum catch in daylight. As the distance to a
+        white surface grows from 0, the signal of every receptor therefore changes at the correct rate per metre, if
+        there are at least as many bands as receptor types. At longer distances, the true transmission of a band is not
+        an exponential function, and `band_error` returns the error.
 
         bands: the bands of an eye
         receptors: the receptors for which these bands were made
@@ -137,8 +137,8 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
     Absorption and scattering follow the classic model of case 1 waters, with λ in nm. Absorption is a = a_w + a_p + 0.2
     a_p(440) exp(-0.014 (λ - 440)), where pure water absorbs a_w, and phytoplankton absorbs a_p = 0.06 A(λ) C^0.65 with
     the relative absorption A. Scattering is b = b_w + 0.30 C^0.62 (550/λ). Pure sea water scatters b_w = 16.06 ·
-    4.72e-4 (400/λ)^4.32. The veiling light is ½ b/(a + b): water scatters light that comes from above, equally from all
-    directions of the upper hemisphere. The attenuation is c = a + b.
+    4.72e-4 (400/λ)^4.32. The veiling light is ½ b/(a + b): the water scatters light that arrives with equal radiance
+    from all directions of the upper hemisphere, and with none from below. The attenuation is c = a + b.
 
     Sources: Gordon & Morel (1983), Remote Assessment of Ocean Color; Morel (1974); Mobley (1994), Light and Water,
     equations 3.27 and 3.40. The sources of the absorption are in `water_absorption` and `phytoplankton_absorption`.
@@ -160,9 +160,10 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
 def fog(visibility: float) -> TurbidMedium:
     """Return fog of this meteorological visibility [m], in [1, 1e6].
 
-    The coefficient c = ln(50) / visibility is the same at all wavelengths, because droplets are large compared with
-    wavelengths. At the distance `visibility`, a black object has a contrast of 2 % with the horizon (Koschmieder 1924).
-    Droplets absorb almost no light, so the veiling light is as bright as a white surface in daylight.
+    The beam attenuation coefficient c = ln(50) / visibility is the same at all wavelengths, because droplets are large
+    compared with wavelengths. At the distance `visibility`, a black object has a contrast of 2 % with the horizon
+    (Koschmieder 1924). Droplets absorb almost no light, so the veiling light is as bright as a white surface in
+    daylight.
 
     Raises:
         ValueError: the visibility is outside its range.

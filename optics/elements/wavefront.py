@@ -1,7 +1,7 @@
 """Wavefront aberrations of an eye or other optics, added to an ideal lens, in the convention of aberrometers.
 
-The sign is that of reports on human eyes: a value is positive if the wavefront that leaves the eye is ahead. A myope
-therefore has a positive defocus. For light that enters the eye, the optical path is shorter by the same amount.
+A value is positive if the wavefront that leaves the eye is ahead of the ideal wavefront, as in reports on human eyes. A
+myope therefore has a positive defocus. For light that enters the eye, the value is the shortening of its optical path.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ UM = 1e-6
 
 
 class Aberration(ABC):
-    """A wavefront aberration over a circle or a square: the length [m] by which the wavefront is ahead.
+    """A wavefront aberration over a circle or square: the length [m] by which the wavefront is ahead of an ideal one.
 
     radius: radius of the circle or half side of the square [m]. None: equal to the pupil's radius.
 
@@ -41,16 +41,16 @@ class Aberration(ABC):
 
     @abstractmethod
     def ahead(self, x: Array, y: Array) -> Array:
-        """Return the length [m] by which the wavefront is ahead at (x, y) [radii], arrays as in `Relief.height`."""
+        """Return the aberration [m] at x and y in units of the radius; x, y: arrays as in `Relief.height`."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Return the frequency [cycles per radius] above which the wavefront varies by less than `level` [m]."""
+        """Return f [cycles per radius] so that components of the wavefront above f are smaller than `level` [m]."""
 
     def detail(self, level: float, part: float = 1.0) -> float:
         """Return the frequency [cycles per radius] along x and y above which fine detail is below `level` [m] rms.
 
-        Fine detail is the part of the wavefront that scatters light away from the rays that follow from its slopes.
+        Fine detail scatters light away from the rays that follow from the wavefront's slopes.
 
         part: radius of the pupil divided by that of the wavefront.
         """
@@ -59,7 +59,7 @@ class Aberration(ABC):
     @property
     @abstractmethod
     def knots(self) -> int:
-        """Number of polynomial pieces across the wavefront. Samples of the slopes must resolve them."""
+        """Number of polynomial pieces across the wavefront, which the grid for `Pupil.slopes` must resolve."""
 
     @property
     @abstractmethod
@@ -89,7 +89,7 @@ class Zernike(Aberration):
     radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: the pupil's
         radius.
 
-    A Dr.Jit or PyTorch vector, or a dictionary of such numbers, may carry derivatives.
+    Dr.Jit or PyTorch numbers, in a vector or as the values of a dictionary, may carry derivatives.
 
     Raises:
         ValueError: a mode is unknown, its order is above 30, a coefficient is not a finite number, a vector does not
@@ -137,9 +137,9 @@ class Zernike(Aberration):
         coefficients_um: {number: [µm]}, or a row [µm] that starts with number 1 (piston).
         radius: radius [m] of the circle. None: the pupil's radius.
 
-        Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. Their
-        coefficients are therefore divided by √((2 - δ_m0)(n + 1)). Many interferometers and programs for lens design
-        use Fringe polynomials. A row that is a Dr.Jit array is not accepted.
+        Fringe polynomials, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ, have the amplitude 1 at the rim. The
+        result has their coefficients divided by √((2 - δ_m0)(n + 1)), as the normalisation of `Zernike` requires. Many
+        interferometers and lens design programs use Fringe polynomials. A row that is a Dr.Jit array is not accepted.
 
         Raises:
             ValueError: a number is outside 1 to 36, or a coefficient is invalid, see `Zernike`.
@@ -156,7 +156,7 @@ class Zernike(Aberration):
         return total
 
     def ahead_at(self, x: np.ndarray, y: np.ndarray, like_array: Array) -> Array:
-        """Return the result of `ahead` at positions of NumPy, whose polynomials wavefronts share.
+        """Return the result of `ahead` at (x, y) [radii], from cached values of the polynomials at these positions.
 
         like_array: array of NumPy or PyTorch, which determines the library and the device of the result.
         """
@@ -191,7 +191,10 @@ class Zernike(Aberration):
         return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return 0: a mode has only n/2 cycles, and its slopes, in proportion to n², account for higher frequencies."""
+        """Return 0, because a Zernike polynomial has no fine detail that scatters light away from the rays.
+
+        It has only n/2 cycles across the circle. Rays reach higher frequencies, as slopes at the rim grow with n².
+        """
         return 0.0
 
     @property
@@ -224,7 +227,7 @@ class Zernike(Aberration):
         return library(x).stack([self._coefficient(n, m, x) for n, m in named])
 
     def _coefficient(self, n: int, m: int, x: Array) -> Array:
-        """Return the coefficient [m] of a mode as a number of the array type of `x`."""
+        """Return the coefficient [m] of the mode (n, m), converted to the array type of `x`."""
         given = self.coefficients_um
         if not isinstance(given, dict) and is_differentiable(given):
             return gather(like(x, given), (n * (n + 2) + m) // 2) * UM
@@ -262,7 +265,7 @@ class WavefrontMap(Aberration):
         return self._map.height(x, y)
 
     def weighted(self, weights: Any, like_array: Array) -> Array:
-        """Return W [m] at fixed points, see `HeightMap.weighted`."""
+        """Return the wavefront W [m] at fixed points, see `HeightMap.weighted`."""
         return self._map.weighted(weights, like_array)
 
     def bandwidth(self, level: float) -> float:

@@ -38,11 +38,13 @@ def derivative(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) -> np.ndarray:
-    """Return |∇L + n (ξ - x) / D| for points ξ of the pupil and x of a plane, D = |ξ - x| apart, (target, point).
+    """Return |∇L + n (p - t) / D| for points p of the pupil and target points t of a plane behind it, (target, point).
 
-    points: x, y, ∂L/∂x and ∂L/∂y of points of the pupil, where L is the optical path to the point.
+    L is the optical path from the source to p, n the refractive index behind the pupil, and D the distance from p to t.
+
+    points: rows x, y, ∂L/∂x and ∂L/∂y for the points p.
     to: x and y of the target points.
-    bend: refractive index n behind the pupil, and distance z [m] of the targets' plane.
+    bend: refractive index n, and distance [m] of the plane from the pupil.
     """
     x, y, px, py = points
     dx, dy = x - to[0], y - to[1]
@@ -54,7 +56,14 @@ def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) 
 
 @dataclass(frozen=True, eq=False)
 class Slopes(ReadOnlyArrays):
-    """Gradient of the optical path, (y, x), on a grid over a disk of this radius [m] and its soft edge."""
+    """Gradient of the optical path to points of a pupil, sampled on a grid over the pupil's disk and its soft edge.
+
+    The soft edge is a ring around the disk, into which a smoothed aperture extends. A slope is the magnitude of the
+    gradient, which has no unit.
+
+    along_x, along_y: components of the gradient, arrays (y, x).
+    radius: radius [m] of the disk.
+    """
 
     grid: Grid
     along_x: np.ndarray
@@ -71,22 +80,25 @@ class Slopes(ReadOnlyArrays):
 
     @cached_property
     def steepest(self) -> float:
-        """Largest slope over the disk and its soft edge."""
+        """Largest magnitude of the optical path's gradient over the pupil's disk and its soft edge."""
         return math.sqrt(self._squared[self.distance_from_axis <= (1 + EDGE_REACH) * self.radius].max())
 
     @cached_property
     def steepest_inside(self) -> float:
-        """Largest slope over the disk."""
+        """Largest magnitude of the optical path's gradient over the pupil's disk, without its soft edge."""
         return math.sqrt(self._squared[self.distance_from_axis <= self.radius].max())
 
     def spread(self, margin: float, towards: tuple[Grid, float, float] | None = None) -> np.ndarray:
-        """Return slopes at points that are evenly spread over the disk.
+        """Return slopes, sorted in descending order, at points that are evenly spread over the pupil's disk.
 
-        The points extend beyond the rim by a margin [radii], but not beyond the square around the disk. Their slopes
-        are sorted into groups of equal size, each of which is represented by its largest slope.
+        A slope is the magnitude of the gradient of an optical path across the pupil. The points extend beyond the
+        disk's rim by a margin [radii], but not beyond the square around the disk. The slopes are sorted into groups of
+        equal size, and the result contains the largest slope of each group.
 
-        towards: window, its distance [m] and the refractive index. The slopes are then upper bounds of those of the
-            paths to any point of the window, see `turning`. None: slopes of the wavefront alone.
+        towards: window in the sensor plane, its distance [m] from the pupil, and the refractive index between them. The
+            path is then the whole path through a point of the pupil to a point of the window, see `turning`. For each
+            point of the pupil, the slope is an upper bound for all points of the window. None: the path ends at the
+            pupil.
         """
         within = np.abs(self.grid.x) <= self.radius
         inside = (self.distance_from_axis <= (1 + margin) * self.radius) & within[:, None] & within
@@ -104,8 +116,9 @@ class Slopes(ReadOnlyArrays):
     def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
         """Return the largest slope |∇L + n (ξ - x) / D| of paths through points ξ of the pupil to points x of a window.
 
-        L is the optical path to ξ, and D is the distance between ξ and x. The window lies in a plane at `distance` [m].
-        The first value is for the disk and its soft edge, the second for the disk alone.
+        L is the optical path to ξ, D is the distance between ξ and x, and n is the index `medium_n` behind the pupil.
+        The window lies in a plane at `distance` [m] from the pupil. The first value is the largest slope for points ξ
+        in the pupil's disk or in the soft edge around it. The second value is for the disk alone.
         """
         soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
         x, y = np.broadcast_arrays(self.grid.x[None, :], self.grid.y[:, None])
@@ -133,7 +146,13 @@ class Slopes(ReadOnlyArrays):
         return float(found[0]), float(found[1])
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points at which rays from the disk hit a plane at `distance` [m]; infinite for evanescent rays."""
+        """Return the coordinates x and y [m] at which rays from the pupil's disk hit a plane at `distance` [m].
+
+        There is one ray for each sample of the grid in the disk. For an evanescent ray, x is infinite, or NaN if
+        the slope along x is 0, and the same holds for y.
+
+        medium_n: refractive index behind the pupil.
+        """
         inside = self.distance_from_axis <= self.radius
         px, py = self.along_x[inside] / medium_n, self.along_y[inside] / medium_n
         axial = np.sqrt(np.maximum(1 - px**2 - py**2, 0))

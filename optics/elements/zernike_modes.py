@@ -17,9 +17,11 @@ MOST_CACHED = 4_000_000  # choice, limited by memory: largest number of values o
 
 
 def mode(n: int, m: int, x: Any, y: Any) -> Any:
-    """Return the Zernike polynomial Z_n^m at (x, y) in units of the circle's radius, arrays of any library.
+    """Return the Zernike polynomial Z_n^m at points (x, y).
 
     It is norm(n, m) ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos mθ, sin |m|θ}, with k = (n - |m|)/2 and Jacobi's polynomials P.
+
+    x, y: positions in units of the circle's radius, arrays of NumPy, PyTorch or Dr.Jit.
     """
     sine, cosine = x * 0, x * 0 + 1.0
     for _ in range(abs(m)):
@@ -48,7 +50,7 @@ def _jacobi(order: int, highest: int, t: Any) -> Iterator[Any]:
 def weighted_modes(weights: Any, named: tuple[tuple[int, int], ...], x: np.ndarray, y: np.ndarray) -> Any:
     """Return Σ w Z_n^m at (x, y), one w for each mode (n, m) in `named`, as an array of the library of `weights`.
 
-    The polynomials are cached unless they have too many values, since many wavefronts are evaluated at the same points.
+    Many wavefronts are evaluated at the same points, so the polynomials are cached, unless they have too many values.
 
     weights: array of NumPy or PyTorch, in float64.
     x, y: positions, float64.

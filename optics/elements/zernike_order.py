@@ -62,10 +62,15 @@ def fringe_mode(j: int) -> Mode:
 
 
 def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
-    """Return coefficients by mode from {number: coefficient}, or from a row that starts with number 1.
+    """Return Zernike coefficients by mode, {(n, m): coefficient}, from coefficients by number.
+
+    The number of a polynomial is its place in a published order, such as Noll's.
+
+    given: {number: coefficient}, or a sequence of coefficients, the first of which has the number 1.
+    mode: function that converts a number to a mode (n, m), such as `noll_mode`.
 
     Raises:
-        ValueError: the argument is of another kind, a number does not exist, or a coefficient is not finite.
+        ValueError: `given` is of another kind, a number does not exist, or a coefficient is not finite.
     """
     if isinstance(given, Mapping):
         for j, value in given.items():
@@ -77,7 +82,9 @@ def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
 
 
 def modes_of_vector(given: Any) -> dict[Mode, float]:
-    """Return coefficients by mode from a vector ordered by the index of OSA, without derivatives.
+    """Return coefficients by mode, {(n, m): coefficient}, from a vector in the order of the OSA index.
+
+    Derivatives that the vector carries are dropped.
 
     Raises:
         ValueError: the argument is not a vector of 1 to 496 finite numbers.

@@ -42,8 +42,8 @@ def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
 def least_eye_parameter(wavelength: float, lattice: str = "hexagon") -> float:
     """Return the smallest useful eye parameter [m]: λ/√3 for a hexagonal lattice, λ/2 for a square one.
 
-    With this value, the finest grating that the lattice resolves has the period λ/D. Facets of the diameter D do not
-    transmit finer gratings.
+    With this value, the finest grating that the lattice of facets resolves has the period λ/D, where D is the diameter
+    of a facet. Facets do not transmit finer gratings.
 
     wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
     lattice: "hexagon" or "square".
@@ -107,8 +107,9 @@ def ideal_contrast_sensitivity(
     photons: number N of photons that the receptors absorb from one square degree during the presentation.
         `PhotonBudget.photons` returns it, if the etendue is the pupil's area times (π/180)² times the fraction of the
         retina that receptors cover.
-    area: area A of the grating [square degrees], a number or one for each frequency. For n · n cycles at the frequency
-        u, it is (n/u)². For a smooth window, it is the integral of the squared window.
+    area: area A of the grating [square degrees], a number or one for each frequency. For a square that is n periods
+        wide and high, at the frequency u, it is (n/u)². For a grating with a smooth window, it is the integral of the
+        squared window.
     d_prime: detectability d' at the threshold. 0.954 corresponds to 75 % correct choices between two intervals.
 
     Raises:

@@ -39,11 +39,13 @@ def choose_bands(
         with 2n bands.
 
     tolerance: largest error, 1e-6 to 0.5.
-    receptors: `Receptors`, or a name or peak wavelengths for `optics.receptors_of`.
-    kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
-        side of a receptor. None: the kernel is the same for all wavelengths.
-    white: fraction of a white surface's signal that kernels transmit if they are wide enough to contain all light.
-        None: the fraction that the given kernels transmit.
+    receptors: `Receptors`, or an argument of `optics.receptors_of`: a name, or peak wavelengths.
+    kernels: function that takes an array of wavelengths and returns a kernel for each of them, array (wave, ky, kx). A
+        kernel has one value per cell. Cells are equal rectangles, samples_per_receptor of them along each side of a
+        receptor. None: the kernel is the same for all wavelengths.
+    white: signal of a white surface, relative to the signal that it would give if the pupil's mask absorbed no light.
+        It is the pupil's `transmission`, and includes light outside the windows of the kernels. Errors are divided by
+        it. None: the signal computed from the given kernels, whose windows may omit some light.
 
     Raises:
         ValueError: the tolerance is outside its range, or the receptors are invalid.
@@ -72,10 +74,13 @@ def choose_bands(
 
 
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
-    """Return the largest error for the coloured surfaces of `choose_bands`, over all phases φ and all channels.
+    """Return the largest error among the signals of all channels for sinusoidal reflectances in daylight.
 
-    It is half the modulus of the error of Σ w d e^{2πiλ/Λ}, with the bands' weights w, daylight d, and the width Λ of
-    `range_nm`.
+    The reflectance is (1 + cos(2πλ/Λ + φ))/2, where Λ is the width of `range_nm`, and φ is the phase with the largest
+    error. This error is half the modulus of the error of the sum Σ w d e^{2πiλ/Λ} over bands, where w are the bands'
+    weights and d is daylight.
+
+    exact: the bands that define the correct signal.
     """
     period = (range_nm[1] - range_nm[0]) * 1e-9
 

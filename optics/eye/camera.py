@@ -33,14 +33,16 @@ class Sensor:
 
     pixels: number of pixels (height, width).
     pitch: side [m] of a square pixel, whose whole area is sensitive.
-    filters: "bayer" for rows of red, green and of green, blue, repeated over the sensor; or any `receptors` of an
-        `Eye`: `Receptors` with measured quantum efficiencies, a mosaic, or the name of an animal's receptors. Without a
-        mosaic, every pixel has all types. The filters of "bayer" and "rgb" have peaks at 600, 520 and 460 nm.
+    filters: colour filters of the pixels. "bayer": red and green pixels alternate in the first row, green and blue
+        pixels in the second row, and both rows are repeated over the sensor. Any value of an Eye's argument `receptors`
+        is also valid, such as the name of an animal's receptors, or `Receptors` that have measured quantum efficiencies
+        or are arranged in a mosaic. Without a mosaic, every pixel has all types of filters. The filters of "bayer" and
+        "rgb" have peaks at 600, 520 and 460 nm.
     photon_budget: illuminance of the scene, exposure time, and quantum efficiency at the filters' peaks.
     full_well: number of electrons at which a pixel saturates.
     read_noise: standard deviation [electrons] of the noise of reading a pixel.
-    bits: bits of a digital number, 1 to 16. The largest number belongs to `full_well`. None: electrons, which are not
-        rounded.
+    bits: bits of a digital number, 1 to 16. A pixel with `full_well` electrons has the largest number. None: the result
+        is the number of electrons, which is not rounded.
     bands: number of spectral bands of the scene, 1 to 64.
 
     Raises:
@@ -82,7 +84,9 @@ def camera_image(
     sensor_distance: Scalar | None = None,
     tolerance: float = 1e-2,
 ) -> np.ndarray | Array:
-    """Return the image (channel, y, x) of a scene behind a pupil on a sensor, or the signals of an eye.
+    """Return the image (channel, y, x) that a camera or an eye forms of a scene.
+
+    A camera is a pupil with a sensor behind it. The image of an eye consists of the signals of its receptors.
 
     Light is blurred by the PSF of its distance and wavelength, and near surfaces hide far ones (see `Eye.see`). The
     blurred light is integrated over pixels and weighted by the filters. Electrons are counted with shot noise, up to
@@ -103,10 +107,10 @@ def camera_image(
         focuses an infinitely distant point, or 240 µm without a lens.
     tolerance: relative error of the PSF, see `Eye`.
 
-    Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons as float32. There is one channel with a
-    mosaic, and otherwise one for each type. If the pupil or `depth` carries derivatives, which requires bits=None, the
-    result is a Dr.Jit tensor of electrons. For an eye, the result is that of `Eye.see`. For PyTorch, see
-    `optics.torch.camera_image`.
+    Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons as float32. The image has one channel if
+    the sensor has a mosaic, and otherwise one channel for each type of filter. If the pupil or `depth` carries
+    derivatives, which requires bits=None, the result is a Dr.Jit tensor of electrons. For an eye, the result is that of
+    `Eye.see`. For PyTorch, see `optics.torch.camera_image`.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.

@@ -1,4 +1,4 @@
-"""Integrals of sampled functions over the cells of a retina.
+"""Integrals of sampled functions over the cells of a retina, the equal rectangles into which it is divided.
 
 A matrix maps samples to the integrals of the spline through them.
 """
@@ -30,11 +30,12 @@ FEWER = ((2.0, 1e-2, 0.5), (1.0, 1e-3, 0.25))
 
 
 def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
-    """Return the number of samples that integrals over cells need per cycle of the highest frequency.
+    """Return how finely an image must be sampled for accurate integrals of it over the cells of a retina.
 
-    The error of the integrals is then within a third of the tolerance.
+    The result is the number of samples per cycle of the image's highest spatial frequency. The error of the integrals
+    is then within a third of the tolerance. Cells are the equal rectangles into which the retina is divided.
 
-    cycles: number of cycles of the highest frequency per cell.
+    cycles: width of a cell, in cycles of the highest frequency.
     """
     if tolerance <= FINE_TOLERANCE:
         return FINE * (FINE_TOLERANCE / tolerance) ** (1 / ORDER)
@@ -44,11 +45,12 @@ def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
 
 @dataclass(frozen=True)
 class Tiles:
-    """Cells in a row.
+    """A row of cells, the equal rectangles into which a retina is divided.
 
     count: number of cells.
-    size: side of a cell [m].
-    from_cell: True if light comes from a whole cell of the scene, which has the same size; False if from a point.
+    size: side of a cell along the row [m].
+    from_cell: True if the source of the light is an area of the scene. The geometric image of this area is as large as
+        a cell of the retina. False if the source is a single point.
     """
 
     count: int
@@ -58,12 +60,15 @@ class Tiles:
 
 @lru_cache(maxsize=16)
 def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
-    """Return a matrix (cell, sample) that maps samples to integrals over cells, along one axis.
+    """Return a matrix (cell, sample) that maps samples of a PSF along one axis to its integrals over a row of cells.
 
-    The integrand is the spline through the samples. The cells lie around the middle sample.
+    The integrand is the spline through the samples. The row of cells is centred on the middle sample.
 
-    If tiles.from_cell is True, the integrals are also averaged over all source positions in a scene cell: PSF ⊗ cell ⊗
-    cell. The spline's coefficients c solve C c = s, where s are the samples and C contains the B-splines at them. The
+    If tiles.from_cell is True, the source of the light is an area of the scene whose geometric image is as large as a
+    cell. The integrals are then averaged over the points of this area. The PSF is thus convolved twice with the width
+    of a cell.
+
+    The spline's coefficients c solve C c = s, where s are the samples and C contains the B-splines at them. The
     integrals are Q c, where Q contains the B-splines' integrals over cells. The matrix is therefore Q C⁻¹.
 
     samples: number of samples.
@@ -94,9 +99,12 @@ def _knots(x: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _over_samples(integrals: np.ndarray, degree: int) -> np.ndarray:
-    """Return the matrix Q C⁻¹ (cell, sample), where C contains the B-splines at the samples.
+    """Return the matrix Q C⁻¹, which maps the samples of a function to the function's integrals over cells.
 
-    integrals: Q, the integrals of B-splines over cells, (cell, B-spline).
+    Cells are the equal rectangles into which the retina is divided. The function is the spline through the samples, a
+    sum of B-splines. C contains the values of the B-splines at the samples. The shape of Q C⁻¹ is (cell, sample).
+
+    integrals: Q, the integrals of the B-splines over the cells, array (cell, B-spline).
     """
     from scipy.linalg import solve_banded
 
@@ -125,7 +133,7 @@ def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
 
 
 def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np.ndarray:
-    """Return single or double integrals of B-splines from the first knot to each place, (place, B-spline).
+    """Return single or double integrals of B-splines from the first knot to each position, (position, B-spline).
 
     The integral of B_j is the sum of the B-splines of the next degree with index j or higher, times the width of B_j
     divided by its degree plus 1 (de Boor, A Practical Guide to Splines, ch. X).
@@ -140,7 +148,7 @@ def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np
 
 
 def _bsplines(knots: np.ndarray, degree: int, at: np.ndarray) -> Any:
-    """Return a sparse matrix (place, B-spline) of B-spline values."""
+    """Return the values of all B-splines at the positions `at`, as a sparse matrix (position, B-spline)."""
     from scipy.interpolate import BSpline
 
     return BSpline.design_matrix(at, knots, degree)

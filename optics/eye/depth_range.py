@@ -39,7 +39,10 @@ class DepthRange:
         return cls(found, found[0] if len(found) == 1 else None)
 
     def distance(self, place: float) -> Scalar:
-        """Return the distance z [m] at a place from -1 (farthest) to 1 (nearest). 1/z is linear in the place."""
+        """Return the distance z [m] at the relative depth `place`, from -1 (farthest) to 1 (nearest).
+
+        1/z is linear in `place`.
+        """
         if self.only is not None:
             return self.only
         far, near = 1 / self.distances[0], 1 / self.distances[-1]

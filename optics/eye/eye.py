@@ -39,8 +39,8 @@ class Eye(EyeSpec):
     """An eye: a pupil, a retina of receptors, and noise.
 
     Pupil and retina have the axes of the OSA and of ANSI Z80.28, as seen by an observer in front of the eye: x to the
-    right, which is the owner's left, and y up. The image is inverted, so rows that ascend with y and columns that
-    ascend with x are in the order of the visual field: row 0 sees the top and column 0 the left, in all arrays.
+    right, which is the owner's left, and y up. In all arrays, rows are numbered along y and columns along x. Because
+    the image is inverted, row 0 sees the top of the visual field, and column 0 its left.
 
     pupil: a Pupil. None is a perfect lens without blur and with a throughput of 1.
     resolution: number of receptors (height, width). Receptors are square with the side sensor_width / width, unless
@@ -51,8 +51,8 @@ class Eye(EyeSpec):
     full_aperture: diameter [m] of a pupil with a throughput of 1 (None: L).
     eccentricity_deg: (right, up), viewing direction of the middle of the patch in the visual field.
     bands: number of spectral bands, 1 to 64. "auto": the smallest power of two, up to 32, for which the predicted error
-        of a receptor's signal is within the tolerance. It requires PSFs at many wavelengths, which is worthwhile for an
-        eye that is used often. This field then contains the chosen number.
+        of a receptor's signal is within the tolerance. The choice requires PSFs at many wavelengths. It is worthwhile
+        for an eye that is used often. This field then contains the chosen number.
     noise_sigma: standard deviation of a receptor's Gaussian noise, in units of the signal.
     photon_budget: light level. Shot noise is added before the Gaussian noise (None: no shot noise).
     receptors: types of receptor: "rgb" (three channels: red, green, blue), "lms" (human cones), "honeybee", "goldfish",
@@ -68,12 +68,12 @@ class Eye(EyeSpec):
     vertical_fov_deg: vertical field of view [degrees], 0.001 to 170, which determines the height of the receptors.
         None: receptors are square, and the height of the retina follows from the number of rows.
     most_seconds: largest predicted time [s] of the PSF of a band. Pupils that need more are refused.
-    dynamics: responses of the receptors over time, which environments compute. The methods of `Eye` return signals of
-        constant light. None: receptors respond without delay.
-    density: receptors per area of the retina, of which only ratios matter: a function of the angles (right, up)
-        [degrees] from the eye's axis, such as `Fovea` and `VisualStreak`, an array (row, column) over the whole field,
-        with the top left first, or the `lattice` of an eye. Receptors are rectangles in rows. A signal is the mean over
-        a receptor, and large receptors have less shot noise (None: all receptors are alike).
+    dynamics: time course of the receptors' responses. Only environments use it. The methods of `Eye` return the signals
+        for constant light. None: receptors respond without delay.
+    density: receptors per area of the retina, up to a constant factor. It is a function of the angles (right, up)
+        [degrees] from the eye's axis (a `Fovea` or `VisualStreak`), an array (row, column) over the whole field, from
+        its top left, or the `lattice` of an eye. Receptors are rectangles in rows. A signal is the mean over a
+        receptor, and large receptors have less shot noise (None: all receptors are alike).
     tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
         receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
@@ -90,7 +90,7 @@ class Eye(EyeSpec):
     def white_signal(self) -> Scalar:
         """Signal of a receptor that sees white everywhere, averaged over receptor types.
 
-        It is the throughput or, with waveguides, the fraction of the light that the waveguides absorb.
+        It is `throughput`. With waveguides, it is the fraction of the widest pupil's light that these absorb.
         """
         if self.waveguide is None:
             return self.throughput
@@ -103,8 +103,8 @@ class Eye(EyeSpec):
     def psf(self, z: Scalar = math.inf) -> PSFResult:
         """Return the PSF on the retina for a point at the distance z [m] along the axis.
 
-        The point lies in the viewing direction of the patch. The window loses less than the fraction `tolerance` of the
-        light (exceptions: see `kernel`). The PSF of the perfect lens is one sample with all power.
+        This point lies in direction `eccentricity_deg`, so its image is at the retina's middle. The window loses less
+        than the fraction `tolerance` of light (exceptions: see `kernel`). A perfect lens has one sample with all power.
 
         Raises:
             ValueError: z is not positive.
@@ -123,22 +123,22 @@ class Eye(EyeSpec):
         It is the PSF, integrated over cells; ky and kx are odd. A receptor has samples_per_receptor² equal cells.
 
         z: distance [m] of the scene along the axis, positive or infinite.
-        direction_deg: direction (right, up) of the light from the axis (None: the patch's eccentricity). The centre
-            cell is its geometric image. Angles are -80 to 80.
+        direction_deg: angles (right, up) from the axis to a point source, -80 to 80 (None: `eccentricity_deg`). The
+            kernel's centre cell lies around the geometric image of this source.
 
-        The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
-        enough to lose less than the tolerance, except for light at more than 50° from the receptor's direction. Light
-        of a steep relief may count as blocked if it lands farther from the image than a side of the retina. A perfect
-        lens has the kernel 1, a single cell. The kernel treats the light of each scene cell as coming from its centre.
-        Signals are then `aperture_throughput` Σ_b `spectral_bands.weights[c, b]` (kernel_b ⊗ radiance_b), averaged over
-        each receptor's cells. By default, `see` assumes light from all over a cell (see `light_from` of `sight`).
+        The kernel extends over a window. Its sum is the fraction of the pupil's power that lands in it. The window is
+        wide enough to lose less than the tolerance, except for light at more than 50° from the receptor's direction.
+        Light that a steep pupil relief sends farther from the image than a side of the retina may count as blocked. A
+        perfect lens has the kernel 1, a single cell. The kernel treats the light of each scene cell as coming from its
+        centre. Signals are then `aperture_throughput` Σ_b `spectral_bands.weights[c, b]` (kernel_b ⊗ radiance_b),
+        averaged over each receptor's cells. By default, `see` assumes light from everywhere in a cell (see `sight`).
 
-        With waveguides, the kernel is the fraction of each scene cell's light that a receptor accepts, averaged over
-        the cell. The cells lie around the receptor's direction. Signals are not averaged over the receptor. ky and kx
-        are even if samples_per_receptor is even. The sum is relative to receptors that absorb all light.
+        With waveguides, the kernel is the fraction of light that a receptor accepts from each cell of the scene near
+        its direction, averaged over the cell. Signals are not averaged over the receptor. ky and kx are even if
+        samples_per_receptor is even. The sum would be 1 for receptors that absorb all light, without a mask.
 
         Raises:
-            ValueError: an argument is invalid, the waveguide has no mode, or it is combined with derivatives.
+            ValueError: an argument is invalid, a waveguide has no mode, or waveguides are combined with derivatives.
             AccuracyError: see `optics.psf`.
         """
         positive("z", z, infinite=True, carried=True)
@@ -180,11 +180,11 @@ class Eye(EyeSpec):
             in z, at most 64.
         field_zones: number of kernels along the longer side of the field, or "auto" for the first of 1, 3, 5 and 9 that
             meets the tolerance. With 1, the kernel in the middle of the field is used for the whole retina.
-        tolerance: largest error of a receptor's signal, relative to the signal of a white surface, for any scene at
-            most as bright as white (None: the eye's tolerance).
+        tolerance: largest error of a receptor's signal, relative to the signal of a white surface, in all scenes that
+            are nowhere brighter than white (None: the eye's tolerance).
         light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" treats all light
             of a cell as coming from its centre. It suits cells whose radiance is the mean of finer detail, as in
-            rendered images. Its error is then less than half the error of "cells", which is O(samples_per_receptor^-2).
+            rendered images. The error of "cells", O(samples_per_receptor^-2), is then more than twice as large.
 
         Raises:
             ValueError: an argument is outside its valid range, which the message states.
@@ -220,20 +220,20 @@ class Eye(EyeSpec):
     ) -> np.ndarray | Array:
         """Return the signals (channel, h, w) for a scene in the tangent plane, by convolution.
 
-        This is the reference for renderers.
+        The signals that renderers compute are compared with the result of this method.
 
-        radiance: radiance (band, Y, X) of the scene's cells. A receptor consists of s x s cells of its own shape, with
-            s = samples_per_receptor. Radiance is constant within each cell (for the alternative, see `light_from` of
+        radiance: radiance (band, Y, X) of the scene's cells. Each receptor is divided into s x s equal cells, with s =
+            samples_per_receptor. Radiance is constant within each cell (for the alternative, see `light_from` of
             `Eye.sight`). The scene is centred on the field, and dark outside. It has at least h s x w s cells. A larger
             scene must exceed this height and this width by even numbers.
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or a map with one per cell (Y, X). In a map, near surfaces
-            hide far ones at jumps of depth (see `optics.eye.occlusion`). Behind them, far surfaces continue with their
-            nearest visible cell. Up to 17 different distances have one kernel each. If there are more, distances share
-            kernels within the tolerance.
-        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside their
-            range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
-            last call are cached. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
+            hide far ones at jumps of depth (see `optics.eye.occlusion`). A hidden part of a far surface looks like the
+            visible cell of this surface that is nearest to the hidden part. Up to 17 different distances have one
+            kernel each. If there are more, distances share kernels within the tolerance.
+        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. An object beyond the
+            kernels' range of distances is rendered with the kernel at the end of this range. The kernels of the last
+            call are cached. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
         polarization: (degree, angle_deg) of the light, for an eye with microvilli. These are the degree of linear
             polarisation in [0, 1], and the angle of the electric field, from right towards up. Each is a number or an
             array (band,), (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do
@@ -257,7 +257,7 @@ class Eye(EyeSpec):
         return to_user(found if rng is None else with_noise(self, found, rng))
 
     def _last_sight(self, samples_per_receptor: int, z: Any) -> KernelBank:
-        """Return `sight` for these samples and distances, from the preceding call of `see` if possible.
+        """Return the kernels for scene distances z [m], from the cache if the last call of `see` used the same kernels.
 
         Kernels that depend on Dr.Jit arrays are computed again, because the arrays may carry derivatives.
         """

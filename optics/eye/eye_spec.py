@@ -37,14 +37,14 @@ __all__ = ["EyeSpec"]
 
 @dataclass(frozen=True)
 class EyeSpec:
-    """Parameters of an eye, with the lengths and throughputs that follow from them without a PSF.
+    """Parameters of an eye, and quantities that follow from them, such as its focal length and its throughput.
 
-    `optics.Eye` documents the fields and adds PSFs, kernels and signals.
+    The quantities do not require a PSF. `optics.Eye` documents the fields and adds PSFs, kernels and signals.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
-        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance. In
-            an Eye with bands="auto", see also `optics.psf`.
+        AccuracyError: the rays behind the pupil are so steep that signals of microvilli do not meet the tolerance. An
+            `Eye` with bands="auto" also computes PSFs, and raises an AccuracyError if `optics.psf` would raise one.
     """
 
     pupil: Pupil | None = None
@@ -138,7 +138,10 @@ class EyeSpec:
 
     @property
     def receptor_pitch(self) -> float:
-        """Distance [m] between the centres of horizontally neighbouring receptors; the average, with a `density`."""
+        """Distance [m] between the centres of horizontally neighbouring receptors.
+
+        If receptors have a `density`, it is the average distance.
+        """
         return self.sensor_width / self.resolution[1]
 
     @property
@@ -177,7 +180,11 @@ class EyeSpec:
 
     @property
     def _on_tangent_plane(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Width and height of an average receptor at distance 1, and tangents (right, down) of the field's middle."""
+        """Size (width, height) of an average receptor, and position (right, down) of the field's middle.
+
+        Both are measured on the plane at distance 1 in front of the eye, perpendicular to its axis. A position on this
+        plane consists of the tangents of the angles from the axis.
+        """
         (height, width), distance = self.receptor_size, number(self.sensor_distance)
         return (width / distance, height / distance), tangents(self.eccentricity_deg)
 
@@ -192,20 +199,20 @@ class EyeSpec:
 
     @property
     def smallest_share(self) -> float:
-        """Smallest side of a receptor, relative to the average height or width."""
+        """Smallest ratio of a receptor's height to the average height, or of its width to the average width."""
         return 1.0 if self.lattice is None else min(self.lattice.smallest)
 
     @property
     def fovy_deg(self) -> float:
-        """Vertical field of view [degrees]: `vertical_fov_deg`, or that of square receptors."""
+        """Vertical field of view [degrees]: `vertical_fov_deg` or, if that is None, the field of square receptors."""
         height, _ = self.receptor_size
         return math.degrees(2 * math.atan(self.resolution[0] * height / (2 * number(self.sensor_distance))))
 
     @property
     def relative_aperture(self) -> Scalar:
-        """Diameter of the pupil, relative to that of a pupil with a throughput of 1; 1 for the perfect lens.
+        """Diameter of the pupil, divided by `widest_pupil`; 1 for the perfect lens.
 
-        It is 2 `pupil.aperture_radius` divided by `full_aperture`, or by `sensor_width` if that is None.
+        It is 2 `pupil.aperture_radius` divided by `full_aperture`, or by `sensor_width` if `full_aperture` is None.
         """
         return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.widest_pupil
 
@@ -216,17 +223,19 @@ class EyeSpec:
 
     @property
     def aperture_throughput(self) -> Scalar:
-        """Throughput without the mask, by which signals from kernels are multiplied.
+        """Throughput of the pupil without its mask.
 
-        Kernels contain the mask's transmission.
+        A signal is this throughput times the radiance weighted by a kernel. The kernel contains the mask's
+        transmission.
         """
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
     @property
     def parallax(self) -> float:
-        """Shift between the images through opposite edges of the pupil, per difference of 1/distance [1/m].
+        """Parallax between views from opposite edges of the pupil, per difference of 1/distance [1/m].
 
-        The unit of the shift is the shorter side of an average receptor. For the perfect lens, it is 0.
+        The parallax is the shift of a near point relative to a far one, in units of the shorter side of an average
+        receptor. It is divided by the difference of the points' 1/distance. For the perfect lens, it is 0.
         """
         if self.pupil is None:
             return 0.0
@@ -244,9 +253,9 @@ class EyeSpec:
 
     @property
     def photons(self) -> np.ndarray | None:
-        """Absorbed photons for a signal of 1, per receptor type (type,); None without a photon budget.
+        """Number of photons that a receptor of each type absorbs for a signal of 1; None without a photon budget.
 
-        They are those of a receptor of average area if receptors have a `density`.
+        If receptors have a `density`, the number is that for a receptor of average area. The shape is (type,).
         """
         if self.photon_budget is None:
             return None
@@ -255,7 +264,7 @@ class EyeSpec:
 
     @property
     def receptor_photons(self) -> np.ndarray | None:
-        """Absorbed photons for a signal of 1 of each receptor; None without a photon budget.
+        """Number of photons that each receptor absorbs for a signal of 1; None without a photon budget.
 
         The shape is (channel, h, w), or (channel, 1, 1) if all receptors are alike. Large receptors absorb more
         photons.
@@ -266,7 +275,7 @@ class EyeSpec:
         return each if self.lattice is None else each * self.lattice.areas
 
     def in_bands(self, radiance: Any) -> np.ndarray:
-        """Convert a spectral radiance to values for this eye's bands (band,), for `see`.
+        """Convert a spectral radiance to one value for each band of this eye, (band,), as `see` requires.
 
         Every receptor type then has the correct quantum catch, if there are at least as many bands as types. The value
         of a band may be negative; see `SpectralBands.band_values`.
@@ -279,5 +288,5 @@ class EyeSpec:
         return self.spectral_bands.band_values(radiance, self.receptors)
 
     def chosen_bands(self) -> SpectralBands:
-        """Return the spectral bands for `bands="auto"`. Only `Eye` can choose them; others raise a ValueError."""
+        """Raise a ValueError: only the subclass `Eye` can choose the spectral bands for `bands="auto"`."""
         raise ValueError("bands = 'auto': must be a number of bands, except in an Eye")

@@ -62,7 +62,7 @@ def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
 def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
     """Raise a ValueError for a pupil that is not a Pupil, or is wider than `full_aperture` [m]; None is valid.
 
-    width: width [m] of the retina, which replaces `full_aperture` if that is None.
+    width: width [m] of the retina. If `full_aperture` is None, the pupil must not be wider than this width.
     """
     if full_aperture is not None:
         positive("full_aperture", full_aperture)
@@ -94,9 +94,13 @@ def check_vertical(vertical_fov_deg: float | None, fov_deg: Scalar) -> None:
 
 
 def etendue(widest_pupil: float, receptor_area: float, focal: float) -> float:
-    """Return the etendue [m² sr] of a receptor of this area [m²], behind a pupil with a throughput of 1.
+    """Return the etendue [m² sr] of a receptor that receives light from the eye's widest pupil.
 
-    widest_pupil: diameter [m] of this pupil.
+    It is the receptor's area, times the pupil's area divided by the squared focal length. The widest pupil is the one
+    whose throughput is 1 by definition.
+
+    widest_pupil: diameter [m] of the widest pupil.
+    receptor_area: area [m²] of the receptor on the retina.
     focal: focal length [m].
     """
     return math.pi / 4 * receptor_area * (widest_pupil / focal) ** 2

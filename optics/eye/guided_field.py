@@ -1,10 +1,11 @@
 """Receptive fields of receptors that are waveguides: the fraction of the light on the pupil that their modes accept.
 
-A point source is imaged at the position v [m] relative to a waveguide. Let E(v) be the fraction of its light on the
-pupil that the waveguide accepts and absorbs. If a receptor occupies the area A of the retina, its kernel is E(v)/A,
-integrated over cells. For comparison, the signal of a receptor that absorbs all light is the mean of the image over the
-area A. The waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. For a
-source imaged at u and a receptor at r, the kernel is a function of r - u = -v. It is therefore E rotated by 180°.
+A point source is imaged at the position v [m] relative to a waveguide. Of the source's light on the pupil, the
+waveguide accepts and absorbs the fraction E(v). If a receptor occupies the area A of the retina, its kernel is E(v)/A,
+integrated over each of the cells, the equal rectangles into which every receptor's area is divided. For comparison, the
+signal of a receptor that absorbs all light is the mean of the image over the area A. The waveguide stands where the ray
+through the pupil's centre hits the retina, and points at that centre. For a source imaged at u and a receptor at r, the
+kernel is a function of r - u = -v. It is therefore E rotated by 180°.
 """
 
 from __future__ import annotations
@@ -43,8 +44,9 @@ CELL_DIGITS = 4.0  # choice: digits of integrals over cells
 class Guide:
     """A waveguide on a retina.
 
-    focal: f [m]. A receptor at the distance x from the axis sees an angle with the tangent x/f.
-    cells: number of cells along a receptor's side.
+    focal: focal length f [m]. A receptor at the distance x from the axis sees an angle with the tangent x/f.
+    cells: number of cells along a receptor's side. Cells are the equal rectangles into which a receptor's area on the
+        retina is divided. A cell of the scene is the part of the scene whose geometric image is one of them.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
     """
 
@@ -73,7 +75,10 @@ def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, receptor: tupl
 
 
 def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
-    """Return the fraction of light that a receptor accepts from each cell around its direction: Dr.Jit (band, ky, kx).
+    """Return the fraction of light that a receptor accepts from each cell of the scene, Dr.Jit (band, ky, kx).
+
+    Cells of the scene are parts of it whose geometric images are equal rectangles. They lie around the receptor's
+    direction.
 
     ky and kx are even if `guide.cells` is even. Rows run from the top of the visual field to the bottom, columns from
     left to right.
@@ -98,10 +103,15 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """Return the accepted fraction of a source's light, E, integrated over the cells of a window.
+    """Return integrals over cells of the scene of E, the fraction of a source's light that a waveguide absorbs.
 
-    The window is widened until it contains all of E except for a fraction of at most the tolerance, but not beyond the
-    half width of `spot` plus the radius of the waveguide's modes.
+    E depends on the source's direction. The cells, equal rectangles in the scene, form a window of directions around
+    the receptor's direction. The window is widened until the integral of E outside it is at most the fraction
+    `retina.tolerance` of the integral over all directions. The half width of the window is at most `spot.half` plus the
+    radius of the waveguide's modes. Directions are measured as tangents of angles, so each integral is in units of a
+    squared tangent. The result is an array (row, column), with one integral for each cell.
+
+    pitch: distance [m] between samples of the PSF on the retina.
     """
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
@@ -121,9 +131,11 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Cells in a row: their number, their side, and the sampling distance that resolves a receptor's field.
+    """A row of cells, the equal rectangles into which the scene is divided. Lengths are tangents of angles.
 
-    Lengths are tangents of angles.
+    count: number of cells.
+    side: side of a cell along the row.
+    pitch: distance between samples of a receptor's field, small enough to resolve the field.
     """
 
     count: int
@@ -132,9 +144,13 @@ class _Cells:
     tolerance: float
 
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return tangents (cell, node) of quadrature nodes, from the middle of the row, and the weights of the nodes.
+        """Return quadrature nodes in every cell of the row, (cell, node), and the weights of the nodes, (node,).
 
-        The weights sum to a cell's side.
+        Cells are the equal rectangles into which the scene is divided. A node is a direction at which a receptor's
+        field is evaluated, so that the field can be integrated over each cell. It is given as the tangent of an angle,
+        minus the tangent of the direction of the row's middle. The weights sum to a cell's side.
+
+        from_cell: False for a single point in the centre of each cell.
         """
         middle = (np.arange(self.count) - (self.count - 1) / 2) * self.side
         if not from_cell:
@@ -145,12 +161,19 @@ class _Cells:
 
     @property
     def step(self) -> float:
-        """Pitch of samples of the receptor's field, as a sine."""
+        """Distance between samples of a receptor's field, as a difference of the sines of two directions.
+
+        It is less than `pitch`, to limit the error of the splines that interpolate the samples.
+        """
         return self.pitch * samples_per_cycle(self.tolerance) / samples_per_cycle(self.tolerance / FINER)
 
 
 def _radius(waveguide: Waveguide, beam: Beam) -> float:
-    """Return the radius [m] that contains the field of the best confined mode; ValueError if there is no mode."""
+    """Return the radius [m] that contains the field of the mode with the strongest confinement.
+
+    Raises:
+        ValueError: there is no mode.
+    """
     modes = waveguide.modes(beam.wavelength)
     if not modes:
         raise ValueError(f"waveguide: has no guided mode at {beam.wavelength:g} m; must be wider, or of a higher index")
@@ -160,7 +183,8 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
     """Return integrals of E over cells, (row, column), and their share of E's integral over all directions.
 
-    E is the accepted fraction of a source's light. Areas of cells are in squared tangents.
+    E is the accepted fraction of a source's light. Directions are measured as tangents of angles, so each integral is
+    in units of a squared tangent.
     """
     from scipy.ndimage import map_coordinates
 
@@ -186,7 +210,9 @@ def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cell
 
 
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
-    """Return a grid of sines that covers the sines x and y, with the margin that a spline needs.
+    """Return a grid that contains all points x, y, with the margin that a spline needs.
+
+    x, y: sines (x and y components of the unit vectors) of directions, minus the sines of the source's direction.
 
     Raises:
         AccuracyError: the grid needs more samples than the limit.

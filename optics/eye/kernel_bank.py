@@ -1,11 +1,14 @@
-"""Kernels of an eye for a scene with a range of distances and directions: the fewest within the tolerance.
+"""Kernels of an eye for a scene with a range of distances and directions, as few kernels as the tolerance allows.
 
-A kernel depends on the position of the light source. Kernels are computed at nodes, and interpolated linearly between
-them (see `kernel_interpolation`). The nodes are evenly spaced over the tangent plane. Along depth they are evenly
-spaced in inverse distance 1/z, because defocus is linear in 1/z, or they are the distances of the scene itself. The
-signal is then
+A kernel, the receptive field of a receptor, depends on the position of the light source. Kernels are computed for a few
+positions, the nodes, and interpolated linearly between them (see `kernel_interpolation`). The nodes are evenly spaced
+over the tangent plane. Along depth, they are evenly spaced in inverse distance 1/z, because defocus is linear in 1/z,
+or there is a node at each distance that occurs in the scene. The scene is divided into cells, one or more per receptor
+along each axis. The signal is then
 
-    signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
+    signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene,
+
+where l is a node, and share_l is the weight of kernel_l in the interpolation of the kernel for each cell.
 
 `occlusion` extends this sum to near surfaces that hide far ones.
 """
@@ -35,16 +38,18 @@ DEPTH_COUNTS, FIELD_COUNTS = (1, 3, 5, 9, 17, 33), (1, 3, 5, 9)
 
 @dataclass(frozen=True)
 class KernelBank:
-    """The kernels of an eye at all nodes, and the weights with which a cell of the scene uses them.
+    """The kernels of an eye at a few positions of the light source, the nodes, between which they are interpolated.
+
+    Cells are the equal rectangles into which the scene and the retina are divided, one or more per receptor.
 
     inverse_distances: 1/z [1/m] of the nodes along depth, ascending.
-    field: (half height, half width) of the retina in cells.
+    field: half height and half width of the retina, as numbers of cells.
     kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
-    choices: the chosen numbers of nodes, for depth and for the field.
+    choices: numbers of nodes along depth and over the field, with the reasons for these numbers.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
-    parallax: shift [cells] between the images through opposite edges of the pupil, per difference of 1/distance [1/m].
-        It determines where near surfaces hide far ones. 0: no surface hides another, as in renderers whose rays all
-        pass the middle of the pupil.
+    parallax: shift [cells] of a near point relative to a far one between views from opposite edges of the pupil,
+        divided by the difference of the points' 1/distance [1/m]. It determines where near surfaces hide far ones. 0:
+        surfaces are hidden only as seen from the middle of the pupil, as in renderers whose rays all pass this point.
     """
 
     inverse_distances: tuple[float, ...]
@@ -55,11 +60,12 @@ class KernelBank:
     parallax: float = 0.0
 
     def shares(self, inverse_distance: np.ndarray) -> list[Any]:
-        """Return the interpolation weight (Y, X) of each node in every cell of a scene, one array per node.
+        """Return the weights with which the kernels of the bank are interpolated for each cell of a scene.
 
-        For a single node, the only weight is the number 1.
+        The list contains one array (Y, X) of weights for each kernel, in the order of `kernels`. If there is a single
+        kernel, its weight is the number 1.
 
-        inverse_distance: 1/z [1/m] of the cells, (Y, X).
+        inverse_distance: 1/z [1/m] of the scene's cells, array (Y, X).
         """
         if len(self.kernels) == 1:
             return [1]
@@ -71,7 +77,12 @@ class KernelBank:
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
     def check(self, shape: tuple[int, int], bands: int, *, averaged: bool) -> None:
-        """Raise a ValueError unless the retina's cells, the number of bands and `averaged` are those of the bank."""
+        """Raise a ValueError unless the kernels were made for this retina.
+
+        shape: number of the retina's cells (height, width).
+        bands: number of spectral bands.
+        averaged: True if a receptor's signal is the mean over its cells.
+        """
         if (shape[0] / 2, shape[1] / 2) != self.field:
             made = " x ".join(f"{2 * half:g}" for half in self.field)
             raise ValueError(f"sight is for a retina of {made} cells: must be for {shape[0]} x {shape[1]}")
@@ -104,12 +115,13 @@ def prepare(
     resolution: number of receptors (height, width).
     samples_per_receptor: number of cells along a receptor's side.
     z: distances [m] in the scene, a number or an array.
-    counts: number of depth layers, and of zones across the longer side of the retina; or "auto", or "distinct" for one
-        layer at each distance.
+    counts: number of depth layers, and number of zones across the longer side of the retina. "auto": the smallest
+        number that meets the tolerance. "distinct", for depth layers only: one layer at each distance.
     tolerance: largest error of a receptor's signal, relative to the signal of a white surface.
-    mean: number of cells along the side of the square over which errors are averaged, as in a receptor's signal (None:
-        samples_per_receptor).
-    white: function that returns the fraction of the signal of a white surface that the kernels transmit.
+    mean: number of cells along a side of the area over which a receptor averages light (None: samples_per_receptor).
+        Errors are averaged over the same area.
+    white: function that returns the signal of a white surface, as a fraction of its signal if kernels lost no light.
+        This fraction is less than 1 behind masks and with waveguides.
 
     Raises:
         ValueError: a number or a distance is invalid, or there are too many distances for "distinct" layers.
@@ -148,8 +160,9 @@ def _choices(
 ) -> tuple[Choice, Choice]:
     """Return the numbers of nodes for depth and for the field.
 
-    If both are automatic, depth may use half of the tolerance, and the field the remainder, because the two errors add
-    up. If depth needs more than half of the tolerance, the number for the field is chosen first.
+    If both numbers are "auto", the error of depth may be half of the tolerance, and the error of the field the
+    remainder, because the two errors add up. If no number for depth meets half of the tolerance, the field gets half of
+    it instead, and depth the remainder.
     """
     along, across = stages
     if asked[0] is not None or asked[1] is not None:
@@ -164,16 +177,18 @@ def _choices(
 
 
 def _rest(tolerance: float, spent: float | None) -> float | None:
-    """Return the remainder of a tolerance after an error `spent`; None if the error is unknown or 0."""
+    """Return the tolerance minus `spent`, an error that uses a part of it; None if this error is unknown or 0."""
     return tolerance - spent if spent else None
 
 
 def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
     """Return the numbers (rows, columns) of nodes over the field, with similar spacing in both directions.
 
-    Along the longer side, the nodes of each of FIELD_COUNTS include those of all smaller counts.
+    Nodes are the positions for which kernels are computed.
 
-    across: number of nodes along the longer side of the retina.
+    across: number of nodes along the longer side of the retina. If it is one of FIELD_COUNTS, the nodes include those
+        of every smaller number in FIELD_COUNTS, so their kernels are reused.
+    resolution: number of receptors (height, width).
     """
     height, width = resolution
     finest = max(across - 1, 0)

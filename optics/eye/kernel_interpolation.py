@@ -28,15 +28,21 @@ Place = tuple[float, ...]
 
 
 class NodeError(AccuracyError):
-    """The largest number of nodes leaves an interpolation error above the tolerance."""
+    """The interpolation error is above the tolerance even with the largest number of nodes that is tried."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The chosen numbers of nodes for one stage, with the reason: along depth, or along the two axes of the field.
+    """The numbers of nodes that were chosen for one stage, and the reason for the choice.
 
+    Nodes are the positions for which kernels are computed. One stage is the choice along depth, the other the choice
+    along the two axes of the field.
+
+    stage: "depth" or "field".
+    counts: number of nodes along each axis of the stage.
     predicted_error: error of a receptor's signal, relative to the signal of a white surface, for any scene at most as
         bright as white. None if the user requested the number.
+    why: the reason.
     """
 
     stage: str
@@ -55,12 +61,13 @@ def nodes(count: int) -> np.ndarray:
 
 
 def checks(counts: tuple[int, ...]) -> list[Place]:
-    """Return the places at which the error is measured, for these numbers of nodes along each axis.
+    """Return the places at which the interpolation error is measured, for these numbers of nodes along each axis.
 
-    With a single node, these are the ends of the range, or on two axes the corners and the middles of the sides. With
-    more, they are the points halfway between nodes along every axis with several nodes. If there are many such points,
-    only a few are used: evenly spaced ones along one axis, and on two axes those next to all four corners and a few
-    between them, because the error of a pupil without symmetry may be largest at any corner.
+    If there is a single node, it lies in the middle. The error is then measured at both ends of the axis or, if there
+    are two axes, at the corners of the field and at the middles of its sides. With more nodes, it is measured halfway
+    between nodes, along every axis with several nodes. If there are many such points, only a few are used. If there is
+    one axis, these are evenly spaced. If there are two, they are the points next to all four corners and a few between
+    them, because the error of a pupil without symmetry may be largest at any corner.
     """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
@@ -73,7 +80,11 @@ def checks(counts: tuple[int, ...]) -> list[Place]:
 
 
 def _place(axes: Sequence[np.ndarray], shares: Iterable[float]) -> Place:
-    """Return the place at these fractions of the lists `axes` of positions: 0 is a list's first one, 1 its last one."""
+    """Return a point: its coordinate along each axis is selected from the list of positions along this axis.
+
+    axes: list of positions for each axis.
+    shares: for each axis, where in the list the coordinate is found, from 0 for the first position to 1 for the last.
+    """
     return tuple(float(axis[round(share * (len(axis) - 1))]) for axis, share in zip(axes, shares, strict=True))
 
 
@@ -85,11 +96,16 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 class NodeChoice:
     """Choice of the numbers of nodes for one stage: along depth, or along the two axes of the field.
 
+    Nodes are the positions for which kernels are computed.
+
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
-    white: function that returns the fraction of the signal of a white surface that the kernels transmit. It is less
-        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, a call takes long, because
-        it computes a kernel.
+    samples_per_receptor: number of kernel samples along a side of the area over which a receptor averages light. Errors
+        of signals are averaged over this area. If the number is 1, errors are not averaged.
+    white: function that returns the signal of a white surface, as a fraction of its signal if kernels lost no light.
+        This fraction is less than 1 behind masks and with waveguides. Errors are divided by it. With waveguides, a call
+        of this function takes long, because it computes a kernel.
+    known: kernels that have been computed, by place.
     """
 
     stage: str
@@ -121,7 +137,10 @@ class NodeChoice:
         )
 
     def error(self, counts: tuple[int, ...]) -> float:
-        """Return the largest measured interpolation error with these nodes, relative to the signal of white."""
+        """Return the largest measured interpolation error, relative to the signal of a white surface.
+
+        counts: number of nodes along each axis.
+        """
         coarse = _places(nodes(n) for n in counts)
         worst = 0.0
         for place in checks(counts):

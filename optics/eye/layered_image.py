@@ -26,7 +26,7 @@ def retinal_image(
 
     If `bank.parallax` is 0, no surface hides another one.
 
-    light: radiance (band, Y, X).
+    light: radiance (band, Y, X) of the cells, the equal rectangles into which the scene is divided.
     inverse_distance: 1/z [1/m] of the cells, (Y, X).
     """
     scene = _Scene(light, inverse_distance, bank, shape, types)
@@ -49,8 +49,9 @@ def retinal_image(
 class _Scene:
     """A scene with the kernels that blur it.
 
-    The argument `source` (Y, X) of the methods is the flat index of the cell from which a cell takes its light and
-    distance. The argument `cells` (Y, X) is a mask of the selected cells.
+    Cells are the equal rectangles into which the scene is divided. Arguments of the methods are arrays (Y, X) with one
+    entry per cell. An entry of `source` is the flat index of the cell whose light and distance are used at this
+    position: the cell itself, or a cell that replaces it. An entry of `cells` is True if the cell is selected.
     """
 
     light: np.ndarray
@@ -60,16 +61,21 @@ class _Scene:
     types: Precision
 
     def image(self, source: np.ndarray, cells: np.ndarray) -> Array:
-        """Return the image (band, *shape) of the selected cells."""
+        """Return the image (band, *shape) that selected cells of the scene form on the retina.
+
+        For the arguments, see `_Scene`.
+        """
         seen = self.light.reshape(len(self.light), -1)[:, source]
         return self._blurred([seen * share for share in self._shares(source, cells)], self.kernels)
 
     def passing(self, layer: Layer) -> Array:
-        """Return the fraction of the light from behind that passes a layer, (band, *shape).
+        """Return the fraction of the light from farther layers that passes a layer, at each cell of the retina.
 
-        Some cells of the layer hide nothing, because their surface continues in a farther layer. The farther layer does
-        not contain these cells again, so its light only comes through the part of the pupil that they leave open. The
-        hidden fraction is relative to this part.
+        A layer contains the scene's cells in one range of distances. There are two kinds of cells. Hiding cells lie in
+        front of a farther surface. The other cells belong to a surface that continues in a farther layer. They hide
+        nothing, but the farther layer has no cells at their positions. Seen from a cell of the retina, the hiding cells
+        cover a fraction h of the pupil, and the other cells a fraction g. Light of the farther layer then comes only
+        through the fraction 1 - g of the pupil, so the passing fraction is 1 - h/(1 - g). The shape is (band, *shape).
         """
         import drjit as dr
 
@@ -80,7 +86,11 @@ class _Scene:
         return dr.clip(1 - hidden, 0, 1)
 
     def _coverage(self, source: np.ndarray, cells: np.ndarray) -> Array:
-        """Return the fraction of the pupil that selected cells cover, (band, *shape)."""
+        """Return the fraction of the pupil that cells of the scene cover, seen from each cell of the retina.
+
+        Only cells of the scene that `cells` selects are included. For the arguments, see `_Scene`. The shape is
+        (band, *shape).
+        """
         ones = np.ones_like(self.light)
         return self._blurred([ones * share for share in self._shares(source, cells)], self._whole)
 
@@ -97,7 +107,10 @@ class _Scene:
         return [kernel / dr.reshape(one, (-1, 1, 1)) for kernel, one in zip(self.kernels, sums, strict=True)]
 
     def _shares(self, source: np.ndarray, cells: np.ndarray) -> list[np.ndarray]:
-        """Return the interpolation weight (Y, X) of each kernel in the selected cells; 0 in all others."""
+        """Return, for each kernel of the bank, its interpolation weights in the cells of the scene, array (Y, X).
+
+        The weights are 0 in cells that are not selected. For the arguments, see `_Scene`.
+        """
         return [share * cells for share in self.bank.shares(self.inverse_distance.ravel()[source])]
 
     def _blurred(self, scenes: list[np.ndarray], kernels: list[Array]) -> Array:

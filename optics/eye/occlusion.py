@@ -1,16 +1,17 @@
-"""Layers of a scene with a depth map: near surfaces hide far ones, and light passes their edges.
+"""Layers of a scene with a depth map: near surfaces hide far ones, but their edges let a part of the light pass.
 
-Seen from a far point, a near edge hides a part of the pupil. The hidden fraction is the near surface's coverage,
-blurred by the kernel of the near surface's distance. Layers are numbered from the farthest to the nearest. With T_l the
-fraction of light that passes all layers nearer than the layer l,
+Seen from a far point, a near edge hides a part of the pupil. The hidden fraction is the near surface's coverage, which
+is 1 on the surface and 0 elsewhere, blurred by the kernel for the distance of this surface. Layers are numbered from
+the farthest to the nearest. They are composited over one another:
 
     image = Σ_l T_l · (kernel_l ⊗ radiance_l),   T_(l-1) = T_l (1 - kernel_l ⊗ coverage_l),
 
-which composites the layers over one another. Different layers are blurred independently, so the formula is exact if the
-far surface is locally uniform, or if either surface is in focus.
+where T_l is the fraction of light that passes all layers nearer than the layer l. Different layers are blurred
+independently, so the formula is exact if the far surface is locally uniform, or if either surface is in focus.
 
-A depth map contains no radiance behind a near surface. There, far surfaces continue with their nearest visible cell.
-Surfaces whose depth changes gradually hide nothing of themselves, so only jumps of depth hide light.
+A depth map contains no radiance behind a near surface. There, every cell of a far surface is a copy of the nearest
+visible cell of this surface. Cells are the equal rectangles into which the scene is divided. If the depth of a surface
+changes gradually, no part of the surface hides another part. Only jumps of depth hide light.
 """
 
 from __future__ import annotations
@@ -33,7 +34,10 @@ MOST_LAYERS = 64  # choice, limited by time: largest number of layers
 class Layer:
     """Cells of a scene in one range of distances.
 
-    source: (Y, X) int, flat index of the cell from which each cell takes its radiance and distance.
+    Cells are the equal rectangles into which the scene is divided.
+
+    source: (Y, X) int, for each cell the flat index of the cell whose radiance and distance are used: the cell itself
+        or, behind a near surface, a visible cell of the far surface.
     cells: (Y, X) bool, the cells of the layer, including cells behind nearer layers.
     hiding: (Y, X) bool, those cells that hide farther layers.
     """
@@ -46,9 +50,9 @@ class Layer:
 def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[Layer]:
     """Yield the layers of a depth map from the nearest to the farthest.
 
-    inverse_distance: 1/z [1/m] of the cells, (Y, X).
-    parallax: shift [cells] of the image between views from opposite edges of the pupil, divided by the difference of
-        1/z [1/m] that causes it. With 0, no surface hides another one.
+    inverse_distance: 1/z [1/m] of the cells, the equal rectangles into which the scene is divided, (Y, X).
+    parallax: shift [cells] of a near point relative to a far one between views from opposite edges of the pupil,
+        divided by the difference of the points' 1/z [1/m]. With 0, no surface hides another one.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -78,14 +82,21 @@ def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[La
 
 
 def _least_jump(inverse_distance: np.ndarray, parallax: float) -> float:
-    """Return the smallest difference of 1/z [1/m] at which a surface hides another one."""
+    """Return the smallest difference of 1/z [1/m] between two surfaces of which one hides the other."""
     if parallax == 0:
         return math.inf
     return max(LEAST_SHIFT / parallax, float(np.ptp(inverse_distance)) / MOST_LAYERS)
 
 
 def _highest_neighbour(values: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return, for each cell, the highest value of itself and its neighbours, of selected cells only; else -inf."""
+    """Return, for each cell, the highest value of the selected cells in a square of 3 x 3 cells around it.
+
+    The square contains the cell itself and its eight neighbours. Cells that are not selected are ignored. The result,
+    an array (Y, X), is -inf where none of these nine cells is selected.
+
+    values: value of each cell, array (Y, X).
+    cells: True for selected cells, array (Y, X).
+    """
     from scipy.ndimage import maximum_filter
 
     selected = np.where(cells, values, -math.inf)

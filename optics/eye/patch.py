@@ -1,4 +1,4 @@
-"""An eye with only the receptor that faces a given direction, because the limits of vision vary over an eye."""
+"""A single receptor of an eye as an eye of its own, for limits of vision, which differ between an eye's receptors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ AnyEye = TypeVar("AnyEye", bound=EyeSpec)
 
 
 def receptor_in(eye: AnyEye, direction_deg: tuple[float, float] | None) -> AnyEye:
-    """Return an eye with the same optics and a single receptor, that of `eye` in this direction.
+    """Return an eye with the optics of `eye` and only one of its receptors, the one that faces a given direction.
 
     direction_deg: angles (right, up) from the axis. None: the middle of the field.
 

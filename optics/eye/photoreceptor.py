@@ -1,6 +1,6 @@
 """Signal of a photoreceptor from the light on it: throughput, spectral weighting, noise.
 
-`optics.Eye.see` draws its noise here. In worlds, `sim.render.receptor_noise` draws the noise.
+`optics.Eye.see` draws noise with the functions of this module, worlds with `sim.render.receptor_noise`.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
 
 
 def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, types: Precision) -> Array:
-    """Return the signals of channels c, `gathered` Σ_b weights[c, b] irradiance[b].
+    """Return the signals of channels c, `gathered` Σ_b weights[c, b] irradiance[b], as a Dr.Jit tensor (channel, y, x).
 
-    The irradiance is a Dr.Jit tensor (band, y, x), the result one of (channel, y, x).
-
+    irradiance: irradiance in spectral bands b, a Dr.Jit tensor (band, y, x).
+    weights: sensitivity of each channel in each band, array (channel, band).
     gathered: throughput of the aperture.
     """
 
@@ -43,9 +43,12 @@ def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, type
 
 
 def own_type(signals: Array, mosaic: np.ndarray, types: Precision) -> Array:
-    """Return the signal of each receptor in a mosaic (y, x), selected by its type from the signals of all types there.
+    """Return the signal of each receptor in a mosaic, which has a receptor of one type at each position.
 
-    Dr.Jit (type, y, x) -> (1, y, x).
+    The result is Dr.Jit (1, y, x).
+
+    signals: signals that receptors of every type would have at each position, Dr.Jit (type, y, x).
+    mosaic: type of the receptor at each position, (y, x).
     """
     import drjit as dr
 

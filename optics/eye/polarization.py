@@ -34,7 +34,9 @@ STEEP = 0.62
 
 
 def microvilli_of(given: Any) -> Tile | None:
-    """Convert a single Microvilli, which all receptors share, or rows of several to a tuple of rows; None remains None.
+    """Return microvilli as a tuple of rows, each a tuple of `Microvilli`; None remains None.
+
+    given: one `Microvilli`, which all receptors share, or rows of several `Microvilli`, or None.
 
     Raises:
         ValueError: `given` is none of these, or rows are empty or have different lengths.
@@ -65,7 +67,7 @@ def polarised_error(pupil: Pupil, distance: float) -> float:
 
 
 def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
-    """Raise an AccuracyError if the bound of `polarised_error` exceeds the tolerance."""
+    """Raise an AccuracyError if the upper bound that `polarised_error` returns exceeds the tolerance."""
     error = 0.0 if pupil is None else polarised_error(pupil, distance)
     if pupil is not None and error > tolerance:
         sine = pupil.radius / math.hypot(pupil.radius, distance)

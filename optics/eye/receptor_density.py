@@ -29,9 +29,9 @@ class Fovea:
 
     The number of columns of receptors per horizontal angle and the number of rows per vertical angle follow this law.
     The density is the product of both. If the field is a square around the fovea, the receptors there have the shape of
-    the average receptor. The default E₂ is that of midget ganglion cells, which limit human acuity. Source: the first
-    term of equation 8 of Watson, J. Vision 14(7):15, 2014, whose density is (1 + E/E₂)⁻² in all directions. The
-    equation's second, smaller term is left out.
+    the average receptor. The default E₂ is that of midget ganglion cells, which limit human acuity. Source: Watson,
+    J. Vision 14(7):15, 2014, equation 8. The first term of this equation is a density of (1 + E/E₂)⁻² in all
+    directions. The second, smaller term is left out.
 
     e2_deg: angle E₂ [degrees] at which acuity is half of that at the fovea, 1e-3 to 1e3.
     center_deg: angles (right, up) [degrees] of the fovea from the eye's axis, -80 to 80.
@@ -48,7 +48,10 @@ class Fovea:
         object.__setattr__(self, "center_deg", direction("Fovea: center_deg", self.center_deg))
 
     def __call__(self, right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
-        """Return the relative density per area of the flat retina, for angles [degrees] from the axis."""
+        """Return the number of receptors per area of the flat retina, up to a constant factor.
+
+        right_deg, up_deg: directions that the receptors see, as angles [degrees] from the eye's axis.
+        """
         right, up = self.center_deg
         return _per_length(right_deg, right, self.e2_deg) * _per_length(up_deg, up, self.e2_deg)
 
@@ -74,7 +77,10 @@ class VisualStreak:
         in_range("VisualStreak: elevation_deg", self.elevation_deg, -WIDEST_DEG, WIDEST_DEG)
 
     def __call__(self, right_deg: np.ndarray, up_deg: np.ndarray) -> np.ndarray:
-        """Return the relative density per area of the flat retina, for angles [degrees] from the axis."""
+        """Return the number of receptors per area of the flat retina, up to a constant factor.
+
+        right_deg, up_deg: angles [degrees] from the eye's axis of the directions that the receptors see.
+        """
         return _per_length(right_deg, 0.0, np.inf) * _per_length(up_deg, self.elevation_deg, self.e2_deg)
 
 
@@ -132,8 +138,8 @@ def density_on(
     """Return the relative density (row, column) on equal cells of the retina, from the top left of the visual field.
 
     resolution: number of receptors (height, width).
-    halves: half height and half width of the field on the plane at distance 1.
-    middle: tangents (right, down) of the direction of the field's middle.
+    halves: half height and half width of the field on the plane at distance 1 in front of the eye.
+    middle: position (right, down) of the field's middle on this plane, the tangents of its angles from the axis.
 
     Raises:
         ValueError: the values of a function are not positive and finite, or do not have the shape of its arguments.

@@ -1,4 +1,8 @@
-"""Choice of a receptor's kernel: `guided_field` for a waveguide, else `visual_kernel`; 1 without a pupil."""
+"""Choice of the module that computes a receptor's kernel.
+
+The kernel comes from `guided_field` if receptors are waveguides, and otherwise from `visual_kernel`. An eye without a
+pupil is a perfect lens, whose kernel is a single cell with the value 1 in every band.
+"""
 
 from __future__ import annotations
 
@@ -40,9 +44,11 @@ def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[fl
 
 
 def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
-    """Return the fraction of a white surface's signal in daylight that kernels (band, ky, kx) transmit.
+    """Return the signal of a white surface in daylight, as a fraction of its signal if kernels lost no light.
 
     It is averaged over channels.
+
+    kernels: the eye's kernels, array (band, ky, kx).
     """
     seen = kernels.sum(axis=(1, 2)) * daylight(bands.wavelengths)
     return float((bands.weights @ seen).mean())
@@ -51,7 +57,10 @@ def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
 def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
     """Return the fewest spectral bands whose error is within the eye's tolerance, see `choose_bands`.
 
-    retina: a retina without wavelengths and with large cells.
+    retina: the eye's retina. Each side of a receptor is divided into two cells, the samples of a kernel. The field
+        `wavelengths` may be empty. It is not used, because several numbers of bands are tried, and kernels are computed
+        at the wavelengths of these bands.
+    direction: tangents (right, down) of the direction in which the kernels are computed.
     """
     if eye.pupil is None:
         return choose_bands(eye.tolerance, eye.receptors)

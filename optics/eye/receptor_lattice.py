@@ -1,11 +1,11 @@
-"""Receptors of different sizes on a retina: rectangles in rows, over each of which the density has the same integral.
+"""Receptors of different sizes on a retina: rectangles that are arranged in rows.
 
-Coordinates are x to the right and y down in the visual field, from the middle of the retina. Their units are the width
-and the height of an average receptor: the retina of h x w receptors is [-w/2, w/2] x [-h/2, h/2]. Each row extends over
-the whole width and has w receptors, whose widths differ from row to row. The heights of rows follow from the density's
-mean along x. The widths in a row follow from the density's mean along y over the height of this row (the conditional
-distribution, Rosenblatt, Ann. Math. Stat. 23, 470, 1952). The rectangles leave no gaps, and an array of signals remains
-an image (row, column).
+The integral of the receptors' density is the same over every rectangle. Coordinates are x to the right and y down in
+the visual field, from the middle of the retina. Their units are the width and the height of an average receptor: the
+retina of h x w receptors is [-w/2, w/2] x [-h/2, h/2]. Each row extends over the whole width and has w receptors, whose
+widths differ from row to row. The heights of rows follow from the density's mean along x. The widths in a row follow
+from the density's mean along y over the height of this row (the conditional distribution, Rosenblatt, Ann. Math. Stat.
+23, 470, 1952). The rectangles leave no gaps, and an array of signals remains an image (row, column).
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ class ReceptorLattice(ReadOnlyArrays):
     def directions_deg(self, size: tuple[float, float], middle: tuple[float, float]) -> np.ndarray:
         """Return the angles (right, up) [degrees] of the receptors' middles from the axis, (2, h, w).
 
-        size: width and height of an average receptor on the plane at distance 1.
-        middle: tangents (right, down) of the direction of the field's middle.
+        size: average width and height of the receptors on the plane at distance 1 in front of the eye.
+        middle: position (right, down) of the field's middle on this plane, the tangents of its angles from the axis.
         """
         right, down = np.moveaxis(self.middles * size + middle, -1, 0)
         return np.degrees(np.arctan(np.stack([right, -down])))
@@ -72,8 +72,8 @@ class ReceptorLattice(ReadOnlyArrays):
     def angles_deg(self, size: tuple[float, float], middle: tuple[float, float]) -> np.ndarray:
         """Return the angles [degrees] that the receptors subtend vertically and horizontally, (2, h, w).
 
-        size: width and height of an average receptor on the plane at distance 1.
-        middle: tangents (right, down) of the direction of the field's middle.
+        size: average width and height of the receptors on the plane at distance 1 in front of the eye.
+        middle: position (right, down) of the field's middle on this plane, the tangents of its angles from the axis.
         """
         at, half = self.middles * size + middle, self.sides * np.reshape(size[::-1], (2, 1, 1)) / 2
         found = []
@@ -86,10 +86,11 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack(found)
 
     def places(self, counted: np.ndarray) -> np.ndarray:
-        """Convert coordinates that count receptors from the middle, (n, 2), to positions (x, y) on the retina, (n, 2).
+        """Convert coordinates in units of receptors, (n, 2), to positions (x, y) on the retina, (n, 2).
 
-        In the former coordinates, the receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. Beyond
-        the rim, receptors continue with the size of the outermost ones.
+        In the given coordinates, every receptor is 1 wide and 1 high. The receptor in row i and column j of a retina
+        with h rows and w columns covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2]. Coordinates outside the retina
+        are converted as if it continued with receptors as large as those at its edge.
         """
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         column, row = (counted + np.array([width, height]) / 2).T
@@ -99,7 +100,14 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack([x, y], axis=-1)
 
     def counted(self, places: np.ndarray) -> np.ndarray:
-        """Return positions (x, y) in coordinates that count receptors, (..., 2): the inverse of `places`."""
+        """Convert positions (x, y) on the retina to coordinates in which every receptor is 1 wide and 1 high.
+
+        This conversion is the inverse of the method `ReceptorLattice.places`. In the new coordinates, the receptor in
+        row i and column j of a retina with h rows and w columns covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2].
+        The result is an array (..., 2).
+
+        places: positions (x, y), in units of the width and the height of an average receptor, array (..., 2).
+        """
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         x, y = np.moveaxis(places, -1, 0)
         i = np.clip(np.searchsorted(self.rows, y, side="right") - 1, 0, height - 1)
@@ -113,9 +121,11 @@ class ReceptorLattice(ReadOnlyArrays):
         return np.stack([column - width / 2, row - height / 2], axis=-1)
 
     def receptors_at(self, shape: tuple[int, int]) -> np.ndarray:
-        """Return the index of the receptor at the middle of each of `shape` equal cells of the retina, (row, column).
+        """Return the index of the receptor at the middle of each cell of the retina, array (row, column).
 
         Receptors are counted row by row.
+
+        shape: numbers of rows and columns of equal cells into which the retina is divided.
         """
         height, width = self.columns.shape[0], self.columns.shape[1] - 1
         y, x = (n * ((2 * np.arange(m) + 1) / (2 * m) - 0.5) for n, m in zip((height, width), shape, strict=True))
@@ -135,11 +145,11 @@ def even_lattice(resolution: tuple[int, int]) -> ReceptorLattice:
 def receptor_lattice(
     density: Density | DensityMap, resolution: tuple[int, int], halves: tuple[float, float], middle: tuple[float, float]
 ) -> ReceptorLattice | None:
-    """Return the receptors of a density, or None if the density is constant and all receptors are alike.
+    """Return receptors of different sizes that have a given density, or None if the density is constant.
 
     resolution: number of receptors (height, width).
-    halves: half height and half width of the field on the plane at distance 1.
-    middle: tangents (right, down) of the direction of the field's middle.
+    halves: half height and half width of the field on the plane at distance 1 in front of the eye.
+    middle: position (right, down) of the field's middle on this plane, the tangents of its angles from the axis.
 
     Raises:
         ValueError: see `density_on`, or a receptor is far narrower than the average.
@@ -160,12 +170,15 @@ def receptor_lattice(
 
 
 def overlaps(edges: np.ndarray, cells: int) -> np.ndarray:
-    """Return the fraction of each cell between successive edges, (edges - 1, cell). Cell k covers [k, k + 1]."""
+    """Return the fraction of each cell that lies between each two successive edges, (edges - 1, cell).
+
+    Cell k covers [k, k + 1].
+    """
     return np.diff(np.clip(edges[:, None] - np.arange(cells), 0, 1), axis=0)
 
 
 def _edges(densities: np.ndarray, count: int) -> np.ndarray:
-    """Return edges (row, count + 1) from -count/2 to count/2 that divide each row of densities into equal sums."""
+    """Return edges (row, count + 1) from -count/2 to count/2, between which the densities of a row have equal sums."""
     cells = densities.shape[1]
     sums = np.concatenate([np.zeros((len(densities), 1)), np.cumsum(densities, axis=1)], axis=1)
     at, shares = np.arange(cells + 1) / cells - 0.5, np.arange(1, count) / count

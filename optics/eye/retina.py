@@ -1,4 +1,4 @@
-"""The retina as a plane of cells, and the time that its kernels may take."""
+"""The retina, a plane that is divided into cells, and errors about PSFs that need too many cells or too much time."""
 
 from __future__ import annotations
 
@@ -17,11 +17,17 @@ __all__ = ["CellsError", "Retina", "more_time"]
 
 @dataclass(frozen=True)
 class Retina:
-    """Properties of the retina that define the PSF: distance [m], wavelengths [m], cells, tolerance, dtype.
+    """Properties of the retina that define the PSF on it.
 
+    Cells are the equal rectangles into which the retina is divided, one or more along each side of a receptor.
+
+    distance: distance [m] from the pupil to the retina.
+    wavelengths: wavelength [m] of each band.
     cell: height and width of a cell [m].
+    tolerance: relative error of the PSF.
     size: height and width [m] of the retina.
     samples: number of cells along a receptor's side.
+    dtype: "float32" or "float64", the type of the results.
     pupil_turned: True if the pupil is rotated by 180° about the axis.
     most_seconds: largest predicted time [s] that the PSF of one band may take.
     """
@@ -39,8 +45,8 @@ class Retina:
     def across_pupil(self, direction: tuple[float, float]) -> tuple[float, float]:
         """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.
 
-        Light from the right travels to the left of the eye's owner, which is +x. Light from below travels up, to +y.
-        Both signs are reversed if the pupil is turned.
+        Light from the right travels to the left, as seen by the eye's owner. This is the direction +x. Light from below
+        travels up, in the direction +y. Both signs are reversed if the pupil is turned.
 
         direction: tangents (right, down) of the source's direction in the visual field.
         """
@@ -49,7 +55,11 @@ class Retina:
 
 
 class CellsError(AccuracyError):
-    """The light covers too many cells. If receptors consist of several cells, coarser cells may be sufficient."""
+    """The light of a point source covers more cells of the retina than the limit.
+
+    Cells are the equal rectangles into which the retina is divided. If receptors consist of several cells, fewer and
+    larger cells may be sufficient.
+    """
 
 
 @contextmanager

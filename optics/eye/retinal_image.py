@@ -22,7 +22,7 @@ def blur(
 ) -> Array:
     """Return the middle part of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u] at cells v, Dr.Jit (band b, *shape).
 
-    scenes: arrays (band, Y, X). Scenes are dark outside.
+    scenes: arrays (band, Y, X). Beyond the borders of its array, a scene is dark.
     kernels: one tensor or array (band, ky, kx) per scene, with odd ky and kx.
 
     This is a convolution, not a correlation: a point of light at v produces the kernel around v. All arrays are in the
@@ -41,7 +41,8 @@ def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], type
 
     pairs: each scene (Y, X) with its kernel (ky, kx).
 
-    The period of the transforms is long enough for wrapped parts to land outside the middle part.
+    Fourier transforms repeat the image periodically. The period is so long that the repeated parts do not overlap the
+    part that is returned.
     """
     if all(kernel.shape == (1, 1) for _, kernel in pairs):
         return sum(_flat(centred(scene, shape), types) * kernel.array for scene, kernel in pairs)
@@ -89,7 +90,10 @@ def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, .
 
 
 def _middle(kernel: tuple[int, ...], shape: tuple[int, int], scene: tuple[int, ...]) -> tuple[slice, slice]:
-    """Return slices of the part of the kernel that contributes to the middle part of the image."""
+    """Return slices of the part of a kernel that contributes to the middle part of the blurred image.
+
+    kernel, shape, scene: sizes (y, x) of the kernel, of this middle part and of the scene.
+    """
     cuts = [max(0, k // 2 - (m + n) // 2) for k, m, n in zip(kernel, shape, scene, strict=True)]
     rows, columns = (slice(cut, k - cut) for cut, k in zip(cuts, kernel, strict=True))
     return rows, columns
@@ -112,14 +116,19 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def receptor_average(image: Array, samples_per_receptor: int, types: Precision) -> Array:
-    """Return the mean over the s x s cells of each receptor, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
+    """Return the mean over the cells of each receptor, a Dr.Jit tensor (band, row, column) with one value per receptor.
+
+    image: Dr.Jit tensor (band, y, x) with one value per cell.
+    samples_per_receptor: number of cells along each side of a receptor.
+    """
     return _of_receptors(image, np.full(samples_per_receptor, 1 / samples_per_receptor), types)
 
 
 def mean_over(lattice: ReceptorLattice, image: Array, types: Precision) -> Array:
-    """Return the mean over each receptor's rectangle, Dr.Jit tensors: (band, Y, X) -> (band, h, w).
+    """Return the mean of an image over each receptor's rectangle, a Dr.Jit tensor (band, row, column) of receptors.
 
-    The image is constant within its cells, whose sides divide the retina evenly.
+    image: Dr.Jit tensor (band, y, x). Its values belong to equal cells, into which the retina is divided. The image is
+        constant within a cell.
     """
     import drjit as dr
 
@@ -142,9 +151,10 @@ def mean_over(lattice: ReceptorLattice, image: Array, types: Precision) -> Array
 
 
 def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> Array:
-    """Return the value at each receptor's middle, or in the next cell if the middle lies between two cells.
+    """Return the image's value in the cell at each receptor's middle.
 
-    In the second case, `with_centre` has shifted the kernels by half a cell.
+    If the number of cells along a receptor's side is even, the middle lies between cells. The value is then that of the
+    cell after the middle along y and x. It is correct if `with_centre` has shifted the kernels by half a cell.
     """
     return _of_receptors(image, np.arange(samples_per_receptor) == samples_per_receptor // 2, types)
 
@@ -159,9 +169,9 @@ def with_centre(kernel: Array) -> Array:
 
 
 def _of_receptors(image: Array, shares: np.ndarray, types: Precision) -> Array:
-    """Return weighted sums over the cells of each receptor, (band, h, w).
+    """Return weighted sums over the cells of each receptor, (band, receptor row, receptor column).
 
-    shares: weights of a receptor's cells along either axis.
+    shares: weights of a receptor's rows of cells. Its columns have the same weights.
     """
     down, across = (types.Tensor(np.kron(np.eye(n // len(shares)), shares)) for n in image.shape[1:])
     return matmul(down, matmul(image, across, transposed=True))

@@ -17,9 +17,9 @@ BEYOND = 8  # choice: samples beyond the outermost pixels, where a spline throug
 
 @dataclass(frozen=True)
 class SensorPixels:
-    """Pixels of a sensor, and the samples from which means over the pixels follow.
+    """Pixels of a sensor, and matrices that compute the means of an image over the pixels from samples of the image.
 
-    samples: grid of the samples. The pixels are the cells of another grid, whose pitch is the side of a pixel.
+    samples: grid of the image's samples. The pixels are the cells of another grid, whose pitch is the side of a pixel.
     rows, columns: matrices (pixel, sample) of the means along y and x. The means of an image are rows @ image @
         columns.T.
     """
@@ -33,7 +33,7 @@ class SensorPixels:
         """Return one pixel around each sample of a window, with the window's pitch as its side.
 
         cutoff: highest frequency [1/m] of the intensity.
-        tolerance: relative error of the means.
+        tolerance: largest relative error of the mean intensity of a pixel.
         """
         side = window.dx
         pitch = min(side, 1 / (samples_per_cycle(tolerance, cutoff * side) * cutoff))

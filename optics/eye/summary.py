@@ -29,7 +29,7 @@ Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (b
 
 @dataclass(frozen=True)
 class Description:
-    """Limits of an eye in white daylight, in the middle of its field. Frequencies [cycles/degree] are visual angles.
+    """Limits of an eye in white daylight, at the field's centre. Frequencies are in cycles per degree of visual angle.
 
     relative_aperture: a, the pupil's diameter relative to that of a pupil with a throughput of 1.
     throughput: a², times the open fraction of the aperture's disk, times the mask's transmission.
@@ -46,14 +46,14 @@ class Description:
     acuity_vertical_cpd: vertical acuity, with the Nyquist frequency of the receptors' rows.
     binding: name of the smallest known limit: "diffraction", "sampling" or "noise".
     strehl_ratio: Strehl ratio of the band nearest `wavelength`.
-    image_quality: mean of the contrast above the noise, up to the Nyquist frequency, times `white_signal`.
+    image_quality: `white_signal` times the mean, up to the Nyquist frequency, of the contrast's excess over the noise.
     noise: standard deviation of the signal of a receptor that sees white, from all sources of noise.
-    photons: photons that such a receptor absorbs per integration time, averaged over channels (None: no photon budget).
+    photons: photons that a receptor that sees white absorbs per integration time, mean of channels; None if unknown.
     acceptance_angle_deg: full width at half maximum of a receptor's angular sensitivity, horizontally.
     interommatidial_angle_deg: angle Δφ between horizontally neighbouring receptors.
-    interommatidial_vertical_deg: the same between vertically neighbouring receptors.
+    interommatidial_vertical_deg: angle between vertically neighbouring receptors.
     interommatidial_range_deg: smallest and largest angle between receptors over the whole eye, horizontally and
-        vertically, ((smallest, largest), (smallest, largest)). None: receptors are alike on the retina.
+        vertically, ((smallest, largest), (smallest, largest)). None: all receptors have the same size on the retina.
     plan: plan of the PSF of the least accurate band.
     white_signal: signal of a receptor that sees white: the throughput, reduced by the losses of waveguides.
     unknown: one line, with the reason, for each measure that cannot be computed accurately enough from the PSF. The
@@ -124,7 +124,7 @@ class Description:
         return "\n".join(f"{name:<20}{value}" for name, value in rows.items())
 
     def _vertical_rows(self, bound: str) -> dict[str, str]:
-        """Return table rows on the vertical direction; none if receptors are square."""
+        """Return the table's rows about vertical acuity, or an empty dictionary if receptors are square."""
         if math.isclose(self.interommatidial_vertical_deg, self.interommatidial_angle_deg, rel_tol=1e-9):
             return {}
         apart = f"rows of receptors {self.interommatidial_vertical_deg:.3g}° apart"
@@ -160,7 +160,7 @@ def noise_of(eye: EyeSpec, white_signal: Scalar) -> float:
 def _photons_of(eye: EyeSpec) -> float | None:
     """Return the photons that a receptor absorbs for a signal of 1, averaged over types; None without a photon budget.
 
-    Receptors with dynamics integrate over the time that their filter defines, instead of that of the photon budget.
+    Receptors with dynamics integrate over the time that their filter defines. The budget's time is not used.
     """
     if eye.photons is None or eye.photon_budget is None:
         return None
@@ -171,7 +171,7 @@ def _photons_of(eye: EyeSpec) -> float | None:
 
 
 def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> Description:
-    """Return the eye's limits for a scene at one distance.
+    """Return the limits of an eye's vision, such as its acuity, for a scene at one distance.
 
     A measure that cannot be computed accurately enough is NaN and has a line in `Description.unknown`.
 
@@ -219,7 +219,7 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
 
 
 def _known(name: str, measure: Callable[[], float], unknown: list[str]) -> float:
-    """Return the value of a measure. If it is not accurate enough, add a line to `unknown` and return NaN."""
+    """Return `measure()`. If this value is not accurate enough, return NaN and add the reason to `unknown`."""
     try:
         return measure()
     except AccuracyError as error:
@@ -252,7 +252,7 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
 def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
     """Return the full width [m] at half maximum of a receptor's sensitivity to white daylight, along x.
 
-    The sensitivity is PSF ⊗ receptor aperture, or that of a waveguide.
+    The sensitivity is the PSF convolved with the receptor's aperture. With a waveguide, it is the receptor's kernel.
     """
     if eye.pupil is None:
         return eye.receptor_pitch
@@ -270,7 +270,9 @@ def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
 
 
 def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
-    """Return the acceptance width [m] of a receptor with a waveguide, see `_acceptance`, from a spline of its kernel.
+    """Return the full width [m] at half maximum, along x, of the sensitivity of a receptor with a waveguide.
+
+    The sensitivity to white light is known for each cell of the scene. A spline interpolates it between cells.
 
     diameter: diameter [m] of the waveguide.
     """

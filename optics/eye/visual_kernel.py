@@ -1,4 +1,4 @@
-"""Receptive fields behind a pupil: the window that contains the light, and the PSF integrated over cells."""
+"""Receptive fields behind a pupil: integrals of a source's PSF over each cell of the retina that its light reaches."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class _WindowNeeds:
 
     half_window: half side [m] of the window around the geometric image.
     pitch: pitch [m] that resolves the PSF.
-    band: frequency [1/m] beyond which light behind the pupil may be omitted, within the tolerance.
-    half_of_rays: half side [m] of a window for the rays alone, see `_half_side`.
+    band: highest frequency [1/m] of light behind the pupil that must be included to meet the tolerance.
+    half_of_rays: half side [m] of a window that is sufficient without diffraction, see `_half_side`.
     """
 
     half_window: float
@@ -60,7 +60,7 @@ class Spot:
     half: half the side [m] of the square around it that contains the light.
     pitch: sampling pitch [m] that resolves the PSF.
     needs: window and sampling that each wavelength requires.
-    on_retina: True if the square is limited to the light that may land on the retina, see `spot_of`.
+    on_retina: True if the square's size was limited. Light outside the square then counts as blocked, see `spot_of`.
     """
 
     centre: tuple[float, float]
@@ -71,11 +71,11 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """Half the side [m] of the square for the rays alone, without diffraction, see `_half_side`."""
+        """The smaller of `half` and half the side [m] of a square that would be sufficient without diffraction."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:
-        """Return samples around the geometric image that cover the square, with a margin of `beside` samples."""
+        """Return a grid that covers the square around the geometric image and a margin of `beside` samples."""
         side = 2 * (math.ceil(self.half / pitch) + beside) + 1
         return Grid((side, side), pitch, self.centre)
 
@@ -84,17 +84,17 @@ class Spot:
 
 
 def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
-    """Return the PSF of a point at distance z [m], integrated over the retina's cells: Dr.Jit (band, ky, kx), both odd.
+    """Return the PSF of a point at distance z [m], integrated over cells of the retina around the geometric image.
 
-    The cells lie around the geometric image. Their rows ascend with y and their columns with x. The image on the retina
-    is inverted, so that this is also the order of the visual field, from top to bottom and from left to right.
+    The result is a Dr.Jit tensor (band, row, column) with odd numbers of rows and columns. The rows ascend with y and
+    the columns with x. As the image is inverted, this is from top to bottom and left to right of the visual field.
 
     direction: tangents (right, down) of the source's direction in the visual field.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
 
     Raises:
         ValueError: the retina's distance carries derivatives, and the source is off the axis.
-        AccuracyError: no method reaches the tolerance within the limits, or the light covers too many cells.
+        AccuracyError: the limits on memory and time are too low for the tolerance, or the light covers too many cells.
     """
     import drjit as dr
 
@@ -128,26 +128,26 @@ def visual_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float]) -> PSFResult:
-    """Return the PSF of a point at distance z [m], with a loss below the fraction `tolerance` at every wavelength.
+    """Return the PSF of a point at distance z [m], with at least 1 - `retina.tolerance` of each wavelength's light.
 
-    If the relief is too steep for this, light farther from the image than a side of the retina counts as blocked.
+    Light from a steep relief may count as blocked if it misses the geometric image by more than a side of the retina.
 
     direction: tangents (right, down) of the point's direction in the visual field.
 
     Raises:
-        AccuracyError: no method reaches the tolerance within the limits, or the light covers too many cells.
+        AccuracyError: the limits on memory and time are too low for the tolerance, or the light covers too many cells.
     """
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     return _on_spot(lambda spot: _spread(beams, spot, retina), beams, retina)
 
 
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
-    """Return the result of `compute` for the area that the light reaches.
+    """Return the result of `compute` for the square that the light reaches or, if `compute` fails, a smaller square.
 
-    If `compute` refuses a steep relief, the area is limited to the longer or else to the shorter side of the retina.
+    Two smaller squares are tried for steep reliefs, with half sides up to the retina's longer or shorter side.
 
     Raises:
-        AccuracyError: `compute` fails for each area. The error is that for the first one.
+        AccuracyError: `compute` fails for every square. The error is the one for the first square.
     """
     errors: list[AccuracyError] = []
     for most in (math.inf, max(retina.size), min(retina.size)):
@@ -167,13 +167,13 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
 
 
 def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
-    """Return the area that the light reaches.
+    """Return the square, centred on the geometric image, that contains the light.
 
-    most: largest half side [m]. If it is the longer side of the retina, the area contains the light that arrives at any
-        receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
+    most: largest half side [m]. The retina's longer side is enough for the light from any point of the visual field to
+        any receptor. Light outside the square counts as blocked by the rim of the eye.
 
     Raises:
-        CellsError: the area has too many cells.
+        CellsError: the square would be too many cells wide. Cells are the rectangles into which receptors are divided.
     """
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)
@@ -202,7 +202,7 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
 
 
 def _pitch_for_cells(pitch: float, retina: Retina) -> float:
-    """Return the largest pitch [m] for integrals over cells, given the `pitch` that the PSF itself requires."""
+    """Return the largest pitch [m] for integrals of the PSF over cells, given the `pitch` that resolves the PSF."""
     each = samples_per_cycle(retina.tolerance)
     return pitch * each / samples_per_cycle(retina.tolerance, min(retina.cell) / (pitch * each))
 
@@ -261,7 +261,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], fraction: float) -> float:
     """Return the half side [m] of the square about `centre` that contains this fraction of the rays' hit points.
 
-    behind: distance [m] and refractive index behind the pupil. Without dispersion, wavelengths share a cached result.
+    behind: distance [m] and refractive index behind the pupil.
     """
     x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
@@ -269,11 +269,11 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
 
 
 def _beyond_edge(pupil: Pupil, fraction: float) -> float:
-    """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts this fraction of the light.
+    """Return δ [1/m]: an aperture's hard edge changes the frequency of this fraction of the light by more than δ.
 
-    δ is relative to undiffracted light. The squared spectrum of a straight edge, integrated over frequencies above f,
-    is 1/(2π²f) per length. An aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ), a disk 1/(π²Rδ)
-    (Airy pattern, Born & Wolf, §8.5.2). The fraction is larger behind a mask brighter along the edge than on average.
+    The squared spectrum of a straight edge, integrated over changes above δ, is 1/(2π²δ) per length. For an aperture of
+    perimeter P and area A, the fraction is thus P/(2π²Aδ), and for a disk 1/(π²Rδ) (Airy pattern, Born & Wolf, §8.5.2).
+    Behind a mask that is brighter along the edge, the fraction is larger.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * fraction)
@@ -283,7 +283,7 @@ def _beyond_edge(pupil: Pupil, fraction: float) -> float:
 def _rim(pupil: Pupil) -> float:
     """Return the mean intensity behind the mask along the aperture's edge, divided by its mean over the aperture.
 
-    The result is 1 without a mask. It is at least 1, because the intensity next to a dark edge may rise steeply.
+    It is 1 without a mask. Values below 1 are replaced by 1: behind a dark edge, the rise of intensity diffracts light.
     """
     import drjit as dr
 
@@ -296,5 +296,5 @@ def _rim(pupil: Pupil) -> float:
 
 
 def _cells_within(half: float, cell: float) -> int:
-    """Return the odd number of cells that cover ±half around the image, with one cell centred on it."""
+    """Return the odd number of cells that cover the distance `half` on both sides of the middle of the middle cell."""
     return 2 * math.ceil(max(half / cell - 0.5, 0) - 1e-6) + 1

@@ -1,7 +1,7 @@
-"""The angular spectrum of a pupil's field on grids, propagated as a whole or with the paraxial part split off.
+"""The angular spectrum of a pupil's field on grids, propagated to the window in one step or in two.
 
-The split method first propagates the spectrum to a relay plane, without the paraxial part of the phase. From there to
-the window, Fresnel's integral adds this part.
+The method with two steps is called the split method. It first propagates the spectrum to a relay plane, without the
+paraxial part of the phase. From there to the window, Fresnel's integral adds this part.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ __all__ = [
 
 @dataclass(frozen=True)
 class GridSampling(SpectrumSampling):
-    """Spectrum of a pupil with a soft edge on a grid.
+    """Grids on which the angular spectrum of a pupil with a soft edge is computed.
 
-    pupil_period: number of the pupil's samples per period.
+    pupil_period: number of samples of the pupil's plane in one period, the width after which the field repeats.
     """
 
     method: str
@@ -56,7 +56,7 @@ class GridSampling(SpectrumSampling):
 
     @cached_property
     def pupil(self) -> Grid:
-        """Grid in the pupil's plane that covers the aperture with its soft edge; at most one period wide."""
+        """Grid in the pupil's plane. It covers the aperture with its soft edge, but at most one period of the field."""
         pitch = self.period / self.pupil_period
         across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
@@ -79,19 +79,27 @@ class GridSampling(SpectrumSampling):
 
 
 def whole_spectrum(problem: Problem) -> list[GridSampling]:
-    """Return samplings for which propagation of the spectrum as a whole meets the problem's tolerance."""
+    """Return samplings with which propagation of the spectrum in one step meets the problem's tolerance.
+
+    A sampling defines the grids on which a field is computed.
+    """
     return _samplings(problem, "angular_spectrum")
 
 
 def split_spectrum(problem: Problem) -> list[GridSampling]:
-    """Return samplings with which the split spectrum meets the problem's tolerance."""
+    """Return samplings with which the split method meets the problem's tolerance.
+
+    A sampling defines the grids on which a field is computed. The split method first propagates the spectrum without
+    the paraxial part of its phase. Fresnel's integral then adds this part.
+    """
     return _samplings(problem, "split_angular_spectrum")
 
 
 def _samplings(problem: Problem, method: str) -> list[GridSampling]:
     """Return samplings for tapers with increasing blur, up to the first sampling that costs more than its predecessor.
 
-    Tapers with little blur need more frequencies, and tapers with much blur a longer period. The cost therefore has a
+    A taper fades the spectrum out at high frequencies, which blurs the field. Tapers with little blur need more
+    frequencies. Tapers with much blur need a longer period, after which the field repeats. The cost therefore has a
     single minimum.
     """
     found: list[GridSampling] = []
@@ -111,10 +119,13 @@ def _sampling(problem: Problem, taper: Taper, method: str) -> GridSampling:
 
 
 def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
-    """Return the period [m] and the number of its samples at the window's pitch.
+    """Return the period [m] after which the field repeats, and the number of its samples at the window's pitch.
 
-    The period covers the window and all light that could wrap around into it from a pupil that ends `outermost` [m]
-    from the axis, except for negligible light beyond the problem's `reach`.
+    Fourier transforms on a grid add copies of the field, one period apart. The period is so long that the light of the
+    copies does not reach the window. Unless `problem.steep` is True, light that arrives farther from the axis than
+    `problem.reach` is excepted. It is negligible, so its copies may overlap the rim of the window.
+
+    outermost: distance [m] from the axis at which the pupil ends.
     """
     beam = outermost + taper.blur + problem.distance * taper.tangent
     # Light beyond `reach` is negligible, except behind steep pupils, so it may wrap around to the rim of the window.
@@ -152,7 +163,7 @@ def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
 
 
 def _spectrum_cost(how: GridSampling, dtype: str) -> tuple[float, float]:
-    """Return the time [s] and the memory [bytes] of the sum from the pupil to the spectrum."""
+    """Return the time [s] and the memory [bytes] of the Fourier sum over the pupil that gives the spectrum."""
     stored, spectrum = how.part(how.pupil), how.part(how.spectrum)
     count, rows = block_size(stored)
     block = Grid((rows, stored.shape[1]), stored.dx)
@@ -166,8 +177,8 @@ def _spectrum_cost(how: GridSampling, dtype: str) -> tuple[float, float]:
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
     """Return the field over the window, U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10).
 
-    U₀ is the field behind the pupil, F the Fourier transform and H the transfer function. A split spectrum omits a
-    phase that does not affect the intensity.
+    U₀ is the field behind the pupil, F the Fourier transform and H the transfer function. If `how` belongs to the
+    split method, the result lacks a phase that does not affect the intensity.
     """
     spectrum = _spectrum(beam, how, types)
     found = arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)
@@ -186,9 +197,10 @@ def _spectrum(beam: Beam, how: GridSampling, types: Precision) -> Field:
 
 
 def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return the field over the window that results from this spectrum in the pupil's plane.
+    """Return the field over the window that results from this spectrum of the field in the pupil's plane.
 
-    For a split spectrum, a phase that does not affect the intensity is omitted.
+    If `how` belongs to the split method, which propagates in two steps, the result lacks a phase that does not affect
+    the intensity.
     """
     spectrum = spectrum * transfer(beam, problem, how, precision(problem.dtype))
     if how.is_whole:
@@ -197,9 +209,10 @@ def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling
 
 
 def transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
-    """Return the transfer function exp(ikz (cos θ - 1)) for light at the angle θ (Goodman, eq. 3-74), times the taper.
+    """Return the product of the transfer function exp(ikz (cos θ - 1)) (Goodman, eq. 3-74) and the taper of `how`.
 
-    With q = 1 - cos θ, the exponent is -ikz q. The split method omits the paraxial part of the exponent, -ikz sin²θ/2.
+    θ is the angle of the light with the axis. The taper fades light out near grazing incidence. With q = 1 - cos θ, the
+    exponent is -ikz q. The split method leaves the paraxial part of the exponent, -ikz sin²θ/2, to Fresnel's integral.
     Because q - sin²θ/2 = q²/2, the exponent -ikz q²/2 remains.
     """
     import drjit as dr
@@ -227,7 +240,11 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return the field over the window: Fresnel's integral of the field in the relay plane adds the paraxial part."""
+    """Return the field over the window, from a spectrum that lacks only the paraxial part of the propagation.
+
+    A Fourier transform gives the field in an intermediate plane, the relay plane. From there to the window, Fresnel's
+    integral adds the paraxial part.
+    """
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

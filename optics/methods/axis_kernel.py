@@ -1,7 +1,9 @@
 """The diffraction kernel along one axis of the window, relative to its value at the middle of the window.
 
-It is the Fourier kernel times the slow factor (see `slow_factor`) along this axis, and depends on one sine and one
-position.
+The kernel is a Fourier kernel times a factor that varies slowly over the window (see `slow_factor`). A point of the
+pupil is identified by two sines, the components along x and y of its direction as seen from the middle of the window.
+Along one axis of the window, the Fourier kernel and the slow factor depend on two numbers only: the position in the
+window and the sine of the point of the pupil, both along this axis.
 """
 
 from __future__ import annotations
@@ -30,20 +32,33 @@ class HasDirections(Protocol):
 
     @property
     def elsewhere(self) -> float | np.ndarray:
-        """Sine along the other axis at which the factor along x or y is evaluated, minus that of the pupil's centre."""
+        """A fixed sine, which selects the points of the pupil for which the slow factor is evaluated.
+
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The sines of a point are the x and y
+        components of the unit vector from the window's middle to the point. Along x, the slow factor is evaluated for
+        points whose sine along y is the fixed one. Along y, it is evaluated for points whose sine along x is the fixed
+        one. The value of this property is the fixed sine minus the sine of the pupil's centre.
+        """
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupils at these sines, which are relative to the pupils' centres."""
+        """Return the points (x, y) [m] of the pupils that have the sines s along x and t along y.
+
+        Sines are the x and y components of the unit vector from the window's middle to a point. The sines of the
+        pupil's centre are subtracted from s and t.
+        """
 
 
 @dataclass(frozen=True, eq=False)
 class AxisFactor:
     """The slow factor along x (0) or y (1), relative to its value at the middle of the window.
 
-    Along the other axis, the sine is that of the pupil's centre plus `elsewhere`. The points of the pupil, and the
-    factor at the middle of the window, are computed once.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window. The
+    sines of a point of the pupil are the components of its direction along x and y, as seen from the middle of the
+    window. The points have different sines along `axis`. Along the other axis, the sine of each is the sine of the
+    pupil's centre plus `samples.elsewhere`. The points, and the factor at the middle of the window, are computed once.
 
-    sines: sines along the axis, minus that of the pupil's centre, as an array with as many dimensions as the positions.
+    sines: sines of the points along the axis, minus the sine of the pupil's centre. The array has as many dimensions as
+        the positions for which `at` is called.
     """
 
     path: Path
@@ -52,9 +67,9 @@ class AxisFactor:
     sines: np.ndarray
 
     def at(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return amplitude and phase [waves] at positions [m] along the axis, relative to the middle of the window.
+        """Return amplitude and phase [waves] of the slow factor, relative to its value at the middle of the window.
 
-        The positions must have the dtype of the sines.
+        places: positions [m] along the axis, relative to the middle of the window, with the dtype of the field `sines`.
         """
         points, directions, middle = self.pupil
         none = np.zeros((1,) * self.sines.ndim, self.sines.dtype)
@@ -65,7 +80,12 @@ class AxisFactor:
 
     @cached_property
     def pupil(self) -> tuple[Pair, Pair, Pair]:
-        """Points of the pupil, their directions, and the slow factor at the middle of the window."""
+        """Points of the pupil, their directions, and the slow factor of each point.
+
+        The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Its amplitude and phase are those at
+        the middle of the window. Points are (x, y) [m], directions are sines along x and y relative to the pupil's
+        centre, and the phase is in waves.
+        """
         kind, elsewhere = self.sines.dtype, self.samples.elsewhere
         none = np.zeros((1,) * self.sines.ndim, kind)
         other = none + (elsewhere.reshape(-1, *none.shape[1:]) if isinstance(elsewhere, np.ndarray) else elsewhere)
@@ -79,30 +99,32 @@ class AxisFactor:
 def axis_factor(path: Path, samples: HasDirections, axis: int, sines: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return the complex factor that `AxisFactor` describes, at positions [m] relative to the middle of the window.
 
-    Like the Fourier kernel along this axis, it depends on one sine and one position. It can therefore be included in
-    that kernel.
+    Like the Fourier kernel along this axis, the factor depends on two numbers only, the position and the sine of a
+    point of the pupil. It can therefore be included in that kernel. Sines are components of the unit vector from the
+    middle of the window to the point.
 
-    sines, places: sines and positions along the axis, which broadcast.
+    sines, places: sines, minus the sine of the pupil's centre, and positions along the axis, which broadcast.
     """
     sines = sines.reshape((1,) * (places.ndim - sines.ndim) + sines.shape)
     return np.asarray(turned(*AxisFactor(path, samples, axis, sines).at(places), "float64"))
 
 
 def axis_kernel(path: Path, samples: SineStack, axis: int, places: np.ndarray, dtype: str) -> np.ndarray:
-    """Return the Fourier kernel times `axis_factor`, (stack, place, sample), complex.
+    """Return the diffraction kernel along x (0) or y (1), relative to its value at the middle of the window.
 
-    It is the whole kernel along x (0) or y (1), relative to its value at the middle of the window.
+    The result, the product of the Fourier kernel and `axis_factor`, is a complex array (pupil, position, sample).
 
-    places: positions [m] along the axis, relative to the middle of the window, (stack, place).
+    places: positions [m] along the axis, relative to the middle of the window, (pupil, position).
     dtype: "float32" or "float64".
     """
     return np.asarray(turned(*_whole(path, samples, axis, samples.at, places), dtype))
 
 
 def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.ndarray:
-    """Return `axis_kernel` for all columns (0) or rows (1) of the window, (stack, place, sample).
+    """Return the diffraction kernel along x (0) or y (1) at all columns or rows of the window, see `axis_kernel`.
 
-    If amplitude and phase are smooth, they are interpolated from a few sines and positions.
+    If amplitude and phase of the kernel are smooth, they are computed for only a few points of the pupil and a few
+    positions in the window, and interpolated. The result is a complex array (pupil, column or row, sample).
     """
     at, place = samples.at, sample_positions(path.window.shape[1 - axis], path.window.dx)
     if min(len(place), at.shape[1]) <= SMOOTH or not samples.smooth(path.window.half_width):
@@ -117,7 +139,9 @@ def window_kernel(path: Path, samples: SineStack, axis: int, dtype: str) -> np.n
 
 @dataclass(eq=False)
 class AxisRows:
-    """Rows of the `axis_kernel` for positions of the window. For a single pupil, each row is computed only once.
+    """Rows of the matrix `axis_kernel`, one for each position along an axis of the window.
+
+    For a single pupil, each row is computed only once.
 
     path, samples, axis, dtype: see `axis_kernel`.
     """
@@ -133,7 +157,10 @@ class AxisRows:
         self._rows = np.empty((count, self.samples.at.shape[1]), np.result_type(self.dtype, np.complex64))
 
     def at(self, places: np.ndarray) -> np.ndarray:
-        """Return the kernel at positions of the window with the indices `places`, (stack, place, sample)."""
+        """Return the kernel at some positions along the axis, an array (pupil, position, sample).
+
+        places: indices of these positions among the window's columns or rows.
+        """
         if len(self.samples.at) > 1:
             return self._computed(places)
         known = self._known[places]
@@ -152,7 +179,13 @@ class AxisRows:
 def _whole(
     path: Path, samples: SineStack, axis: int, sines: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return amplitude and phase [waves] of `axis_kernel`, (stack, place, sine)."""
+    """Return amplitude and phase [waves] of the diffraction kernel along an axis, arrays (pupil, position, sine).
+
+    The kernel is relative to its value at the middle of the window, see `axis_kernel`.
+
+    sines: sines of points of the pupil along the axis, minus the sine of the pupil's centre, (pupil, sine).
+    places: positions [m] along the axis, relative to the middle of the window, (pupil, position).
+    """
     sines, places = sines[:, None, :], places[:, :, None]
     size, waves = AxisFactor(path, samples, axis, sines).at(places)
     wavelength, _ = path.numbers(3)

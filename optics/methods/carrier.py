@@ -1,4 +1,4 @@
-"""The phase of a spherical wave from the pupil's centre, which methods remove from a field before interpolating it."""
+"""The phase of a spherical wave from the pupil's centre. Without this phase, fields are easier to interpolate."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ __all__ = ["on_line", "on_window", "with_sphere"]
 def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, sign: int) -> Field:
     """Return the field times e^{±ik(ρ - z)} at points (x, y) [m].
 
-    ρ is the distance of the point from the pupil's centre, and z that of the window's plane. ρ - z is computed as (x² +
-    y²)/(ρ + z).
+    ρ is the distance of the point from the pupil's centre, and z the distance between the planes of the pupil and the
+    window. ρ - z is computed as (x² + y²)/(ρ + z).
 
     sign: sign of the exponent.
     """
@@ -29,7 +29,7 @@ def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, 
 
 
 def on_window(field: Field, beam: Beam, problem: Problem) -> Field:
-    """Return a field over the window, multiplied by the spherical phase that its method omitted."""
+    """Return the product of a field over the window and the factor e^{ik(ρ - z)}, see `with_sphere`."""
     x, y = problem.window.coordinates(precision(problem.dtype))
     return with_sphere(field, x, y, beam, problem, +1)
 

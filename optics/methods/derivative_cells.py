@@ -1,10 +1,10 @@
 """Quadrature nodes in the cells between the knots of spline maps, for derivatives with respect to the maps' samples.
 
-In a cell, the integrand of a derivative is a cubic polynomial, or a product of two, times the light behind the pupil,
-which is a wave. Let t in [-1, 1] be the position across the cell, and z the largest phase difference between the cell's
-middle and a border. The wave then varies at most as fast as e^{izt}, whose Chebyshev coefficients have the modulus
-2 |J_k(z)|. A rule of n Gauss-Legendre nodes is exact for polynomials up to degree 2n - 1. Cells that the edge of the
-aperture cuts have the same nodes, with weights that are exact up to degree n - 1 over the open part.
+In a cell, the integrand of a derivative is the light behind the pupil, a wave, times one or two cubic polynomials.
+Let t in [-1, 1] be the position across the cell, and z the largest phase difference between the cell's middle and a
+border. The wave then varies at most as fast as e^{izt}, whose Chebyshev coefficients have the modulus 2 |J_k(z)|. A
+rule of n Gauss-Legendre nodes is exact for polynomials up to degree 2n - 1. If the edge of the aperture cuts a cell,
+the nodes are those of a whole cell. Their weights are then exact up to degree n - 1 over the open part of the cell.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ DEGREES = 96  # number of degrees in this table; coefficients of higher degrees 
 def derivative_cells(
     opening: Aperture, knots: DerivativeKnots, cycles: np.ndarray, tolerance: float
 ) -> PixelatedAperture | None:
-    """Return the opening, divided into cells with the fewest nodes that are accurate enough; None for too many cells.
+    """Return the opening, divided into cells with the fewest quadrature nodes per cell that are accurate enough.
 
-    The error is the relative L2 error of the derivatives with respect to all samples, for a random functional of the
-    PSF. It is at most NODES_PART times the tolerance. Cells are halved if they would need more than MOST_NODES nodes.
+    The result is None if more than MOST_CELLS cells along a side would be necessary. The derivatives are those of a
+    random functional of the PSF with respect to all samples of the maps. Their relative L2 error is at most NODES_PART
+    times the tolerance. Cells are halved if they would need more than MOST_NODES nodes along a side.
 
     cycles: local frequencies [cycles per radius] of the integrand at points that are evenly spread over the opening.
     """
@@ -60,17 +61,26 @@ def derivative_cells(
 
 @lru_cache(maxsize=64)
 def _divided(opening: Aperture, borders: tuple[float, ...], halvings: int) -> PixelatedAperture:
-    """Return the opening with cells between these borders, each divided into 2^halvings equal parts per axis."""
+    """Return the opening, divided into cells.
+
+    Each interval between two borders is divided into 2^halvings equal parts, along both axes. These are the cells.
+    """
     parts = 2**halvings
     places = np.interp(np.arange((len(borders) - 1) * parts + 1) / parts, np.arange(len(borders)), borders)
     return PixelatedAperture.between(opening, tuple(places.tolist()))
 
 
 def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
-    """Return the errors of derivatives for 1 to MOST_NODES nodes along a cell, (MOST_NODES,).
+    """Return the relative error of derivatives for each number of quadrature nodes along a cell's side.
 
-    z: half the phase [rad] that the wave gains across a cell, at points that are evenly spread over the opening.
-    cut_share: fraction of the area that lies in cut cells.
+    Spline maps are reliefs, wavefronts or masks that splines interpolate between samples. The derivatives are those of
+    a functional of the PSF with respect to the samples. Cells are the rectangles into which the knots of the splines
+    divide the opening. The result is an array (number of nodes,), for numbers from 1 to MOST_NODES.
+
+    z: half the phase [rad] that the light behind the pupil gains across a cell, at points that are evenly spread over
+        the opening.
+    splines: number of splines by which this light is multiplied in the integrand of a derivative.
+    cut_share: fraction of the opening's area that lies in cells cut by the edge of the aperture.
     """
     place = np.searchsorted(WAVES, z)
     if place.max() >= len(WAVES):
@@ -85,9 +95,12 @@ def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _tails(splines: int) -> np.ndarray:
-    """Return the sum of the integrand's Chebyshev coefficients from each degree on, for z in WAVES, (z, degree).
+    """Return sums of Chebyshev coefficients, each over all degrees from one degree on, as an array (wave, degree).
 
-    splines: number of splines whose product with the wave is integrated.
+    The coefficients are upper bounds of those of a wave e^{izt} times splines. t in [-1, 1] is the position across a
+    cell, and z half the phase [rad] that the wave gains across the cell. The table WAVES contains the values of z.
+
+    splines: number of splines by which the wave is multiplied.
     """
     from scipy.special import jv
 

@@ -34,8 +34,8 @@ def diffraction_kernel(
     """Return modulus [1/m²] and phase [waves] of i times the kernel, without the spherical phase e^{ikρ}.
 
     The kernel is z/(λD²) (1/(kD) - i) e^{ikD}. D is the distance of a point of the window from a point of the pupil,
-    and ρ its distance from the pupil's centre. z is the distance of the window's plane, and k the wave number. All
-    arrays are broadcast.
+    and ρ is the distance of the same point of the window from the pupil's centre. z is the distance of the window's
+    plane, and k the wave number. All arrays are broadcast.
 
     wavelength: wavelength in the medium [m].
     distance: distance of the window's plane [m].

@@ -1,7 +1,8 @@
-"""The Rayleigh-Sommerfeld integral by Fourier transforms onto directions.
+"""The Rayleigh-Sommerfeld integral by Fourier transforms of the light in the pupil, from points to directions.
 
-One transform is computed for each of a few points of the window (nodes). Between the nodes, a slow factor is
-interpolated.
+The window is the part of the sensor plane in which the PSF is computed. The kernel of the integral is a Fourier kernel
+times a factor that varies slowly over the window. With the value of this factor at one point of the window, the
+integral is a Fourier transform. It is computed for a few such points, the nodes, and interpolated between them.
 """
 
 from __future__ import annotations
@@ -48,9 +49,9 @@ POINTS = 150  # choice: points of the pupil at which the slow factors of nodes a
 class FarFieldSampling:
     """Samples of the pupil and of direction cosines, and nodes over the window.
 
-    The pitch of the direction cosines is the wavelength, divided by period x pitch of the pupil. The nodes are
-    Chebyshev points in the angle atan(x/z), because the kernel as a function of x has poles at ±iz, with z the distance
-    of the window.
+    The pitch of the direction cosines is λ/(period · pitch), with the wavelength λ and the pitch of the pupil grid. The
+    nodes are Chebyshev points in the angle atan(x/z), because the kernel as a function of x has poles at ±iz, with z
+    the distance of the window.
     """
 
     edge: PupilEdge
@@ -68,7 +69,12 @@ class FarFieldSampling:
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
+
+        The power of all rounding errors is a fraction of the power of the light. Their size in the window is estimated
+        from this power and the width, see `Sampling.plane`. The width is one period of the Fourier transform of the
+        pupil's samples.
+        """
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -81,9 +87,12 @@ class FarFieldSampling:
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
-    """Return a list with one sampling: directions that oversample the field, and the nodes that the slow factor needs.
+    """Return a list with one sampling, or an empty list if the method is not suitable for the window.
 
-    The list is empty if the method is not suitable for the window.
+    The sampling consists of samples of the pupil, directions towards the window, and a few points of the window
+    (nodes). The field is computed for the directions. They are denser than the field requires, so that it can be
+    interpolated between them. The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is interpolated
+    between the nodes.
     """
     half = problem.window.half_width
     sine = half / math.hypot(half, problem.distance)
@@ -125,7 +134,11 @@ def _seconds(how: FarFieldSampling, problem: Problem) -> float:
 
 
 def _nodes(problem: Problem, count: int) -> WindowNodes:
-    """Return the nodes at which the slow factor must be evaluated, selected from `count` nodes along each axis."""
+    """Return the nodes of the window at which the slow factor of `_far_field` must be evaluated.
+
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The nodes are selected from a square of
+    `count` x `count` Chebyshev points.
+    """
     # The width of a single sample is 0, but the half angle must be positive.
     half_angle = math.atan2(max(problem.window.half_width, problem.window.dx), problem.distance)
     if count <= FEW:
@@ -139,17 +152,18 @@ def _nodes(problem: Problem, count: int) -> WindowNodes:
 
 
 def _step(error: float) -> float:
-    """Return the phase step [rad] between samples of a unit wave for this error of eight-point Lagrange interpolation.
+    """Return the difference of phase [rad] between samples of a wave at which interpolation has this error.
 
-    The step is at most 1.5.
+    The wave has the amplitude 1 and is interpolated by eight-point Lagrange polynomials. The difference is at most 1.5.
     """
     return min(1.5, (error / LAGRANGE_8) ** 0.125)
 
 
 def _nodes_needed(problem: Problem, error: float) -> int | None:
-    """Return the number of Chebyshev nodes along an axis that interpolate the kernel's slow factor; None if too many.
+    """Return how many Chebyshev nodes along an axis are sufficient to interpolate the slow factor.
 
-    Interpolation is tested for points on the rim of the aperture.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel. The result is None if the largest number
+    that is tried is not sufficient. Interpolation is tested for points on the rim of the aperture.
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
@@ -168,7 +182,7 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
 
 @lru_cache(maxsize=len(CHEBYSHEV_NODES))
 def _between(n: int) -> np.ndarray:
-    """Return interpolation weights of n Chebyshev points at the test positions, (point, position)."""
+    """Return weights that interpolate from n Chebyshev points to TRIED evenly spaced positions, (point, position)."""
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(n))
 
 
@@ -221,7 +235,10 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
 
 def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
-    """Return the slow factor G(ξ; x) of `_far_field` on the pupil's grid, without a constant phase.
+    """Return the factor by which the diffraction kernel differs from a Fourier kernel, on the pupil's grid.
+
+    This is the factor G(ξ; x) of the integrand in `_far_field`, apart from the constant -i. For a fixed point ξ of the
+    pupil, it varies slowly with the point x of the window.
 
     tan_x, tan_y: tangents x/z and y/z of the point x of the window.
     """

@@ -1,8 +1,9 @@
-"""The nodes of the window at which `far_field` evaluates the slow factor.
+"""The points of the window (nodes) at which `far_field` evaluates the slow factor.
 
-The slow factor is interpolated between nodes, which are Chebyshev points in angle. Within the tolerance, its
-values at all nodes are linear combinations of its values at a few of them. Only these few nodes are evaluated. Their
-choice is an interpolative decomposition (Cheng et al., SIAM J. Sci. Comput. 26 (2005) 1389).
+The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window. It is
+interpolated between the nodes, which are Chebyshev points in angle. Within the tolerance, its values at all nodes are
+linear combinations of its values at a few of them. It is evaluated only at these few nodes, which an interpolative
+decomposition selects (Cheng et al., SIAM J. Sci. Comput. 26 (2005) 1389).
 """
 
 from __future__ import annotations
@@ -20,11 +21,14 @@ AT_A_TIME = 4_000_000  # choice, limited by memory: entries of a product of poly
 
 @dataclass(frozen=True, eq=False)
 class WindowNodes:
-    """Nodes of the window and their weights.
+    """Points of the window (nodes), and the weights with which a few of them represent all others.
 
-    count: number of nodes along each axis: Chebyshev points in angle, between ±half_angle [rad].
-    kept: rows and columns of the nodes at which the slow factor is evaluated, (kept, 2).
-    mix: complex weights, (kept, row, column), with which the kept nodes represent each node.
+    The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is evaluated only at these few nodes, the
+    kept ones. Its values at all nodes are linear combinations of its values at the kept nodes.
+
+    count: number of nodes along each axis. They are Chebyshev points in angle, between ±half_angle [rad].
+    kept: row and column of each kept node among all nodes, (kept node, 2).
+    mix: complex weights of the kept nodes in the linear combination for each node, (kept node, row, column).
     """
 
     count: int
@@ -34,14 +38,19 @@ class WindowNodes:
 
     @property
     def tangents(self) -> list[tuple[float, float]]:
-        """Tangents (x/z, y/z) of the kept nodes."""
+        """Tangents (x/z, y/z) of the directions to the kept nodes.
+
+        The kept nodes are the points of the window at which the slow factor, the ratio of the diffraction kernel to a
+        Fourier kernel, is evaluated.
+        """
         at = np.tan(self.half_angle * chebyshev_points(self.count))
         return [(float(at[column]), float(at[row])) for row, column in self.kept]
 
     def weights(self, angle: np.ndarray, dtype: str) -> np.ndarray:
-        """Return the weights of the kept nodes for all directions of a square grid, (kept, 2, direction).
+        """Return the weights that interpolate from the kept nodes to a square grid of directions.
 
-        The second axis contains real and imaginary parts.
+        The kept nodes are the few points of the window at which the slow factor, the ratio of the diffraction kernel to
+        a Fourier kernel, is evaluated. The result is an array (kept node, real or imaginary part, direction).
 
         angle: atan(x/z) of the directions, (y, x). The grid is symmetric, so the transpose of `angle` is atan(y/z).
         """
@@ -59,17 +68,22 @@ class WindowNodes:
 
 
 def all_nodes(count: int, half_angle: float) -> WindowNodes:
-    """Return `WindowNodes` in which all nodes are kept, so that each node represents itself."""
+    """Return `WindowNodes` that evaluate the slow factor at every node, so that no node is a combination of others.
+
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel.
+    """
     kept = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="ij"), axis=-1).reshape(-1, 2)
     return WindowNodes(count, half_angle, kept, np.eye(count**2).reshape(-1, count, count).astype(complex))
 
 
 def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> WindowNodes:
-    """Return `WindowNodes` with a few kept nodes. Their values, linearly combined, approximate those at all nodes.
+    """Return `WindowNodes` that evaluate the slow factor only at a few nodes, the kept ones.
 
-    For each node, the root mean square error over the points of the pupil is less than `error`.
+    Linear combinations of the values at the kept nodes approximate those at all nodes. For each node, the root mean
+    square error over the points of the pupil is less than `error`.
 
-    slow: slow factor for every node at points of the pupil, (row, column, point), with a modulus of about 1.
+    slow: the slow factor, which is the ratio of the diffraction kernel to a Fourier kernel, for every node and for
+        points of the pupil, (row, column, point), with a modulus of about 1.
     """
     rest = slow.reshape(count**2, -1)
     kept: list[int] = []

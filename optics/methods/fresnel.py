@@ -35,7 +35,8 @@ MUCH = 0.7  # choice: above this error, the field is unrelated to the exact fiel
 class ParaxialSampling:
     """Samples of a pupil for a paraxial method.
 
-    `model_error` is computed on first access, because it takes longer than all other parts of a plan.
+    `model_error` is computed on first access, because this takes longer than choosing the samples and predicting their
+    cost.
     """
 
     method: str
@@ -57,7 +58,11 @@ class ParaxialSampling:
         return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, curved).intensity
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+
+        `Sampling.plane` explains how the size of rounding errors follows from this width. The width is one period of
+        the Fourier transform of the pupil's samples.
+        """
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -109,16 +114,17 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
 
 
 def model_error(problem: Problem, curved: bool) -> float:
-    """Return the relative L2 error of the intensity that results from the paraxial kernel.
+    """Return the relative L2 error of an intensity that is computed with the paraxial kernel.
 
-    It follows from the ratio q of the paraxial kernel to the exact kernel for light from ξ to x,
+    The ratio of the paraxial kernel to the exact kernel for light from ξ to x is
 
-        q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|,   D = √(d² + z²),
+        q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|,   D = √(d² + z²).
 
-    at and near the hit points x of rays. Fraunhofer's integral omits the term ξ² of d². Light that adds up coherently
-    at a hit point comes from a few Fresnel zones around the ray's origin, or from the whole aperture if several rays
-    may hit the same point. A phase that is common to all this light causes no error. Without rays or behind a mask, the
-    error cannot be predicted and counts as 1.
+    Fraunhofer's integral also omits the term ξ² of d². The error is the deviation of q from a constant phase factor,
+    averaged over points x at and near the hit points of rays. A phase that is common to all light at x causes no error.
+    For each x, only points ξ count whose light adds up coherently there. They lie in a few Fresnel zones around the
+    ray's origin, or in the whole aperture if several rays may hit the same point. If there are no rays, or if the pupil
+    has a mask, the error cannot be predicted and counts as 1.
 
     curved: True for Fresnel's integral, False for Fraunhofer's.
     """
@@ -148,9 +154,10 @@ def model_error(problem: Problem, curved: bool) -> float:
 
 
 def _misplaced(problem: Problem) -> float:
-    """Return the error of Fraunhofer's integral for wide shadows, which the integral wrongly shrinks to a spot.
+    """Return the relative L2 error of a PSF from Fraunhofer's integral whose spot of light is much too small.
 
-    It follows from the brightness of the spot, relative to that of the exact PSF.
+    For example, a pupil without a lens casts a wide shadow, but the integral yields a small spot. The error follows
+    from the brightness of the spot, relative to that of the exact PSF.
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None

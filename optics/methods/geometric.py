@@ -37,9 +37,10 @@ class NoDerivativesError(ValueError):
 class RaySampling:
     """Rays from quadrature nodes that are fitted to the edge of the aperture.
 
-    rule: aperture, cycles and digits of the nodes, see `cached_nodes`.
+    rule: the aperture, the largest frequency [cycles per pupil radius] that the nodes resolve, and the accuracy of sums
+        over the nodes [decimal digits].
     count: number of nodes.
-    model_error: relative L2 error of the intensity that results because rays replace waves.
+    model_error: relative L2 error that the intensity has because rays replace waves.
     """
 
     rule: tuple[Aperture, float, float]
@@ -51,12 +52,14 @@ class RaySampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
+        """Return the power per area at each sample of the window, as a flat Dr.Jit array.
+
+        The intensity at the pupil is 1.
 
         Raises:
-            NoDerivativesError: derivatives are required on a GPU. There, derivatives in Dr.Jit that use the reciprocal
-                of a float64 have errors of 1e-6. The directions of rays are small differences of paths, which magnify
-                these errors to 1e-2.
+            NoDerivativesError: derivatives are required on a GPU. On a GPU, Dr.Jit computes derivatives with errors of
+                1e-6 if they use the reciprocal of a float64. The directions of rays are computed from small differences
+                between optical paths, and this magnifies the errors to 1e-2.
         """
         import drjit as dr
 
@@ -74,7 +77,12 @@ class RaySampling:
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return infinity, because rounding errors do not spread rays."""
+        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+
+        The intensity of rounding errors is their power divided by the area of this square, see `Sampling.plane`. Here,
+        the width is infinite, so these errors count as zero. Rounding errors shift rays, but do not scatter light over
+        the window.
+        """
         return math.inf
 
     @property
@@ -84,7 +92,10 @@ class RaySampling:
 
 @dataclass(frozen=True)
 class PinholeSampling:
-    """A PSF with all light in the cell that the ray through the pupil's centre hits."""
+    """Plan for a PSF with all light in one sample of the window.
+
+    This is the sample closest to the point that the ray through the pupil's centre hits.
+    """
 
     model_error: float
     seconds: float = CALL["pinhole"]
@@ -94,10 +105,13 @@ class PinholeSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
+        """Return the power per area at each sample of the window, as a flat Dr.Jit array.
+
+        The intensity at the pupil is 1.
 
         Raises:
-            ValueError: derivatives are requested. They do not exist, because the light jumps from cell to cell.
+            ValueError: derivatives are requested. The intensity has none: when the ray through the pupil's centre
+                moves, all light jumps from one sample of the window to the next.
         """
         import drjit as dr
 
@@ -115,17 +129,23 @@ class PinholeSampling:
         return types.Float(padded_for_packets(image))
 
     def plane(self, problem: Problem) -> float:
-        """Return infinity, because rounding errors do not occur."""
+        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+
+        The intensity of rounding errors is their power divided by the area of this square, see `Sampling.plane`. Here,
+        the width is infinite, so these errors count as zero. The reason is that all light is in one sample of the
+        window, and the other samples are exactly 0.
+        """
         return math.inf
 
 
 def geometric(problem: Problem) -> list[RaySampling]:
-    """Return a list with one sampling, which has enough rays for a smooth image; empty for a pupil of pixels.
+    """Return a list with one sampling, which has enough rays for a smooth image.
 
-    Every ray is spread by a quadratic B-spline over the window's cells. The spectrum of the spline falls like
-    (πf dx)⁻³, so it is below the error ε beyond f = ε^(-1/3)/(π dx). ε is a tenth of the tolerance, or a hundredth of
-    the model error if that is larger. The rays are dense enough for this frequency: their hit points are closer
-    together than the window's pitch.
+    The list is empty if the pupil's relief consists of pixels, because these scatter light away from rays. Every ray is
+    spread by a quadratic B-spline over the window's cells. The spectrum of the spline falls like (πf dx)⁻³, so it is
+    below the error ε beyond f = ε^(-1/3)/(π dx). ε is a tenth of the tolerance or a hundredth of the model error,
+    whichever is larger. The rays are dense enough for this frequency: their hit points are closer together than the
+    window's pitch.
     """
     rays = problem.rays
     if rays is None:
@@ -142,10 +162,11 @@ def geometric(problem: Problem) -> list[RaySampling]:
 
 
 def pinhole(problem: Problem) -> list[PinholeSampling]:
-    """Return a list with the sampling that puts all light into one sample; empty for a pupil of pixels.
+    """Return a list with the sampling that puts all light into one sample of the window.
 
-    The predicted error exceeds 100 %, even for a very small exact PSF, because samples of the exact PSF are intensities
-    at points and not means over cells. "auto" therefore never chooses this method.
+    The list is empty if the pupil's relief consists of pixels. The sample is the mean intensity over a cell, the square
+    around a sample. Samples of the exact PSF are intensities at points, which differ from means over cells if the PSF
+    is small. The predicted error therefore exceeds 100 % for small PSFs, too, and "auto" never chooses this method.
     """
     if problem.pixelated is not None:
         return []
@@ -199,19 +220,24 @@ def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision
 
 
 def _quadratic_basis(t: Array) -> tuple[Array, Array, Array]:
-    """Return the three uniform quadratic B-splines within half a cell of a sample, t in [-1/2, 1/2]."""
+    """Return the three uniform quadratic B-splines that are not zero at a distance t from a sample of the window.
+
+    t is in units of the pitch, in [-1/2, 1/2]. The splines are those of the preceding sample, this one, and the next.
+    """
     return (0.5 - t) * (0.5 - t) / 2, 0.75 - t * t, (0.5 + t) * (0.5 + t) / 2
 
 
 def _ray_error(problem: Problem) -> float:
-    """Return the relative L2 error of the ray density.
+    """Return the relative L2 error of an intensity that is computed from the density of rays.
 
-    The error is due to the fringes along the rim of the shadow, which are as wide as a Fresnel zone or a cell. The
-    error exceeds 1 if rays cross, if a mask scatters light, or if hit points are concentrated in an area that is
-    smaller than diffraction or cells allow.
+    Rays lack the fringes of diffraction along the rim of the shadow. The intensity is therefore wrong in a strip
+    along this rim. The strip is as wide as a Fresnel zone plus a cell of the window, over which a ray is spread. The
+    error exceeds 1 if rays cross, if a mask scatters light, or if the rays hit so small an area that diffraction or the
+    size of a cell determines the spot.
 
-    If the rays magnify the pupil by m, the fringes of an edge are those at the distance z/m without a lens, magnified
-    by m. The reason is that a quadratic phase only scales Fresnel's integral (Goodman, eq. 4-17).
+    Let m be the magnification of the rays, the size of the shadow divided by that of the pupil. The fringes are then m
+    times as large as the fringes that the pupil would have at the distance z/m without a lens. The reason is that a
+    quadratic phase only scales Fresnel's integral (Goodman, eq. 4-17).
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None
@@ -227,7 +253,10 @@ def _ray_error(problem: Problem) -> float:
 
 
 def _brightness(problem: Problem) -> float:
-    """Return the brightness of the light, see `rays.brightness`, after rays and diffraction have spread it."""
+    """Return the brightness of the exact PSF, see `rays.brightness`.
+
+    The area of the PSF is estimated as the area that rays hit, plus the area of the diffraction spot.
+    """
     assert problem.rays is not None
     diffracted = math.pi * (problem.wavelength * problem.distance / (2 * problem.radius)) ** 2
     return brightness(problem.rays.image_area + diffracted, problem.window.dx**2)

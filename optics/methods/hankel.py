@@ -71,7 +71,12 @@ class HankelSampling:
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+
+        The power of all rounding errors is a fraction of the power of the light. Their size in the window follows from
+        this power and the width, see `Sampling.plane`. The width is twice the sum of the pupil's radius and of the
+        largest radius at which the image is computed.
+        """
         return 2 * (self.line.radius + problem.radius)
 
     @property
@@ -80,9 +85,11 @@ class HankelSampling:
 
 
 def hankel(problem: Problem) -> list[HankelSampling]:
-    """Return samplings whose nodes resolve the phases of both integrals, one for each taper of the spectrum.
+    """Return samplings whose quadrature nodes resolve the phases of both Hankel transforms.
 
-    The list is empty unless the problem is rotationally symmetric.
+    The transforms are integrals over the radius in the pupil, and over the frequencies of the spectrum. There is one
+    sampling for each taper, a function that fades the spectrum out before grazing incidence. The list is
+    empty unless the problem is rotationally symmetric.
     """
     if not problem.symmetric:
         return []
@@ -155,7 +162,10 @@ def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -
 
 
 def _transform(field: Field, at: Array, to: Array, types: Precision, exactly: bool) -> Field:
-    """Return Σ_j u_j J₀(2π at_j to_k) for every k, where u is the field. `exactly` selects J₀ with all digits."""
+    """Return Σ_j u_j J₀(2π at_j to_k) for every k, where u is the field.
+
+    exactly: True to compute J₀ in float64 with an error of 1e-15 instead of 1e-12.
+    """
     import drjit as dr
 
     n, m = dr.width(at), dr.width(to)

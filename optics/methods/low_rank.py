@@ -1,4 +1,8 @@
-"""The Rayleigh-Sommerfeld integral as one matrix product: the Fourier kernel times a slow factor of low rank."""
+"""The Rayleigh-Sommerfeld integral as a product of three matrices, two of which contain Fourier kernels.
+
+The ratio of the diffraction kernel to a Fourier kernel varies slowly over the window. This slow factor has a low rank:
+few points of the window are enough to interpolate it.
+"""
 
 from __future__ import annotations
 
@@ -31,12 +35,16 @@ MOST_BYTES = 288_000_000  # choice, limited by memory: largest matrix between pu
 
 @dataclass(frozen=True)
 class LowRankSampling:
-    """Samples of the pupil, and the rank of the slow factor over the window.
+    """Samples of the pupil, and the points of the window that are necessary to interpolate the slow factor.
 
-    rank: number of Chebyshev points per axis of the window.
-    half_width: distance [m] from the window's centre within which these points lie.
-    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. It is 1
-        if samples are sines.
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel, and varies slowly over the window.
+
+    rank: number of Chebyshev points along each axis of the window, between which the factor is interpolated.
+    half_width: distance [m] from the window's centre, along each axis, within which these points lie.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. The
+        samples may instead be evenly spaced in their sines s, the x and y components of the unit vectors from the
+        window's centre to the samples, minus the sines of the pupil's centre. The kernel is then e^{-ik s·u}, and
+        `scale` is 1.
     """
 
     pupil: PupilSamples
@@ -58,12 +66,17 @@ class LowRankSampling:
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
+
+        The power of all rounding errors is a fraction of the power of the light. Their size in the window follows from
+        this power and the width, see `Sampling.plane`. The width is one period of the Fourier transform of the pupil's
+        samples. If their spacing varies, the period is that of their mean spacing.
+        """
         return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
 
     @property
     def directions(self) -> np.ndarray:
-        """Directions of the samples along either axis: positions divided by `scale`."""
+        """Directions of the samples, the same along x and along y: the positions `pupil.at` divided by `scale`."""
         found: np.ndarray = self.pupil.at / self.scale
         return found
 
@@ -73,12 +86,14 @@ class LowRankSampling:
 
 
 def low_rank(problem: Problem) -> Sequence[LowRankSampling | WindowSampling]:
-    """Return a list with one sampling, which has the fewest samples of the pupil and the necessary rank.
+    """Return a list with one sampling, which has the fewest samples of the pupil that meet the tolerance.
 
-    The samples resolve the combined phase of pupil and path. They are evenly spaced in sines, or in positions if even
-    spacing in sines needs too many samples. A pupil of pixels has nodes within the pixels. At coarse tolerances, the
-    samples follow from the light in the window instead (`window_sampling`). The list is empty if the pupil is too wide
-    for its distance, or if the samples or the matrices would be too large.
+    It also has the smallest rank that meets the tolerance: the number of points along each axis of the window between
+    which the slow factor is interpolated. The samples resolve the combined phase of pupil and path. They are evenly
+    spaced in sines, or in positions if even spacing in sines needs too many samples. If the relief consists of pixels,
+    the samples are quadrature nodes within the pixels. At coarse tolerances, the samples only resolve the light that
+    reaches the window (`window_sampling`). The list is empty if the pupil's radius exceeds STEEPEST times the distance
+    to the window, or if there would be too many samples or too large matrices.
     """
     coarse = window_sampling(problem)
     if coarse is not None:
@@ -99,7 +114,11 @@ def low_rank(problem: Problem) -> Sequence[LowRankSampling | WindowSampling]:
 
 
 def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) -> LowRankSampling | None:
-    """Return a sampling with the necessary rank, for these samples of the pupil; None if the matrix is too large."""
+    """Return a sampling with the given samples of the pupil; None if its matrix would be too large.
+
+    Its rank, the number of interpolation points along each axis of the window, is the smallest that meets the
+    tolerance.
+    """
     entries = MOST_BYTES // np.dtype(precision(problem.dtype).complex_dtype).itemsize
     rank = uniform_rank(problem, pupil, half, scale, math.isqrt(entries) // len(pupil.at))
     if rank is None:
@@ -129,13 +148,15 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
         G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + s·(u, v))},   D = |(x - ξ, z)|, ρ = |(x, z)|.
 
     (u, v) is the position in the window relative to its centre. P is the light behind the pupil times the areas of the
-    samples. s is ξ/c or the sines of the samples. G varies slowly with x, so the Lagrange polynomials L_a and L_b
-    interpolate it between the points (x_a, y_b) of the window.
+    samples. s is the direction of a sample. If the samples are evenly spaced in sines (components of unit vectors from
+    the window's centre), s contains these sines, minus those of the pupil's centre. Otherwise, s is ξ/c with the
+    distance c = `how.scale`. G varies slowly with x, so the Lagrange polynomials L_a and L_b interpolate it between the
+    points (x_a, y_b) of the window.
 
-    For each axis, the sums over the interpolation points and over ξ are combined. The field is then the product of
-    three matrices, A_y W A_xᵀ. W contains P G, and A_x and A_y contain the remaining factors along their axis. A_x does
-    not change if window and samples are both mirrored, so the matrices are split into even and odd parts along x. This
-    halves the cost of the product with W.
+    For each axis, the sum over the interpolation points and the sum over the samples become one sum, over pairs of a
+    point and a sample. The field is then the product of three matrices, A_y W A_xᵀ. W contains P G, and A_x and A_y
+    contain the remaining factors along their axis. A_x does not change if window and samples are both mirrored, so the
+    matrices are split into even and odd parts along x. This halves the cost of the product with W.
     """
     window = problem.window
     nodes = how.half_width * chebyshev_points(how.rank)
@@ -177,9 +198,14 @@ def _unfolded(parts: list[tuple[Array, Array]], window: Grid, types: Precision) 
 
 
 def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> list[tuple[Array, Array]]:
-    """Return W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)], each as two tensors, for its real and its imaginary part.
+    """Return the sum and the difference of the matrix W and its mirror image, W[row, col] ± W[row, -col].
 
-    W is P(ξ, η) G(ξ, η; x_a, y_b), see `_low_rank`. Columns (a, ξ) are counted from the middle.
+    W contains the light P(ξ, η) at the samples of the pupil, times the slow factor G(ξ, η; x_a, y_b), the ratio of the
+    diffraction kernel to a Fourier kernel (see `_low_rank`). Each row stands for a pair (b, η): an interpolation point
+    y_b of the window, and the y coordinate η of a sample. Each column stands for a pair (a, ξ): an interpolation point
+    x_a of the window, and the x coordinate ξ of a sample. Columns are counted from the middle.
+
+    Sum and difference are two tensors (row, column) each, the real and the imaginary part.
     """
     import drjit as dr
 
@@ -197,7 +223,10 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
 
 
 def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, how: LowRankSampling) -> Field:
-    """Return the matrix W of `_kernel` at the columns and rows `at`, which are float64 indices."""
+    """Return entries of the matrix W that `_kernel` defines, the pupil's light times the slow factor.
+
+    at: indices (column, row) of the entries, as float64.
+    """
     import drjit as dr
 
     types, n = u.types, len(how.pupil.at)

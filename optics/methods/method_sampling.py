@@ -13,7 +13,7 @@ __all__ = ["Sampling", "WithField"]
 
 
 class WithField(Protocol):
-    """The additional interface of all exact methods except "far_field": the complex field."""
+    """Interface of samplings that can also compute the complex field: all exact methods except "far_field"."""
 
     def field(self, beam: Beam, problem: Problem) -> Field:
         """Return the field for unit amplitude at the pupil, without the carrier e^{ikz} of a plane wave."""
@@ -33,11 +33,17 @@ class Sampling(Protocol):
 
     @property
     def samples(self) -> tuple[int, int]:
-        """Numbers of samples of the pupil (y, x), or numbers of nodes: (radial, angular), or (nodes, 1)."""
+        """Numbers of samples of the pupil along y and along x.
+
+        For quadrature nodes, the value is (radial nodes, angular nodes) or (number of nodes, 1) instead.
+        """
 
     @property
     def padding(self) -> float:
-        """Period of the pupil's transform, in samples, divided by the number of samples; 1 without a period."""
+        """Padding: period of the pupil's Fourier transform, in samples, divided by the samples across the pupil.
+
+        The value is 1 for methods without a padded transform.
+        """
 
     @property
     def bytes(self) -> float:
@@ -51,8 +57,9 @@ class Sampling(Protocol):
         """Return the intensity over the window, for unit amplitude at the pupil, as a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread.
+        """Return the width [m] of the square over which rounding errors are taken as evenly spread.
 
-        Rounding errors have a fraction of the power of all light. Spread evenly over the square, this power has the
-        intensity power / width². Within the window, rounding errors are therefore smaller if the square is wider.
+        The square lies in the plane of the window. The power of all rounding errors is a fraction of the power of all
+        light, which depends on the number type. Spread evenly over the square, it has the intensity power / width².
+        Within the window, rounding errors are therefore smaller if the square is wider.
         """

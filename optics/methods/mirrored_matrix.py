@@ -1,7 +1,8 @@
-"""Products with matrices that do not change if rows and columns are both mirrored, at half the cost.
+"""Faster products with matrices that do not change if rows and columns are both mirrored.
 
-The Fourier kernel of a window about the axis is such a matrix, because it depends on products of positions and sines.
-These products do not change if both factors change their signs.
+The cost of such a product is halved. The Fourier kernel of a window about the axis is such a matrix: each entry depends
+on a position in the window times the sine of the direction of a sample of the pupil. This number does not change if
+position and sine both change their signs.
 """
 
 from __future__ import annotations
@@ -19,9 +20,13 @@ LEAST_PRODUCTS, SHARE = 4e6, 0.65
 
 
 def mirroring_share(window: Grid, inner: np.ndarray) -> np.ndarray:
-    """Return the time of a sum over the pupil relative to that without mirrored matrices; 1 if they save no time.
+    """Return the time of sums over the pupil with `MirroredMatrix`, relative to the time without it.
 
-    inner: numbers of rows of square matrices between the Fourier kernels of both axes, one for each sum.
+    A sum is the product of three matrices. The first is the Fourier kernel along y, the second is square, and the third
+    is the Fourier kernel along x. The result is 1 if mirroring saves no time: for small matrices, or for a window off
+    the axis. It is an array (sum,).
+
+    inner: number of rows of the square matrix in each sum, array (sum,).
     """
     height, width = window.shape
     large = inner * inner * width + height * inner * width >= LEAST_PRODUCTS
@@ -32,10 +37,11 @@ def mirroring_share(window: Grid, inner: np.ndarray) -> np.ndarray:
 class MirroredMatrix:
     """A matrix A with A[-x, -s] = A[x, s], as the parts that are even and odd in s.
 
-    Position n//2 of n rows is x = 0. The columns are symmetric about their middle.
+    The row of A with the index n//2 is x = 0, where n is the number of rows. The columns are symmetric about their
+    middle, s = 0.
 
-    even: even part for x = 0, -1, ... and s >= 0, (..., x, s).
-    odd: odd part for the same x and s > 0.
+    even: even part for x = 0, -1, ... and s >= 0, array (..., x, s).
+    odd: odd part for the same x and s > 0, array (..., x, s).
     rows: number n of rows of A.
     """
 
@@ -45,14 +51,20 @@ class MirroredMatrix:
 
     @classmethod
     def from_matrix(cls, matrix: np.ndarray) -> MirroredMatrix:
-        """Return the parts of a matrix (..., n, s)."""
+        """Return a matrix A as its even and odd parts.
+
+        matrix: the matrix A, which does not change if rows and columns are both mirrored, (..., x, s).
+        """
         rows, half = matrix.shape[-2], matrix.shape[-1] // 2
         middle, ahead, behind = _split(matrix[..., rows // 2 :: -1, :].swapaxes(-1, -2), half)
         even, odd = np.concatenate([middle, (ahead + behind) / 2], axis=-2), (ahead - behind) / 2
         return cls(even.swapaxes(-1, -2), odd.swapaxes(-1, -2), rows)
 
     def __matmul__(self, other: np.ndarray) -> np.ndarray:
-        """Return the product A B with a matrix B (..., s, column)."""
+        """Return the product A B of this matrix A and a matrix B.
+
+        other: the matrix B, which has as many rows as A has columns, array (..., row, column).
+        """
         middle, ahead, behind = _split(other, self.odd.shape[-1])
         even = self.even @ np.concatenate([middle, ahead + behind], axis=-2)
         odd = self.odd @ (ahead - behind)

@@ -1,8 +1,13 @@
-"""Nodes within the pixels of a stepped relief, for `low_rank` at coarse tolerances.
+"""Quadrature nodes within the pixels of a stepped relief, for the method "low_rank" at coarse tolerances.
 
-The Fourier kernel has positions instead of sines as its variable, because pixels have straight borders. The factors
-along both axes of the window correct most of the difference. A pixel has as few nodes along an axis as the phase of
-lens, wavefront and path requires for an average point of the window, because light behind a relief may arrive anywhere.
+Light of a node is multiplied by the Fourier kernel e^{-ik s·u}, with u a position in the window. For pupils without
+pixels, s contains the sines of a sample, the components of the unit vector from the window's centre to the sample (see
+`sine_samples`). Here, s is the position of the node divided by the distance of the window's plane, because the borders
+of pixels are straight lines in position, but not in sines. The Fourier kernel with this s differs more from the
+diffraction kernel than the one with sines. Factors along x and along y (`axis_kernel`) correct most of the difference.
+
+The number of nodes in a pixel follows from the phase of the path through lens and wavefront to the window. It is
+sufficient on average over the points of the window, because a relief may send light to any of them.
 """
 
 from __future__ import annotations
@@ -46,12 +51,16 @@ POINTS = 40  # choice: number of points of the pupil that determine the rank
 
 @dataclass(frozen=True)
 class PixelNodes:
-    """Nodes of a pupil of pixels, with the attributes of `SineSamples` that sums over a window use.
+    """Quadrature nodes of a pupil of pixels, as a replacement for `SineSamples` in sums over the pupil.
 
-    nodes: the nodes.
+    `SineSamples` describes a sample by its sines, the components of a unit vector. Here, the direction of a node, its
+    position divided by the distance of the window's plane, takes the place of the sines.
+
+    nodes: positions and weights of the nodes.
     centre: centre (x, y) [m] of the window.
-    distance: distance [m] of the window's plane. Directions are positions divided by this distance.
-    elsewhere: direction at which factors along the other axis are evaluated, see `axis_kernel.AxisFactor`.
+    distance: distance [m] of the window's plane.
+    elsewhere: a fixed direction, computed from the radius and the distance. `axis_kernel.AxisFactor`, a factor of the
+        kernel along x or y, is computed for points of the pupil that have this direction along the other axis.
     """
 
     nodes: PixelSamples
@@ -64,28 +73,28 @@ class PixelNodes:
 
     @property
     def at(self) -> np.ndarray:
-        """Directions of the nodes along either axis."""
+        """Positions of the nodes divided by `distance` (their directions), the same along x and along y."""
         return self.nodes.at / self.distance
 
     @property
     def grid(self) -> Grid:
-        """Grid of as many directions as there are nodes, with their mean spacing."""
+        """Evenly spaced directions, as many as there are nodes. Their pitch is the mean spacing of the nodes."""
         count = self.nodes.aperture.count * self.nodes.across
         return Grid.square(count, 2 * self.nodes.radius / self.distance / count)
 
     @property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes (x, y) [m], (y, x)."""
+        """Coordinates x and y [m] of the nodes, two arrays (row, column)."""
         x, y, _ = self.layout
         return x, y
 
     @property
     def layout(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Nodes x and y [m], and their weights [m²], (y, x)."""
+        """Coordinates x and y [m] of the nodes, and their weights [m²], three arrays (row, column)."""
         return _layout(self.nodes)
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupil in directions (s, t)."""
+        """Return the points (x, y) [m] of the pupil with the directions (s, t) = (x, y) / `distance`."""
         return s * self.distance, t * self.distance
 
     def light(self, beam: Beam, dtype: str) -> np.ndarray:
@@ -101,7 +110,7 @@ class PixelNodes:
         return self.nodes.field(beam, types)
 
     def stack(self) -> PixelStack:
-        """Return the nodes as a stack of one."""
+        """Return the nodes as a stack of pupils that contains only this pupil."""
         numbers = self.distance, self.nodes.radius / math.hypot(self.nodes.radius, self.distance), self.elsewhere
         distance, steepest, elsewhere, radius = (np.array([value]) for value in (*numbers, self.nodes.radius))
         return PixelStack(
@@ -111,7 +120,13 @@ class PixelNodes:
 
 @dataclass(frozen=True, eq=False)
 class PixelStack(SineStack):
-    """The nodes of one pupil as a `SineStack`, with directions instead of sines."""
+    """A stack that contains one pupil, whose relief consists of pixels, for code that expects a `SineStack`.
+
+    A `SineStack` describes samples of pupils by their sines, the components of unit vectors from the window's centre.
+    Here, the directions of the nodes (position divided by the window's distance) take the place of the sines.
+
+    nodes: positions and weights of the nodes.
+    """
 
     nodes: PixelSamples
 
@@ -155,10 +170,14 @@ WindowSamples = SineSamples | PixelNodes
 
 
 class PixelPlan(NamedTuple):
-    """Nodes for a pupil of pixels, and what follows from them.
+    """Quadrature nodes for a pupil whose relief consists of pixels, with the rank and the cost of sums over them.
 
-    finer: finer nodes for `window_check`.
-    rank, half: rank of the slow factor, and half width [m] of the square of its interpolation points.
+    The slow factor, the ratio of the diffraction kernel to a Fourier kernel, is interpolated over the window.
+
+    pupil: the nodes.
+    finer: finer nodes, with which `window_check` estimates the error.
+    rank: number of interpolation points along each axis of the window.
+    half: distance [m] from the window's centre, along each axis, within which these points lie.
     seconds, bytes: predicted time and memory.
     """
 
@@ -171,9 +190,11 @@ class PixelPlan(NamedTuple):
 
 
 def pixel_plan(problem: Problem) -> PixelPlan | None:
-    """Return the nodes for a pupil of pixels and a coarse tolerance; None if there would be too many.
+    """Return the plan with the fewest quadrature nodes per pixel for which the error is within the tolerance.
 
-    The result is also None if the pupil has no pixels, or for derivatives with respect to maps or the pupil's radius.
+    The pupil is divided into the pixels of a stepped relief. The result is None if the pupil has no such pixels, or if
+    too many nodes or interpolation points would be necessary. It is also None if derivatives with respect to the
+    pupil's radius or to samples of a relief, wavefront or mask are requested.
     """
     aperture = problem.pixelated
     if aperture is None or problem.knots is not None or problem.resized or (across := _across(problem)) is None:
@@ -215,10 +236,12 @@ def _across(problem: Problem) -> int | None:
 
 @lru_cache(maxsize=MOST_NODES)
 def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return squared errors of the integrals of e^{2iφt} over t in [0, 1], and in open parts of it, for φ in PHASES.
+    """Return squared errors of integrals of the wave e^{2iφt} over a whole pixel, and over a part of a pixel.
 
-    The second errors are averaged over the parts [0, p] with p in PARTS. The weights of `count` Gauss-Legendre nodes in
-    [0, 1] integrate the interpolating polynomial over each part.
+    t in [0, 1] is the position across the pixel, and the table PHASES contains the values of φ. If the edge of the
+    aperture cuts a pixel, only a part [0, p] is open. The second result is the mean over the values of p in PARTS. The
+    wave is known at `count` Gauss-Legendre nodes in [0, 1]. A polynomial in t interpolates it between the nodes, and is
+    integrated from 0 to 1 or from 0 to p. Both results are arrays (phase,).
     """
     (at, _), (t, size), found = gauss_legendre(count), gauss_legendre(MOST_NODES), []
     for part in (1.0, *PARTS):
@@ -230,7 +253,11 @@ def _squared_errors(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=64)
 def _rank(pupil: PixelNodes, path: Path, tolerance: float, least: int) -> int | None:
-    """Return the rank that is sufficient on average over pupil and window; None if it is too large.
+    """Return the number of points per axis of the window (rank) that interpolate the slow factor accurately enough.
+
+    The slow factor is the ratio of the diffraction kernel to a Fourier kernel. Here, this ratio is divided by its own
+    values along the x axis and along the y axis of the window. The root mean square error of the interpolation over
+    pupil and window must be a small part of the tolerance. The result is None if this takes too many points.
 
     least: smallest rank.
     """

@@ -67,12 +67,15 @@ class PixelSpectrum(SpectrumSampling):
 
 
 def whole_pixel_spectrum(problem: Problem) -> list[PixelSpectrum]:
-    """Return samplings with which the whole spectrum meets the problem's tolerance."""
+    """Return samplings that propagate the angular spectrum in one step and meet the problem's tolerance."""
     return _samplings(problem, "angular_spectrum")
 
 
 def split_pixel_spectrum(problem: Problem) -> list[PixelSpectrum]:
-    """Return samplings with which the split spectrum meets the problem's tolerance."""
+    """Return samplings that propagate the angular spectrum in two steps and meet the problem's tolerance.
+
+    The first step leaves out the paraxial part of the phase. The second step, Fresnel's integral, adds this part.
+    """
     return _samplings(problem, "split_angular_spectrum")
 
 
@@ -88,9 +91,10 @@ def _samplings(problem: Problem, method: str) -> list[PixelSpectrum]:
 
 
 def _nodes(problem: Problem, taper: Taper) -> PixelSamples | None:
-    """Return nodes within pixels that resolve the phase and every frequency below the end of the taper.
+    """Return quadrature nodes in each pixel. They are dense enough for the pupil's phase and for the angular spectrum.
 
-    The result is None if pixels would need too many nodes.
+    The taper is a function of frequency that fades the spectrum out. The nodes resolve all frequencies below the end of
+    the taper. The result is None if pixels would need too many nodes.
     """
     if problem.knots is not None:
         return cell_samples(problem, taper.end)

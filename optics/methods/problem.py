@@ -1,4 +1,4 @@
-"""The parameters of a propagation from which a method derives its samples."""
+"""Parameters that describe the propagation from a pupil to a window. Methods derive their samples from them."""
 
 from __future__ import annotations
 
@@ -46,23 +46,22 @@ FINER_DETAIL = 10.0
 class Problem:
     """One monochromatic propagation from a pupil to a window, described by numbers.
 
-    light: the beam. Its source and its distance are plain numbers, without derivatives.
-    aperture: shape of the pupil.
+    light: the beam. Its source and its distance to the window are plain numbers, without derivatives.
+    aperture, wavelength: shape of the pupil, and wavelength [m] in the medium behind it.
     radius, distance: radius of the pupil and distance of the window's plane [m].
-    wavelength: wavelength [m] in the medium.
-    window, tolerance: grid of the output, and relative L2 error of the intensity that is allowed there.
-    symmetric: True if the light behind the pupil is rotationally symmetric.
-    even: True if this light is even in x and in y.
-    widest_band: frequency [1/m] beyond which light may be omitted; infinite if no light may be omitted.
-    reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
-        beyond it may be wrong, and edge-diffracted light less accurate. None: the whole window must be accurate.
+    window, tolerance: grid of the output, and allowed relative L2 error of the intensity over this grid.
+    symmetric, even: True if the light behind the pupil is rotationally symmetric, or even in x and in y.
+    widest_band: frequency [1/m] beyond which methods may omit light; infinite if they must not omit any.
+    reach: distance [m] from the axis beyond which the light is negligible, a fraction of the tolerance. Samples farther
+        out may be wrong, and diffraction by the edge may be less accurate. None: the whole window must be accurate.
     medium_n: refractive index behind the pupil.
-    masked: True if a mask scatters light where no rays arrive. Approximations then cannot predict their error.
+    masked: True if a mask scatters light where no rays arrive. Approximate methods then cannot predict their error.
     spread: mean square distance of the light from the axis along one direction, in squared radii (`light_spread`).
     differentiated: True if the PSF carries derivatives.
     moves, resized: True if derivatives with respect to the distance or the radius, respectively, are requested.
-    knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
-    detail_part: largest phase [rad] of neglected detail, divided by the tolerance.
+    knots: rectangles (cells) of the pupil, between the rows and columns of samples of a relief, wavefront or mask.
+        Derivatives with respect to these samples require them. None: no such derivatives are requested.
+    detail_part: phase [rad] below which fine detail of the pupil is neglected, divided by the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even if the window needs fewer samples.
     steep: True if most light of a steep relief misses the window; see `smooth_spectrum`. Methods then remove light
         beyond `reach`.
@@ -128,44 +127,44 @@ class Problem:
 
     @cached_property
     def stack(self) -> LightStack:
-        """The light as a stack of one beam."""
+        """Stack that contains only the beam `light`, for code that handles several beams at once."""
         return LightStack((self.light,))
 
     @cached_property
     def slopes(self) -> Slopes:
-        """Slopes of the wavefront, on a grid that resolves all maps."""
+        """Gradient of the optical path across the pupil, on a grid that resolves its height profile and wavefront."""
         return self.light.pupil.slopes(self.light.wavelength, self.light.source)
 
     @cached_property
     def detail(self) -> float:
-        """Bandwidth [1/m] of the fine phase that the slopes of the wavefront do not include."""
+        """Frequency [1/m] above which components of phase [rad] and mask are below `detail_part` times tolerance."""
         return self.light.pupil.bandwidth(self.light.wavelength, self.detail_part * self.tolerance)
 
     @cached_property
     def other_detail(self) -> float:
-        """Bandwidth [1/m] as in `detail`, without the maps whose derivatives are requested."""
+        """Value of `detail` for the pupil without its maps (relief, wavefront, mask) that carry derivatives."""
         assert self.knots is not None
         others = self.knots.without_maps(self.light.pupil)
         return others.bandwidth(self.light.wavelength, DETAIL_PART * self.tolerance)
 
     @property
     def phase_band(self) -> float:
-        """Highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge."""
+        """Highest spatial frequency [1/m] of the phase over the pupil's disk and the soft edge around the disk."""
         return SLOPE_MARGIN * self.slopes.steepest / self.light.wavelength + self.detail
 
     @property
     def phase_band_inside(self) -> float:
-        """Highest spatial frequency [1/m] of the phase over the disk; a relief may be steeper in the soft edge."""
+        """Highest frequency [1/m] of the phase over the pupil's disk, without the soft edge, which may be steeper."""
         return SLOPE_MARGIN * self.slopes.steepest_inside / self.light.wavelength + self.detail
 
     @cached_property
     def turning(self) -> float:
-        """Highest frequency [1/m] of the combined phase of pupil and path; in focus, both phases nearly cancel."""
+        """Largest phase gradient [cycles/m] across the pupil of whole paths to any point of the window."""
         return self._turning[0]
 
     @cached_property
     def turning_inside(self) -> float:
-        """The same as `turning`, over the disk without its soft edge."""
+        """Value of `turning` for the pupil's disk alone. `turning` also includes the soft edge around the disk."""
         return self._turning[1]
 
     @cached_property
@@ -176,16 +175,16 @@ class Problem:
 
     @cached_property
     def rays(self) -> Rays | None:
-        """Rays of geometrical optics, from which approximations predict their error; None if pixels scatter light."""
+        """Rays of geometrical optics, which predict the errors of methods; None if the pupil's pixels scatter light."""
         if self.pixelated is not None:
             return None
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     def cells(self, band: float | None = None) -> PixelatedAperture | None:
-        """Return the aperture, divided at the knots of splines into cells of nodes; None if there would be too many.
+        """Return the aperture, divided into rectangles (cells) that contain quadrature nodes; None for too many cells.
 
-        band: highest frequency [1/m] in the pupil's plane of the light that the nodes must resolve. None: they
-            resolve the combined phase of pupil and path for all points of the window, as in `turning`.
+        band: highest frequency [1/m] of the light's spectrum, if this spectrum is computed from the nodes. None: the
+            nodes resolve the phase of paths through the pupil to all points of the window.
         """
         assert self.knots is not None
         slopes = self._turning_slopes if band is None else self._slopes
@@ -195,23 +194,23 @@ class Problem:
 
     @cached_property
     def _slopes(self) -> np.ndarray:
-        """Slopes of the wavefront over all cells, see `Slopes.spread`."""
+        """Slopes of the wavefront in the pupil and up to `_beyond_rim` outside its rim, see `Slopes.spread`."""
         return self.slopes.spread(self._beyond_rim)
 
     @cached_property
     def _turning_slopes(self) -> np.ndarray:
-        """Slopes of the combined phase of pupil and path over all cells."""
+        """Slopes like `_slopes`, but of whole paths to the window; upper bounds for all points of the window."""
         return self.slopes.spread(self._beyond_rim, (self.window, self.distance, self.medium_n))
 
     @property
     def _beyond_rim(self) -> float:
-        """Distance [radii] beyond the rim up to which nodes may lie: the diagonal of the largest cell."""
+        """Largest distance [radii] of nodes beyond the pupil's rim: the diagonal of the largest of its `cells`."""
         assert self.knots is not None
         return math.sqrt(2) * max(after - before for before, after in pairwise(self.knots.borders))
 
     @property
     def divided(self) -> bool:
-        """True if the aperture must be divided, into the pixels of a relief or into the cells between knots."""
+        """True if the aperture must be divided, into the pixels of a relief or into the rectangles of `cells`."""
         return self.pixelated is not None or self.knots is not None
 
     @property
@@ -221,7 +220,7 @@ class Problem:
 
     @property
     def ripple(self) -> float:
-        """Allowed amplitude error of the soft aperture's spectrum."""
+        """Allowed amplitude error of the aperture's spectrum due to its edge, which is softened to save samples."""
         return self.tolerance * (EDGE_RIPPLE_PER_TOLERANCE if self.reach is None else BRIGHT_EDGE_RIPPLE_PER_TOLERANCE)
 
     @property
@@ -241,7 +240,7 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Upper bound [waves] on all phases: longest path from pupil to window plus steepest slope times radius."""
+        """Upper bound [waves] on all phases: (longest path - distance)/λ + radius · `phase_band_inside`."""
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
         return path + self.radius * self.phase_band_inside
@@ -262,11 +261,11 @@ class Problem:
         return scalar_theory_error(self.steepest_sine, self.spread)
 
     def soft_edge(self, band: float) -> PupilEdge:
-        """Return the aperture with a soft edge that leaves frequencies up to `band` [1/m] unchanged."""
+        """Return the aperture with a softened edge; its spectrum is unchanged at frequencies up to `band` [1/m]."""
         return PupilEdge(self.aperture.soften(stepped_up(band * self.radius), self.ripple, EDGE_REACH), self.radius)
 
     def band(self, margin: float = 0.0) -> float:
-        """Return the highest frequency [1/m] of light from the disk that can land within `margin` [m] of the window."""
+        """Return the highest frequency [1/m] of the pupil's light that can land within `margin` [m] of the window."""
         edge = 0.0 if self.steep else EDGE_REACH
         reach = (1 + edge) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)

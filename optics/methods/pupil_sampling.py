@@ -32,7 +32,11 @@ class PupilSamples(Protocol):
 
     @property
     def at(self) -> np.ndarray:
-        """Positions along either axis, in metres or as sines."""
+        """Positions of the samples, the same along x and along y.
+
+        They are in metres, or they are sines: components of the unit vectors from the window's centre to the samples,
+        minus those of the unit vector to the pupil's centre.
+        """
 
     @property
     def outermost(self) -> float:
@@ -45,7 +49,8 @@ class PupilSamples(Protocol):
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
         """Return the points (x, y) [m] of samples. i and j are their float64 indices along x and along y.
 
-        Nodes within pixels carry the derivatives of the beam's radius. Points of grids are fixed.
+        If the samples are quadrature nodes within pixels, their positions scale with the radius of the beam's pupil and
+        carry derivatives with respect to it. The points of a grid are fixed.
         """
 
     def field(self, beam: Beam, types: Precision) -> Field:
@@ -85,7 +90,7 @@ class GridSamples:
 class PixelSamples:
     """Nodes within the pixels of an aperture. Each pixel has `across` nodes along each axis.
 
-    The nodes are computed on request and not stored, because plans are cached for a long time.
+    The nodes are computed on request and not stored, because objects of this class are cached for a long time.
     """
 
     aperture: PixelatedAperture
@@ -98,10 +103,11 @@ class PixelSamples:
 
     @property
     def outermost(self) -> float:
-        """Distance from the axis [m] beyond which the pupil is dark.
+        """Distance from the axis [m] beyond which all nodes have the weight 0.
 
-        Pixels that the edge cuts also have nodes outside the aperture, but the weights integrate over the open part
-        alone. The edge itself lies within the radius.
+        It is the pupil's radius plus the diagonal of the aperture's widest pixel. The reason is that pixels that the
+        edge of the aperture cuts also have nodes outside the aperture. Sums over a pixel's nodes are nevertheless
+        integrals over the open part of the pixel only.
         """
         return self.radius * (1 + math.sqrt(2) * self.aperture.widest)
 
@@ -130,29 +136,38 @@ class PixelSamples:
 
 
 def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, radius: float) -> PixelSamples | None:
-    """Return the fewest nodes with an accuracy of `digits` digits for `cycles` cycles per radius.
+    """Return the fewest nodes with which integrals over the aperture are accurate enough.
 
-    The result is None if the pixels are too coarse.
+    The result is None if the pixels are so coarse that each would need too many nodes.
+
+    cycles: highest spatial frequency of the integrand [cycles per pupil radius].
+    digits: accuracy of the integrals [decimal digits].
+    radius: radius of the pupil [m].
     """
     across = aperture.nodes_across(cycles, digits)
     return None if across is None else PixelSamples(aperture, across, radius)
 
 
 def cell_samples(problem: Problem, band: float | None = None) -> PixelSamples | None:
-    """Return the nodes that derivatives with respect to samples of maps require; None if there would be too many cells.
+    """Return quadrature nodes for derivatives with respect to the samples of a relief, wavefront or mask.
 
-    band: highest frequency [1/m] in the pupil's plane of the light that the nodes must resolve. None: they resolve the
-        combined phase of pupil and path for all points of the window.
+    These samples are interpolated by cubic splines, whose knots divide the pupil into rectangles (cells). Each cell has
+    the same number of nodes. The result is None if there would be too many cells.
+
+    band: highest frequency [1/m] of the light's spectrum that the nodes must resolve. None: for each point of the
+        window, they resolve the phase of the light that passes the pupil and arrives at this point.
     """
     cells = problem.cells(band)
     return None if cells is None or cells.fixed is None else PixelSamples(cells, cells.fixed, problem.radius)
 
 
 def samples_of(problem: Problem) -> PupilSamples | None:
-    """Return the fewest samples that resolve the combined phase of pupil and path.
+    """Return the fewest samples that resolve the total phase: the pupil's phase plus that of the path to the window.
 
-    The result is None if pixels are too coarse for this phase, if a grid would be too large, or if derivatives with
-    respect to samples of maps need too many cells.
+    The result is None if the pixels of a relief are so coarse that each would need too many nodes. For a pupil without
+    pixels, it is None if the grid would be too large. It is also None if derivatives with respect to samples of a
+    relief, wavefront or mask are requested, and the pupil would have to be divided into too many rectangles (see
+    `cell_samples`).
     """
     if problem.knots is not None:
         return cell_samples(problem)

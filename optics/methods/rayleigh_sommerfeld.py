@@ -1,4 +1,7 @@
-"""The first Rayleigh-Sommerfeld integral as a direct sum over nodes fitted to the edge. This is the reference."""
+"""The first Rayleigh-Sommerfeld integral as a direct sum over quadrature nodes that fit the edge of the aperture.
+
+It is the reference with which other methods are compared.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +51,9 @@ Rule = tuple[Aperture, float, float, bool]
 
 @dataclass(frozen=True)
 class NodeSampling:
-    """Quadrature nodes fitted to the aperture's edge, accurate to `digits` for `cycles` cycles per radius.
+    """Quadrature nodes that fit the edge of the aperture.
+
+    Sums over the nodes are accurate to `digits` decimal digits if the integrand has at most `cycles` cycles per radius.
 
     line: radii at which a rotationally symmetric image is computed; None if it is computed at every sample.
     """
@@ -84,10 +89,12 @@ class NodeSampling:
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`.
+        """Return the width [m] of a square in the window's plane, from which the size of rounding errors follows.
 
-        It is the width of the focus times the square root of the number of nodes, because the rounding errors of the
-        summands are independent.
+        The power of all rounding errors is a fraction of the power of the light. It is taken as spread evenly over this
+        square (see `Sampling.plane`). The width is in proportion to the width λz/R of a focus, where z is the distance
+        of the window and R the radius of the pupil. It is also in proportion to the square root of the number of nodes,
+        because the rounding errors of the summands are independent.
         """
         return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
 
@@ -101,9 +108,10 @@ class NodeSampling:
 
 
 def nodes(problem: Problem) -> list[NodeSampling]:
-    """Return a list with one sampling, whose nodes resolve the combined phase of pupil and path.
+    """Return a list with one sampling. Its nodes resolve the phase of paths through the pupil to points of the window.
 
-    The list is empty if derivatives with respect to samples of maps need too many nodes.
+    The list is empty if derivatives with respect to samples of a relief, wavefront or mask are requested, and the pupil
+    would have to be divided into too many rectangles (see `Problem.cells`).
     """
     (cycles, digits), aperture = node_rule(problem), problem.aperture
     if problem.knots is not None:
@@ -136,11 +144,11 @@ def node_rule(problem: Problem) -> tuple[float, float]:
 def turns(problem: Problem, digits: float) -> float:
     """Return the cycles per radius that the nodes must resolve.
 
-    These are the cycles of the phase. In addition, the kernel has poles at the height z above the pupil's plane, where
-    z is the distance of the window. If z is short, the poles slow convergence: with n nodes, the errors of
-    Gauss-Legendre rules over [0, R] fall like e^{-4nz/R}, and those of the trapezoid rule around a ring of radius R
-    like e^{-nz/R}. Additional cycles then represent the poles. In a focus, where the phase is constant, only the poles
-    matter.
+    These are the cycles of the phase of paths through the pupil to the window. In addition, the kernel has poles at the
+    height z above the pupil's plane, where z is the distance of the window. If z is short, the poles slow convergence:
+    with n nodes, the errors of Gauss-Legendre rules over [0, R] fall like e^{-4nz/R}, and those of the trapezoid rule
+    around a ring of radius R like e^{-nz/R}. Further cycles are then added, so that there are enough nodes to converge.
+    In a focus, where the phase is constant, only the poles matter.
     """
     phase, poles = problem.radius * problem.turning_inside, digits * math.log(10) / (2 * math.pi)
     nearness = problem.radius / problem.distance
@@ -160,8 +168,10 @@ def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
 
 
 def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool = False) -> Nodes:
-    """Return the nodes of an aperture, from a cache if possible.
+    """Return the quadrature nodes of an aperture, from a cache if possible.
 
+    cycles: largest number of cycles per radius of the integrand.
+    digits: number of decimal digits to which sums over the nodes are accurate.
     halved: True to return only the nodes on one side of the x axis, for mirror-symmetric pupils and points on the x
         axis. Both sides then contribute the same, so the weights of nodes off the axis are doubled.
     """
@@ -171,7 +181,7 @@ def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool 
 
 
 def _made(aperture: Aperture, cycles: float, digits: float, halved: bool) -> Nodes:
-    """Return the nodes of an aperture without a cache, see `cached_nodes`."""
+    """Return newly computed nodes of an aperture. `cached_nodes` explains the arguments and keeps the results."""
     found = aperture.nodes(cycles, digits)
     if not halved:
         return found
@@ -201,7 +211,8 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ik(D - z)} dξ (Goodman, §3.5), where d = |x - ξ| and D = √(d² + z²). The path
     D - z is computed as d²/(D + z). Whole waves of the phase are subtracted in float64.
 
-    rule: aperture, cycles, digits and `halved` of the nodes, see `cached_nodes`.
+    rule: the arguments of `cached_nodes`: the aperture, the cycles per radius that its nodes must resolve, the decimal
+        digits to which their sum must be accurate, and True if only the nodes on one side of the x axis are summed.
     """
     import drjit as dr
 

@@ -51,7 +51,8 @@ class Rays:
     def from_slopes(cls, slopes: Slopes, aperture: Aperture, distance: float, medium_n: float) -> Rays:
         """Return the rays that propagate (sine of the angle below 1).
 
-        With the local slope p of the wavefront, divided by the index of the medium, tan θ = p/√(1 - p²).
+        Let p be the local slope of the wavefront, already divided by the index of the medium. The angle θ between the
+        ray and the axis then satisfies tan θ = p/√(1 - p²).
         """
         step = max(1, (slopes.grid.shape[0] - 1) // (ACROSS - 1))
         centred = slice(slopes.grid.shape[0] // 2 % step, None, step)
@@ -80,7 +81,11 @@ class Rays:
         return disk_area(self.to_x, self.to_y)
 
     def densest(self) -> list[tuple[float, float]]:
-        """Return two points (x, y) [m]: the median of all hit points, and the mean of those in the densest cell."""
+        """Return two points (x, y) [m]: the median of all hit points, and the mean of those in the densest region.
+
+        The area that rays hit is divided into CELLS by CELLS equal rectangles. The densest region is the rectangle with
+        the most hit points.
+        """
         counts, x, y = np.histogram2d(self.to_x, self.to_y, CELLS)
         i, j = np.unravel_index(counts.argmax(), counts.shape)
         within = (self.to_x >= x[i]) & (self.to_x <= x[i + 1]) & (self.to_y >= y[j]) & (self.to_y <= y[j + 1])
@@ -108,8 +113,8 @@ def brightness(area: float, cell: float) -> float:
     """Return the sum of squared samples of a PSF, times the area `cell` [m²] of a sample, in 1/m².
 
     The PSF has unit power, spread over `area` [m²]. If samples resolve it, the result is 1/area. Coarse samples may hit
-    the maximum of the PSF without resolving it, and then the maximum alone determines the result. The maximum of the
-    Airy pattern is π²/4 times its mean over this area.
+    the maximum of the PSF without resolving it, and then the maximum alone determines the result. The maximum is taken
+    to be π²/4 times the mean 1/area, as in an Airy pattern.
     """
     area = max(area, 1e-30)
     return max(1.0, (math.pi**2 / 4) ** 2 * cell / area) / area

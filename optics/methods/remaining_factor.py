@@ -1,6 +1,11 @@
-"""The slow factor of `low_rank`, relative to the middle of the window, divided by its values along both axes.
+"""The remaining factor of the diffraction kernel, after the parts that depend on x alone or on y alone are removed.
 
-This quotient varies even more slowly over the window than the slow factor.
+The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `slow_factor`). It has
+two axis factors (see `AxisFactor`). The axis factor along x is the slow factor on the x axis of the window, for light
+from points of the pupil that all have the same sine along y. The axis factor along y is the slow factor on the y axis,
+for light from points that all have the same sine along x. The remaining factor is the slow factor divided by both axis
+factors. All are relative to their values at the middle of the window. The remaining factor varies even more slowly over
+the window than the slow factor.
 """
 
 from __future__ import annotations
@@ -21,9 +26,14 @@ __all__ = ["RemainingFactor"]
 
 @dataclass(frozen=True, eq=False)
 class RemainingFactor:
-    """The remaining factor for some points of pupils. Parts that do not depend on the window are computed once.
+    """The diffraction kernel divided by a Fourier kernel and by two factors, of which one depends on x and one on y.
 
-    directions: sines (s, t) of the points, minus those of the pupil's centre.
+    The kernel describes light from some points of pupils to a window. The slow factor is the factor by which it differs
+    from a Fourier kernel. The two factors are the slow factor along x and along y (see `AxisFactor`). Intermediate
+    results that do not depend on the position in the window are computed once.
+
+    directions: x and y components (s, t) of the unit vectors from the middle of the window to the points, minus those
+        of the unit vector to the pupil's centre.
     dtype: "float32" or "float64". With "float32", paths are computed in float32, too, if they are short enough.
     """
 
@@ -33,9 +43,13 @@ class RemainingFactor:
     dtype: str = "float64"
 
     def at(self, window: Pair) -> np.ndarray:
-        """Return the factor at positions (u, v) [m] relative to the middle of the window, complex.
+        """Return the complex remaining factor for light that arrives at positions of the window.
 
-        Directions and positions are arrays with the same number of dimensions, and broadcast.
+        The slow factor is the diffraction kernel divided by a Fourier kernel. The remaining factor is the slow factor
+        divided by two axis factors, the slow factor along x and the slow factor along y (see `AxisFactor`).
+
+        window: positions (u, v) [m] relative to the middle of the window. They have as many dimensions as the
+            attribute `directions`, with which they broadcast.
         """
         window = self.rounded(window[0]), self.rounded(window[1])
         if len({part.shape for part in (*self.directions, *window)}) == 1:
@@ -43,11 +57,17 @@ class RemainingFactor:
         return self.divided(window, [factor.at(place) for factor, place in zip(self.along, window, strict=True)])
 
     def rounded(self, values: np.ndarray) -> np.ndarray:
-        """Return numbers in the type of the paths."""
+        """Return numbers, rounded to the type in which path lengths from pupil to window are computed."""
         return values.astype(self._kind, copy=False)
 
     def divided(self, window: Pair, along: Sequence[Pair | np.ndarray]) -> np.ndarray:
-        """Return the factor at `rounded` positions, from amplitudes and phases of both axis factors there."""
+        """Return the slow factor divided by given axis factors, which are the slow factor along x and along y.
+
+        The slow factor is the diffraction kernel divided by a Fourier kernel.
+
+        window: positions (u, v) [m] relative to the middle of the window, as `rounded` returns them.
+        along: amplitude and phase [waves] of the axis factors at u and at v, as `AxisFactor.at` returns them.
+        """
         path, points, directions = self._pupil
         size, waves = slow_parts(path, points, directions, window)
         middle = self._middle
@@ -58,7 +78,14 @@ class RemainingFactor:
         return np.asarray(turned(size, waves, self.dtype))
 
     def _paired(self, window: Pair) -> np.ndarray:
-        """Return the factor for one position per point. The slow factor and its axis factors are evaluated together."""
+        """Return the remaining factor for pairs of one point of the pupil and one position (u, v) in the window.
+
+        The slow factor is the diffraction kernel divided by a Fourier kernel. It is evaluated at (u, v), (u, 0) and
+        (0, v) together. The values at (u, 0) and (0, v) are called axis factors. The remaining factor is the value at
+        (u, v) divided by both axis factors.
+
+        window: positions u and v [m], arrays of the same shape as the attribute `directions`.
+        """
         (u, v), none, (points, directions, middle) = window, np.zeros_like(window[0]), self._three
         at = np.stack([u, u, none], axis=1), np.stack([v, none, v], axis=1)
         size, waves = slow_parts(self._pupil[0], points, directions, at)
@@ -68,9 +95,14 @@ class RemainingFactor:
 
     @cached_property
     def _three(self) -> tuple[Pair, Pair, Pair]:
-        """Points, directions, and slow factors at the window's middle, for the factor itself and both axis factors.
+        """Points of the pupil, their sines, and amplitude and phase of the slow factor at the window's middle.
 
-        The shapes are (pupil, 3, ...).
+        The slow factor is the diffraction kernel divided by a Fourier kernel. The sines of a point are the x and y
+        components of the unit vector from the window's middle to the point, minus those of the pupil's centre.
+
+        Each array has the shape (pupil, 3, ...). Its axis 1 counts three cases: the points of this factor, the points
+        of the `AxisFactor` along x, whose sines along y are all the same, and the points of the `AxisFactor` along y,
+        whose sines along x are all the same.
         """
         _, points, directions = self._pupil
         own, shape = (points, directions, self._middle), directions[0].shape
@@ -83,18 +115,25 @@ class RemainingFactor:
 
     @cached_property
     def along(self) -> tuple[AxisFactor, AxisFactor]:
-        """Factors along x and y."""
+        """The diffraction kernel divided by a Fourier kernel, along x and along y.
+
+        Both factors are relative to their values at the middle of the window.
+        """
         path, _, (s, t) = self._pupil
         return AxisFactor(path, self.samples, 0, s), AxisFactor(path, self.samples, 1, t)
 
     @cached_property
     def _kind(self) -> str:
-        """Type of the paths."""
+        """Type in which path lengths from pupil to window are computed."""
         return "float32" if self.dtype == "float32" and self.path.short(self.samples.steepest) else "float64"
 
     @cached_property
     def _pupil(self) -> tuple[Path, Pair, Pair]:
-        """Path, points of the pupil and their directions, rounded."""
+        """Three values: the attribute `path`, points (x, y) [m] of the pupil, and the attribute `directions` (s, t).
+
+        The points are those that lie in these directions. The numbers in all three values are rounded to the type in
+        which path lengths are computed (see `rounded`).
+        """
         points = self.samples.points_at(*self.directions)
         if self._kind == "float64":
             return self.path, points, self.directions
@@ -103,7 +142,10 @@ class RemainingFactor:
 
     @cached_property
     def _middle(self) -> Pair:
-        """Amplitude and phase [waves] of the slow factor at the middle of the window."""
+        """Amplitude and phase [waves] of the slow factor at the middle of the window.
+
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel.
+        """
         path, points, directions = self._pupil
         none = np.zeros((1,) * directions[0].ndim, self._kind)
         return slow_parts(path, points, directions, (none, none))

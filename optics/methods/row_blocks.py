@@ -1,5 +1,6 @@
-"""Blocks of rows of a pupil that is too large to be evaluated at once. The sums over the blocks add up to its spectrum.
+"""Blocks of rows of a pupil that is too large to be evaluated at once.
 
+A Fourier sum is computed over the samples of each block. The sums of all blocks add up to the spectrum of the pupil.
 Memory then depends on the size of a block and of the spectrum, and not on the number of samples of the pupil.
 """
 
@@ -18,14 +19,17 @@ AT_ONCE = 2**24  # choice, limited by memory: largest number of samples of a blo
 
 
 def block_size(grid: Grid) -> tuple[int, int]:
-    """Return the number of blocks, and the number of rows of each block except the last."""
+    """Return the number of blocks of rows into which a grid is divided, and the rows of each block except the last."""
     height, width = grid.shape
     rows = -(-height // -(-height * width // AT_ONCE))
     return -(-height // rows), rows
 
 
 def row_blocks(grid: Grid) -> Iterator[tuple[int, Grid]]:
-    """Yield the first row and the samples of each block. A small grid is a single block."""
+    """Yield, for each block of rows of a grid, the index of its first row and the grid of its samples.
+
+    A small grid is a single block.
+    """
     height, width = grid.shape
     count, rows = block_size(grid)
     if count == 1:

@@ -1,8 +1,11 @@
-"""Heights of reliefs and lengths of wavefronts at samples of the pupil, from arrays that many pupils share.
+"""Heights of reliefs and aberrations of wavefronts at samples of the pupil.
 
-Polynomials are interpolated from a few points across the pupil. Values of maps of cubic splines are the product of a
-sparse matrix and the coefficients of the splines. This matrix and the weights of the interpolation only depend on the
-samples, not on the relief or wavefront.
+They are computed from weights that are stored, because they are the same for many pupils.
+An aberration is the length [m] by which a wavefront is ahead of the wavefront without aberrations.
+Polynomials are interpolated from a few points across the pupil. A relief or wavefront can also be a map, a table of
+values that cubic splines interpolate. Its values at the samples are the product of a sparse matrix and the coefficients
+of the splines. This matrix and the weights of the interpolation only depend on the positions of the samples and the
+size of the table, not on the values of the relief or wavefront.
 """
 
 from __future__ import annotations
@@ -38,7 +41,7 @@ MOST_BYTES = 128e6  # choice, limited by memory: all sparse matrices that are ca
 
 
 def sampled_height(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Array | None:
-    """Return the height [m] of the relief at samples, (η, ξ); None without a relief.
+    """Return the height [m] of the relief at samples, array (row, column); None without a relief.
 
     The radius of the pupil must not carry a derivative.
 
@@ -57,9 +60,10 @@ def sampled_height(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Ar
 
 
 def sampled_wavefront(pupil: Pupil, samples: WindowSamples, convert: Convert) -> Array | None:
-    """Return the length [m] by which the wavefront is ahead at samples, (η, ξ); None without an aberration.
+    """Return the aberration of the pupil's wavefront at samples, array (row, column); None without an aberration.
 
-    See `sampled_height`.
+    It is the length [m] by which the wavefront is ahead of the wavefront without aberrations. `sampled_height` explains
+    the arguments.
     """
     wavefront = pupil.wavefront
     if wavefront is None:
@@ -74,7 +78,12 @@ def sampled_wavefront(pupil: Pupil, samples: WindowSamples, convert: Convert) ->
 
 
 def _of_map(surface: HeightMap | WavefrontMap, radius: float, samples: WindowSamples, convert: Convert) -> Array:
-    """Return the values of a map, (η, ξ). radius: half the side of the map [m]."""
+    """Return the value [m] of a map at each sample of the pupil, interpolated by splines, array (row, column).
+
+    It is the height of a relief, or the length by which a wavefront is ahead of the wavefront without aberrations.
+
+    radius: half the side of the map [m].
+    """
     rows, columns = surface.samples.shape
     weights = _map_weights(samples, radius, rows, columns)
     return surface.weighted(weights, convert(np.zeros(0))).reshape(samples.grid.shape)
@@ -86,9 +95,10 @@ def _interpolated(
     samples: WindowSamples,
     convert: Convert,
 ) -> Array:
-    """Return values at samples, (η, ξ), interpolated from a few points of the pupil if possible.
+    """Return values at samples, array (row, column), interpolated from a few points of the pupil if possible.
 
-    values: function of positions (x, y) [m], whose result is in the library of the computation.
+    values: function of NumPy arrays x and y [m]. It returns an array of the same library (NumPy or PyTorch) as
+        `convert`.
     powers: number of powers of x and of y of a polynomial; None for other functions, which are not interpolated.
     """
     many, few = len(samples.at), (powers or 0) + SPHERE_POINTS
@@ -123,7 +133,7 @@ def _pixel_weights(samples: PixelNodes) -> Any:
 
 @lru_cache(maxsize=64)
 def _few_points(samples: WindowSamples, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return Chebyshev points (x, y) [m] across the samples, (y, x)."""
+    """Return coordinates x and y [m] of Chebyshev points across the samples, each an array (row, column)."""
     ends = samples.at[[0, -1]]
     nodes = ends.mean() + np.diff(ends) / 2 * chebyshev_points(count)
     return samples.points_at(nodes[None, :], nodes[:, None])

@@ -1,12 +1,13 @@
-"""Samples of a pupil that are evenly spaced in their sines, as seen from the window's centre.
+"""Samples of a pupil with evenly spaced sines, which are components of directions from the window's centre.
 
-The distance from a point ξ of the pupil to points x = c + u of a window about c is
+The sines of a point are the x and y components of the unit vector from the window's centre to the point. The distance
+from a point ξ of the pupil to points x = c + u of a window about c is
 
     |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
 
 With s as the variable, the term that is linear in u is exactly the Fourier kernel, however wide the aperture is. The
-remaining terms decrease with the distance. Because the rays are oblique, they vary over the pupil by about u²NA²/2λD
-cycles.
+remaining terms decrease with the distance. Over the pupil, these terms vary by about u²NA²/2λD cycles, because the rays
+are oblique.
 """
 
 from __future__ import annotations
@@ -40,13 +41,15 @@ RIM = 64  # number of points on the rim from which the range of the sines is det
 class SineSamples:
     """A soft aperture on a grid of sines. The grid lies around the sines of the pupil's centre.
 
-    grid: grid of s - s₀, where s = (ξ - c)/D are the sines of a point ξ of the pupil as seen from the window's centre
-        c, and s₀ those of the pupil's centre.
+    The sines s = (ξ - c)/D of a point ξ of the pupil are the x and y components of the unit vector from the window's
+    centre c to ξ, at the distance D. The sines of the pupil's centre are s₀.
+
+    grid: grid of s - s₀.
     centre: centre (x, y) [m] of the window.
     distance: distance [m] to the window's plane.
     steepest: |s| of the outermost sample with light.
-    elsewhere: sine along y, relative to s₀, at which `axis_kernel.AxisFactor` evaluates the factor along x, and the
-        reverse.
+    elsewhere: a fixed value of a component of s - s₀. `axis_kernel.AxisFactor` evaluates the diffraction kernel along
+        one axis of the window, x or y, for points of the pupil whose s - s₀ has this value along the other axis.
     """
 
     edge: PupilEdge
@@ -58,7 +61,10 @@ class SineSamples:
 
     @property
     def at(self) -> np.ndarray:
-        """Sines s - s₀ of the samples along either axis."""
+        """Sines of the samples along either axis, each minus the sine of the pupil's centre along this axis.
+
+        Sines are the x and y components of the unit vector from the window's centre to a point.
+        """
         return self.grid.x
 
     @property
@@ -76,7 +82,10 @@ class SineSamples:
         return _middle(self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sines s - s₀ of points (x, y) [m] of the pupil."""
+        """Return the sines of points (x, y) [m] of the pupil, minus the sines of the pupil's centre.
+
+        Sines are the x and y components of the unit vector from the window's centre to a point.
+        """
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
 
@@ -94,8 +103,8 @@ class SineSamples:
     def light(self, beam: Beam, dtype: str) -> np.ndarray:
         """Return the result of `field` as a complex NumPy array (y, x), without derivatives.
 
-        dtype: type of the real and imaginary parts, to which the phase is rounded after whole waves are subtracted,
-            "float32" or "float64".
+        dtype: type of the real and imaginary parts, "float32" or "float64". The phase is rounded to the same type after
+            whole waves are subtracted.
         """
         x, y, weight = self.layout
         if beam.pupil.mask is not None:
@@ -104,7 +113,11 @@ class SineSamples:
         return found
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupil for sines (s, t), from which s₀ is subtracted as in `grid`."""
+        """Return the points (x, y) [m] of the pupil whose `directions` are (s, t).
+
+        s and t are the x and y components of the unit vector from the window's centre to a point, minus those of the
+        unit vector to the pupil's centre.
+        """
         sx, sy = s + self._middle[0], t + self._middle[1]
         slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, max(self.steepest**2, MOST_SQUARE)))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
@@ -133,7 +146,8 @@ class SineSamples:
     def field(self, beam: Beam, types: Precision) -> Field:
         """Return the field behind the pupil times the areas of the samples [m²].
 
-        The area is dξ dη = z²/cos⁴θ ds dt for a ray at the angle θ, with the sines (s, t).
+        The area of a sample is dξ dη = z²/cos⁴θ ds dt. Here z is the distance between pupil and window, (s, t) are the
+        sines of the sample, and θ is the angle between the axis and the line from the window's centre to the sample.
         """
         import drjit as dr
 
@@ -149,7 +163,7 @@ class SineSamples:
 
 @lru_cache(maxsize=64)
 def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return `SineSamples.layout`. Many PSFs have the same samples, so it is cached."""
+    """Return `SineSamples.layout`. Many PSFs have the same samples, so the layout is cached."""
     types, radius = precision("float64"), samples.edge.radius
     sx, sy = np.meshgrid(samples.at + samples._middle[0], samples.at + samples._middle[1])
     x, y = samples.points_at(sx - samples._middle[0], sy - samples._middle[1])
@@ -160,37 +174,39 @@ def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _sines(x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sines of points (x, y) of the pupil as seen from the centre of the window."""
+    """Return x and y components (sines) of unit vectors from the window's centre to points (x, y) [m] of the pupil."""
     x, y = x - centre[0], y - centre[1]
     slant = np.sqrt(x * x + y * y + distance * distance)
     return x / slant, y / slant
 
 
 def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]:
-    """Return s₀, the sines of the pupil's centre as seen from the window's centre."""
+    """Return s₀, the x and y components (sines) of the unit vector from the window's centre to the pupil's centre."""
     slant = math.hypot(*centre, distance)
     return -centre[0] / slant, -centre[1] / slant
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """Return the fewest samples that resolve the combined phase of pupil and path; None if they would be too uneven.
+    """Return the fewest samples that resolve the phase over the pupil; None if their spacing would be too uneven.
 
-    The result is also None if the grid would be too large.
+    The phase is the sum of the phase of the light behind the pupil and the phase of the path from the pupil to a point
+    of the window. The result is also None if the grid would be too large.
     """
     edge = problem.soft_edge(problem.turning)
     return evenly_in_sines(problem, edge, problem.turning + edge.stopband)
 
 
 def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: float = 0.0) -> SineSamples | None:
-    """Return samples that resolve a number of cycles per metre of the pupil.
+    """Return samples that resolve light behind the pupil whose phase varies by up to `cycles` cycles per metre.
 
     The result is None if samples that are evenly spaced in sines are too uneven in the pupil, or if the grid would be
     too large.
 
-    The distance between two points in the pupil is at most z/cos³θ times the distance between their sines, with θ the
-    angle of the steepest ray. The number of cycles per unit of sine is therefore `cycles` times this factor.
+    The distance between two points in the pupil is at most z/cos³θ times the difference between their sines. Here z is
+    the distance between pupil and window, and θ is the angle of the steepest ray. The number of cycles per unit of sine
+    is therefore `cycles` times this factor.
 
-    cycles: number of cycles per metre [1/m].
+    cycles: number of cycles per metre in the pupil's plane [1/m].
     shift: distance by which the grid is shifted along both axes, in units of its pitch, at most 1.
     """
     angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)

@@ -1,7 +1,7 @@
-"""Samples of several pupils at once, evenly spaced in sines as in `sine_samples`, the same number for each pupil.
+"""Samples of several pupils at once, with evenly spaced sines (see `sine_samples`), the same number in each pupil.
 
-All arrays are of NumPy, and their first axis counts the pupils. It has length 1 if the light of several wavelengths or
-sources passes the same samples.
+All arrays are of NumPy, and their first axis counts the pupils. If the light of several wavelengths or sources passes
+the same pupil, its samples are stored once, and the first axis has length 1.
 """
 
 from __future__ import annotations
@@ -33,13 +33,15 @@ SMOOTH_SINE = 0.4  # choice: largest sine at which paths are interpolated from a
 
 @dataclass(frozen=True, eq=False)
 class SineGeometry:
-    """Points of pupils, and their sines as seen from the centre of the window.
+    """Conversion between points of pupils and their sines.
+
+    Sines are the x and y components of the unit vector from the window's centre to a point.
 
     distance: distances of the window [m], (pupil,).
     centre: centre (x, y) [m] of the window.
-    steepest: sines of the outermost samples with light, (pupil,).
-    elsewhere: sines along the other axis at which `axis_kernel.AxisFactor` evaluates the factor along x or y, minus
-        those of the pupils' centres, (pupil,).
+    steepest: sines of the angle between the axis and the line to the outermost sample with light, (pupil,).
+    elsewhere: a fixed sine for each pupil, minus the sine of the pupil's centre, (pupil,). `axis_kernel.AxisFactor`
+        evaluates the kernel along x for points with this sine along y, and along y for points with this sine along x.
     """
 
     distance: np.ndarray
@@ -49,17 +51,21 @@ class SineGeometry:
 
     @cached_property
     def _middle(self) -> tuple[np.ndarray, np.ndarray]:
-        """Sines of the centres of the pupils as seen from the centre of the window."""
+        """Components x and y (sines) of unit vectors from the window's centre to the pupils' centres, each (pupil,)."""
         none = np.zeros(len(self.distance))
         return _sines(none, none, self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sines of points (x, y) [m] of the pupils, minus those of the pupils' centres, (pupil, ...)."""
+        """Return the sines of points (x, y) [m] of the pupils, minus the sines of the pupils' centres.
+
+        Sines are the x and y components of the unit vector from the window's centre to a point. Both arrays have the
+        shape (pupil, ...).
+        """
         sx, sy = _sines(x, y, self.centre, _aligned(self.distance, x))
         return sx - _aligned(self._middle[0], sx), sy - _aligned(self._middle[1], sy)
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points (x, y) [m] of the pupils whose `directions` are (s, t)."""
+        """Return those points (x, y) [m] of the pupils for which `directions` returns (s, t)."""
         sx, sy = s + _aligned(self._middle[0], s), t + _aligned(self._middle[1], t)
         slant = _aligned(self.distance, sx) / np.sqrt(self._squared_cosine(sx, sy))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
@@ -72,13 +78,13 @@ class SineGeometry:
 
 @dataclass(frozen=True, eq=False)
 class SineStack(SineGeometry):
-    """Soft apertures on grids of sines.
+    """Soft apertures, sampled on grids of sines. `SineGeometry` defines sines.
 
     at: sines along either axis minus those of the pupil's centre, (pupil, sample), evenly spaced.
     edges: soft apertures, (pupil,).
     radius: radii [m], (pupil,).
-    curvature: local frequencies at the rim [cycles per radius] of waves that are smoothed with the edges; 0 for others,
-        (pupil,).
+    curvature: local frequency c [cycles per radius] at the rim of a curved wave e^{iπcr²}, (pupil,). The hard aperture
+        is multiplied by this wave before the edge is softened, see `curved_ring`. 0 if there is no such wave.
     """
 
     at: np.ndarray
@@ -123,13 +129,13 @@ class SineStack(SineGeometry):
         return (self.at + sx)[:, None, :] * slant + self.centre[0], (self.at + sy)[:, :, None] * slant + self.centre[1]
 
     def arriving(self, stack: LightStack, dtype: str) -> np.ndarray:
-        """Return the contribution of each sample to the field at the middle of the window, (beam, y, x), complex.
+        """Return the complex contribution of each sample to the field at the middle of the window, (beam, y, x).
 
         It is the light behind the pupils, times the areas of the samples, times z/(λD²) (1/(kD) - i) e^{ik(D - ρ)}, up
-        to a constant phase. D and ρ are the distances of this point from the sample and from the pupil's centre, z is
-        that of the window, and k the wave number.
+        to a constant phase. D and ρ are the distances from the middle of the window to the sample and to the pupil's
+        centre. z is the distance between the planes of pupil and window, and k the wave number.
 
-        dtype: type of the real and imaginary parts, in which the phase is rounded, "float32" or "float64".
+        dtype: type of real and imaginary parts, and of the phase after whole waves are removed, "float32" or "float64".
         """
         size = self._sizes(dtype) / stack.wavelength[:, None, None].astype(dtype)
         if any(beam.pupil.mask is not None for beam in stack.beams):
@@ -152,9 +158,8 @@ class SineStack(SineGeometry):
     def _sizes(self, dtype: str) -> np.ndarray:
         """Return the areas of the samples times the transmittance of the apertures and z/D² [m], (pupil, y, x).
 
-        z is the distance of the window, and D that of a sample from the middle of the window.
-
-        The transmittance of smoothed waves is complex.
+        z is the distance of the window's plane, and D the distance of a sample from the middle of the window. If
+        `curvature` is not 0, the transmittance is that of `curved_ring`, and the result is complex.
         """
         return np.asarray(self.known.get(dtype, lambda: self._new_sizes(dtype)))
 
@@ -184,16 +189,17 @@ class SineStack(SineGeometry):
         return found
 
     def _waves(self, stack: LightStack) -> np.ndarray:
-        """Return the paths through all samples to the middle of the window, in waves up to a constant, (beam, y, x).
+        """Return paths [waves] from the source through all samples to the window's middle, (beam, y, x).
 
-        Paths without fine detail are interpolated from a few points of the pupil if no sine exceeds SMOOTH_SINE.
+        A constant is omitted. Paths that vary smoothly are interpolated from a few points of the pupil. This requires
+        that the sines of the angles between the axis and the rays to the window do not exceed SMOOTH_SINE.
         """
         count = stack.smooth_points
         if count is None or count >= self.at.shape[1] or not self.smooth(0.0):
             return self._paths(stack, *self.points)
 
         def computed() -> tuple[np.ndarray, np.ndarray]:
-            """Return the paths without reliefs and wavefronts at Chebyshev points, and powers of their coordinates."""
+            """Return paths [waves] without relief and aberration, and polynomial terms y^i x^j, at Chebyshev points."""
             side = self.at[:, [0, -1]]
             nodes = side.mean(axis=1)[:, None] + np.diff(side) / 2 * chebyshev_points(count)
             points = self.points_at(nodes[:, None, :], nodes[:, :, None])
@@ -206,7 +212,7 @@ class SineStack(SineGeometry):
         return np.asarray(weight @ paths @ weight.T)
 
     def _paths(self, stack: LightStack, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the paths through points (x, y) [m], in waves up to a constant."""
+        """Return paths [waves] from the source through points (x, y) [m] to the window's middle, without a constant."""
         return np.asarray(stack.waves(x, y) + self._to_middle(stack.wavelength[:, None, None], x, y)[1])
 
     def _to_middle(self, wavelength: float | np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -214,9 +220,11 @@ class SineStack(SineGeometry):
         return diffraction_kernel(wavelength, self.distance[:, None, None], (x, y), self.centre)
 
     def to_middle(self, wavelength: float | np.ndarray, dtype: str) -> np.ndarray:
-        """Return the factor between the light of samples and their contribution to the middle, (pupil, y, x), complex.
+        """Return the factor from the light at each sample to its contribution at the window's middle, (pupil, y, x).
 
-        It is the `diffraction_kernel` [1/m²] up to a constant phase. The light must include the areas of samples.
+        It is the complex `diffraction_kernel` [1/m²], up to a constant phase. The light that is multiplied by this
+        factor must already be multiplied by the areas [m²] of the samples.
+
         wavelength: wavelength [m] in the medium, a number.
         """
         key = "to_middle", float(wavelength), dtype
@@ -226,10 +234,13 @@ class SineStack(SineGeometry):
 def rim_sines(
     outermost: np.ndarray, centre: tuple[float, float], distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the largest difference along an axis between sines of points on a rim and of the pupil's centre, (pupil,).
+    """Return three properties of each pupil's rim, which determine the grid of sines with which it is sampled.
 
-    The second result is the largest sine of the points on each rim. The third result is True for pupils in which
-    samples with evenly spaced sines have similar distances from each other.
+    Sines are the x and y components of the unit vector from the window's centre to a point. The first result is half
+    the width of the grid: the largest difference, along x or y, between the sine of a point on the rim and that of the
+    pupil's centre. The second is the largest sine of the angle between the axis and the line to a point on the rim. The
+    third is True for pupils in which samples with evenly spaced sines are fairly evenly spaced in the pupil's plane,
+    too: their spacing [m] at the rim is at most MOST_STRETCH times that at the centre. All are arrays (pupil,).
 
     outermost: radii [m] of the rims.
     """
@@ -252,7 +263,7 @@ def _aligned(values: np.ndarray, to: np.ndarray) -> np.ndarray:
 def _sines(
     x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sines of points (x, y) of the pupils as seen from the centre of the window."""
+    """Return x and y components (sines) of unit vectors from the window's centre to points (x, y) [m] of the pupils."""
     x, y = x - centre[0], y - centre[1]
     slant = np.sqrt(x * x + y * y + distance * distance)
     return x / slant, y / slant
@@ -273,9 +284,13 @@ def even_weights(samples: int, count: int) -> np.ndarray:
 
 @lru_cache(maxsize=256)
 def _profile(edge: SoftAperture, curvature: float, dtype: str) -> np.ndarray:
-    """Return the transmittance in the middle of equal steps of r², up to the outermost radius, and 0 beyond.
+    """Return a table of a soft aperture's transmittance against r², the squared distance from the axis.
 
-    dtype: type of real transmittances. The table of a smoothed wave has single precision.
+    Its values are in the middle of equal steps of r² up to the outermost radius with light, followed by a 0.
+
+    curvature: if it is not 0, and the aperture is a circle or a ring, the table contains the result of `curved_ring`,
+        complex in single precision.
+    dtype: type of the table otherwise, "float32" or "float64".
     """
     if curvature and isinstance(edge, SoftAnnulus):
         return np.append(curved_ring(edge.edge, edge.inner, curvature, SMOOTHED_LEVELS), 0)

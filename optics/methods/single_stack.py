@@ -1,6 +1,7 @@
-"""Samples of a single pupil as a stack of one, kept for further PSFs with the same samples.
+"""Samples of a single pupil as a `SineStack`, the samples of several pupils, that contains only this pupil.
 
-A stack keeps arrays (`SineStack.known`), whose memory grows with the number of samples.
+The stack is kept for further PSFs with the same samples. It keeps arrays (`SineStack.known`), whose memory grows with
+the number of samples.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ LARGE = 2**17
 
 
 class Stackable(Protocol):
-    """Samples that return their own stack, such as `PixelNodes`."""
+    """Samples of a pupil, such as `PixelNodes`, with a method that returns them as a `SineStack` of a single pupil."""
 
     @property
     def grid(self) -> Grid: ...
@@ -34,7 +35,7 @@ class Stackable(Protocol):
 
 
 def single_stack(samples: SineSamples | Stackable) -> SineStack:
-    """Return the samples of a single pupil as a stack of one."""
+    """Return the samples of a single pupil as a `SineStack` of one pupil, from a cache if possible."""
     return (_large if math.prod(samples.grid.shape) > LARGE else _small)(samples)
 
 

@@ -1,6 +1,7 @@
 """The factor by which the diffraction kernel differs from a Fourier kernel. It varies slowly over the window.
 
-A few Chebyshev points per axis of the window are enough to interpolate it. Their number is the rank of the factor.
+A few Chebyshev points per axis of the window are enough to interpolate it. The number of points per axis is called the
+rank of the factor.
 """
 
 from __future__ import annotations
@@ -54,11 +55,15 @@ class Path:
 
     @property
     def key(self) -> tuple[bytes, bytes, Grid]:
-        """The same numbers in a form that can be hashed."""
+        """Wavelength, distance and window in a form that can be hashed."""
         return np.asarray(self.wavelength).tobytes(), np.asarray(self.distance).tobytes(), self.window
 
     def short(self, steepest: float | np.ndarray) -> bool:
-        """Return whether paths differ by few enough waves for float32, for pupils with sines up to `steepest`."""
+        """Return whether the lengths of paths differ by so few waves that float32 is precise enough.
+
+        steepest: largest sine of the angle between the axis and the line from the window's centre to a sample of the
+            pupil.
+        """
         reach = steepest + np.hypot(*self.window.centre) / self.distance + self.window.half_diagonal / self.distance
         return bool(np.max(np.square(reach) * self.distance / self.wavelength) < FEW_WAVES)
 
@@ -68,7 +73,7 @@ class Path:
         return Path(wavelength, distance, self.window)
 
     def numbers(self, axes: int) -> tuple[float | np.ndarray, float | np.ndarray]:
-        """Return wavelength and distance; arrays (pupil,) get `axes` axes, so that they broadcast with others."""
+        """Return wavelength and distance in a shape that broadcasts with arrays (pupil, ...) that have `axes` axes."""
         wavelength, distance = (
             part.reshape(-1, *[1] * (axes - 1)) if isinstance(part, np.ndarray) else part
             for part in (self.wavelength, self.distance)
@@ -79,7 +84,12 @@ class Path:
 def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
     """Return the number of Chebyshev points per axis that interpolate the slow factor; None if `most` are too few.
 
-    Interpolation is tested for points on the rim of the soft aperture.
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. Interpolation is tested
+    along a few lines through the window, for light from points on the rim of the pupil, including its soft edge.
+
+    half: distance [m] from the window's centre within which the Chebyshev points lie.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. This
+        argument is not used if the samples of the pupil are evenly spaced in sines (`SineSamples`).
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
@@ -90,7 +100,11 @@ def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: floa
     lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
 
     def rest(at: np.ndarray) -> np.ndarray:
-        """Return the slow factor at positions `at` [m] on all lines, (line, point of the rim, position)."""
+        """Return the slow factor along lines in the window, for light from points on the rim of the pupil.
+
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The lines are
+        parallel to x or y. at: positions [m] along each line. Shape: (line, rim point, position).
+        """
         u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
         return slow_factor(path, rim, directions, (u, v))
 
@@ -106,7 +120,10 @@ def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: floa
 
 @lru_cache(maxsize=len(RANKS))
 def _between(rank: int) -> np.ndarray:
-    """Return interpolation weights of `rank` Chebyshev points at the test positions, (point, position)."""
+    """Return weights for interpolation from `rank` Chebyshev points to the positions where it is tested.
+
+    There are TRIED evenly spaced positions. Shape: (point, position).
+    """
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(rank))
 
 
@@ -129,13 +146,13 @@ def slow_factor(
 ) -> np.ndarray:
     """Return the slow factor (z/D)² (1 + i/(kD)) e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
 
-    D is the distance from ξ to u, ρ that from the pupil's centre to u, and z that of the window. k is the wave number.
-    All arrays are broadcast.
+    D is the distance from ξ to u, and ρ the distance from the pupil's centre to u. z is the distance between the planes
+    of pupil and window, and k the wave number. All arrays are broadcast.
 
     pupil: points ξ (x, y) [m].
-    directions: directions s of these points in the Fourier kernel e^{-ik s·u}.
+    directions: components along x and y of s, the variable of the Fourier kernel e^{-ik s·u} for each point ξ.
     window: points u (x, y) [m], relative to the window's centre.
-    dtype: type in which the phase is rounded, "float32" or "float64".
+    dtype: type to which the phase is rounded after whole waves are subtracted, "float32" or "float64".
     """
     return np.asarray(turned(*slow_parts(path, pupil, directions, window), dtype))
 
@@ -168,14 +185,16 @@ def cross_term(
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return a and b, so that the slow factor, divided by its values along both axes, is about 1 + a b.
+    """Return a and b, where 1 + a b approximates the part of the slow factor that depends on both x and y.
 
-    The product a b is the term -ik us vt/D of the exponent, where k = 2π/λ, and 1/D is the mean inverse distance over
-    the pupil. Because a depends on u and s, and b on v and t, the term costs as much as a second Fourier kernel along
-    each axis.
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. F(u, v) is the slow
+    factor divided by its value at the middle of the window. The quotient F(u, v) / (F(u, 0) F(0, v)) would be 1 if F
+    were a function of x times a function of y. It is about 1 + a b. The product a b is the term -ik (u s) (v t)/D in
+    the exponent of F, where k = 2π/λ, and 1/D is the mean inverse distance over the pupil. Because a depends on u and
+    s, and b on v and t, the term costs as much as a second Fourier kernel along each axis.
 
-    directions: s and t, sines of samples along x and y minus those of the pupil's centre. Their last two axes broadcast
-        with those of `window`.
+    directions: s and t, the x and y components of the unit vectors from the window's centre to samples of the pupil,
+        minus those of the unit vector to the pupil's centre. Their last two axes broadcast with those of `window`.
     window: u and v, positions along x and y relative to the middle of the window [m].
     """
     (s, t), (u, v) = directions, window

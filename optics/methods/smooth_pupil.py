@@ -1,15 +1,15 @@
 """The light behind a steep relief or wavefront, convolved with a Gaussian, so that few samples represent it.
 
-The convolution multiplies the light of a ray of the frequency ν by e^{-2π²δ²ν²}, where δ is the width of the Gaussian.
-Light that is too steep to arrive in a window disappears from the samples. A division of the spectrum by this factor
-restores the light of all other rays exactly.
+The convolution multiplies light of the spatial frequency ν by e^{-2π²δ²ν²}, where δ is the standard deviation of the
+Gaussian. It nearly removes light that is too steep to arrive in the window in which the image is computed. When the
+spectrum of the samples is divided by e^{-2π²δ²ν²}, the light that arrives in the window is restored exactly.
 
 Within the width of the Gaussian, the phase is approximated by a quadratic function, with the slope and the curvature of
 the wavefront. The convolution then has a closed form. Near the edge of the aperture, the edge is approximated by a
 straight line. The samples therefore contain the light that the edge diffracts, even where the relief is steep. The
-integral of the Gaussian over one side of this line is a complementary error function of a complex argument. At a
-corner, the factors of both sides are multiplied. The largest neglected term is the third derivative of the phase, times
-δ³.
+fraction of the Gaussian that lies on the open side of this line is a complementary error function of a complex
+argument. At a corner, the fractions for both edges are multiplied. The largest neglected term is the third derivative
+of the phase, times δ³.
 """
 
 from __future__ import annotations
@@ -66,9 +66,11 @@ class Side:
 
 @lru_cache(maxsize=64)
 def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
-    """Return sides such that the aperture is the intersection of their openings; None if no sides have this property.
+    """Return the lines and circles that bound an aperture; None if they do not describe it completely.
 
-    Circles, single rings, slits and convex polygons have such sides.
+    Each side, a line or a circle, divides the plane into an open and a dark region. The sides describe the aperture if
+    it is the intersection of the open regions of all sides. This is true for circles, single rings, slits and convex
+    polygons.
     """
     outline, sides = aperture.outline, []
     for start, end in outline.segments:
@@ -89,11 +91,14 @@ def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
 
 
 class _Gaussian(NamedTuple):
-    """The Gaussian times the light around each sample. The product is a Gaussian with complex parameters.
+    """A complex Gaussian around each sample: the light there, times the real Gaussian of the convolution.
+
+    The variable of both factors is the displacement (x, y) from the sample. The phase of the light is approximated by a
+    quadratic function of the displacement, so the product is a Gaussian with complex parameters.
 
     log: logarithm of its integral.
-    mean: mean (x, y) [m].
-    covariance: covariances xx, xy and yy [m²].
+    mean: mean displacement (x, y) [m].
+    covariance: covariances xx, xy and yy of the displacement [m²].
     """
 
     log: np.ndarray
@@ -101,11 +106,14 @@ class _Gaussian(NamedTuple):
     covariance: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def along(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and variance of the component along unit vectors (x, y)."""
+        """Return the mean [m] and the variance [m²] of the displacement from each sample along unit vectors (x, y)."""
         return x * self.mean[0] + y * self.mean[1], self.between((x, y), (x, y))
 
     def between(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Return the covariance of the components along two unit vectors (x, y)."""
+        """Return the covariance [m²] between two components of the displacement from each sample.
+
+        one, other: unit vectors (x, y) along which the two components are taken.
+        """
         xx, xy, yy = self.covariance
         return one[0] * other[0] * xx + (one[0] * other[1] + one[1] * other[0]) * xy + one[1] * other[1] * yy
 
@@ -121,7 +129,7 @@ class _Gaussian(NamedTuple):
 class SmoothPupil:
     """A pupil whose light is convolved with a Gaussian.
 
-    sides: sides of the aperture.
+    sides: the lines and circles that bound the aperture.
     radius: radius [m] of the pupil.
     width: width δ [m] of the Gaussian, its standard deviation.
     """
@@ -137,12 +145,16 @@ class SmoothPupil:
 
     @cached_property
     def exponent(self) -> float:
-        """Coefficient 2π²δ² [m²] of the factor e^{-2π²δ²ν²}, by which light of the frequency ν is attenuated."""
+        """Coefficient 2π²δ² [m²] of the factor e^{-2π²δ²ν²}, by which light of the spatial frequency ν is attenuated.
+
+        δ is the standard deviation `width` of the Gaussian with which the light is convolved.
+        """
         return 2 * (math.pi * self.width) ** 2
 
     def light(self, beam: Beam, x: np.ndarray, y: np.ndarray, dtype: Any) -> np.ndarray:
-        """Return the convolved light at evenly spaced positions x and y [m], complex (y, x).
+        """Return the light behind the pupil, convolved with the Gaussian of this `width`, complex (y, x).
 
+        x, y: evenly spaced positions [m] along each axis.
         dtype: type of the real and imaginary parts.
         """
         waves, pitch = beam.waves(x[None, :], y[:, None]), float(x[1] - x[0])
@@ -188,12 +200,16 @@ class SmoothPupil:
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the integral of each Gaussian over the aperture, complex (point,).
 
-        Each side that is near contributes one factor. Where the relief is steep, only light that one side diffracts
-        remains. This light comes from points on this side, so the factors of all other sides are computed for the
-        conditional Gaussian along this side.
+        Each side of the aperture is a line or a circle that divides the plane into an open and a dark region. The
+        integral over the whole plane is multiplied by a factor for each side near the centre of the Gaussian: the
+        fraction of the Gaussian that lies in the open region of this side.
 
-        inner: Gaussians of the points.
-        x, y: positions of the points, in radii.
+        Where the relief is steep, the convolution with the Gaussian removes nearly all light. Only light that is
+        diffracted at one of the sides remains, and it comes from points on this side. The factors of the other sides
+        are therefore computed from the Gaussian as it is along this side.
+
+        inner: Gaussians around the points.
+        x, y: positions of the points, the centres of the Gaussians, in radii of the pupil.
         """
         depth, across, down = np.stack([np.broadcast_arrays(*side.depth(x, y)) for side in self.sides], axis=1)
         mean, variance = inner.along(across, down)
@@ -218,7 +234,10 @@ class SmoothPupil:
 
 
 def _behind(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (a, b) with e^a b = erfc(-u)/2, the fraction of a Gaussian behind a line. Neither number overflows.
+    """Return (a, b) with e^a b = erfc(-u)/2. Neither number overflows.
+
+    The product is the fraction of a Gaussian that lies on one side of a line. u is the distance of the line from the
+    mean, divided by √2 times the standard deviation. It may be complex.
 
     The scaled function w(z) = e^{-z²} erfc(-iz) is bounded in the upper half plane (Abramowitz & Stegun, 7.1.3).
     """

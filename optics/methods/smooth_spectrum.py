@@ -1,9 +1,10 @@
 """The angular spectrum behind a steep relief, from samples of the light convolved with a Gaussian (`smooth_pupil`).
 
-Samples of all light behind a rough relief would have to resolve its steepest slopes, even if nearly all of this light
-misses the window or is evanescent. Samples of the convolved light only have to resolve the light that arrives in the
-window. The spectrum of the convolved light is divided by that of the Gaussian, and propagated as in `angular_spectrum`.
-Light beyond the `reach` of the problem is removed.
+To sample all light behind a rough relief, samples would have to resolve the steepest slopes of the relief, even if
+nearly all of this light misses the window or is evanescent. Samples of the convolved light only have to resolve the
+light that arrives in the window. The spectrum of the convolved light is divided by that of the Gaussian, and propagated
+as in `angular_spectrum`. In the window, the image is set to 0 beyond `Problem.reach`, the distance from the axis within
+which all light lies, except for a fraction of the tolerance.
 """
 
 from __future__ import annotations
@@ -71,7 +72,11 @@ class SmoothSpectrum(SpectrumSampling):
 
     @cached_property
     def closed_form(self) -> Grid:
-        """Grid of the samples at which the convolved light is computed in closed form."""
+        """Grid on which the light behind the pupil is computed in closed form, convolved with a first Gaussian.
+
+        The width of the first Gaussian is `smooth.width`. If `blur` is not 0, the light on this grid is then convolved
+        numerically with a second Gaussian of the width `blur`. This yields the light on another grid, `pupil`.
+        """
         if self.blur == 0:
             return self.pupil
         return _samples(self.smooth.outermost, _pitch(self.taper.end, self.smooth.width, self.tolerance))
@@ -93,7 +98,10 @@ class SmoothSpectrum(SpectrumSampling):
         return types.Float(padded_for_packets(found / float(self.pupil_period) ** 4))
 
     def _light(self, beam: Beam, dtype: Any) -> np.ndarray:
-        """Return the convolved light at the samples from which the spectrum is computed, complex (y, x)."""
+        """Return the light behind the pupil, convolved with two Gaussians, on the grid `pupil`, complex (y, x).
+
+        The first Gaussian has the width `smooth.width`. The second has the width `blur`, and is absent if `blur` is 0.
+        """
         grid = self.closed_form
         light = self.smooth.light(beam, grid.x, grid.y, dtype)
         if self.blur == 0:
@@ -104,9 +112,11 @@ class SmoothSpectrum(SpectrumSampling):
         return found
 
     def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
-        """Return the transfer function to the window, divided by the spectrum of both Gaussians, complex (fy, fx).
+        """Return the transfer function from pupil to window, divided by the spectra of two Gaussians, complex (fy, fx).
 
-        The function is even along both axes, so only its values at non-negative frequencies are returned.
+        The light is convolved with these Gaussians. The first has the width `smooth.width`. The second has the width
+        `blur`, and is absent if `blur` is 0. The division reverses the convolution. The transfer function is even along
+        both axes, so only its values at non-negative frequencies are returned.
         """
         found = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
         exponent = 2 * math.pi**2 * (self.smooth.width**2 + self.blur**2)
@@ -117,8 +127,9 @@ class SmoothSpectrum(SpectrumSampling):
     def _propagated(self, light: np.ndarray, transfer: np.ndarray, window: Grid) -> np.ndarray:
         """Return the field over the window (y, x), times the squared number of samples per period.
 
-        The sums along y, to the spectrum and back, are computed for some columns at a time, which fit into the cache.
-        All transforms have the first sample as their origin. Phases that are linear in the frequency correct this.
+        The transforms along y, from light to spectrum and back, are computed for a few columns at a time, which fit
+        into the cache. All transforms have the first sample as their origin. Phases that are linear in the frequency
+        correct this.
         """
         from scipy import fft
 
@@ -172,7 +183,10 @@ def may_be_steep(beam: Beam) -> bool:
 
 
 def smooth_spectrum(problem: Problem) -> list[SmoothSpectrum]:
-    """Return samplings with which the spectrum meets the problem's tolerance, one for each taper."""
+    """Return samplings that meet the problem's tolerance, one for each of the problem's `tapers`.
+
+    A taper fades the spectrum out before grazing incidence.
+    """
     third = _third_derivative(problem)
     return [_sampling(problem, taper, third) for taper in tapers(problem)]
 

@@ -23,9 +23,9 @@ class Taper:
 
     It blurs the field by `blur` [m].
 
-    The taper is an error function. The transform of its derivative falls to the allowed error of the amplitude, the
-    ripple, within the distance `blur`. Light that the taper removes must therefore land at least this far outside the
-    window.
+    The taper is an error function of the frequency. Within the distance `blur`, the Fourier transform of its derivative
+    falls to the ripple, which is the allowed error of the amplitude. Light that the taper removes must therefore land
+    at least this far outside the window.
 
     sine, tangent: sine and tangent of the angle at which the taper ends.
     """
@@ -49,7 +49,8 @@ class Taper:
     def fade(self, f2: Array, types: Precision) -> Array:
         """Return the taper: 1 up to the frequency `band` and 0 beyond `end`, to within the ripple.
 
-        The error function falls to the ripple at the argument √ln(1/ripple).
+        The ripple is the allowed error of the amplitude. At the argument √ln(1/ripple), the error function differs from
+        its limit by at most the ripple.
 
         f2: squared frequencies f², float64.
         """
@@ -63,7 +64,7 @@ class Taper:
 
 
 def tapers(problem: Problem) -> list[Taper]:
-    """Return the tapers that end before grazing incidence, in the order of increasing blur."""
+    """Return tapers that fade the angular spectrum out before grazing incidence, in the order of increasing blur."""
     size = problem.radius + problem.outermost
     found = [Taper.for_problem(problem, blur * size) for blur in FADES]
     return [taper for taper in found if taper.sine < TAPER_END_SINE]

@@ -1,4 +1,8 @@
-"""The planes between which the methods of the angular spectrum transform a field, and the sums between them."""
+"""Grids for propagation by the angular spectrum, and the Fourier sums that transform a field from one grid to another.
+
+There are grids of the spectrum, of the window, and of the relay plane. The relay plane is an intermediate plane of the
+split method, which propagates light to the window in two steps (see `angular_spectrum`).
+"""
 
 from __future__ import annotations
 
@@ -22,13 +26,14 @@ __all__ = ["SpectrumSampling"]
 
 
 class SpectrumSampling:
-    """Samples of a spectrum and of the planes onto which it is transformed.
+    """Grid of the spectrum of the light behind a pupil, and grids in the planes where the field is computed from it.
 
     method: "angular_spectrum" or "split_angular_spectrum".
     taper: taper that fades the spectrum out.
     period: width [m] after which the field in the pupil's plane repeats. The spectrum's samples are 1/period apart.
-    output_period: number of samples per period in the window's plane or, with the split method, in the `relay` plane.
-    even: True if the field is even in x and y. A quarter of each plane is then sufficient.
+    output_period: number of samples after which the field in the window's plane repeats. With the split method, it is
+        this number in the `relay` plane.
+    even: True if the field is even in x and y. A quarter of the samples of each plane is then sufficient.
     """
 
     method: str
@@ -39,7 +44,10 @@ class SpectrumSampling:
 
     @property
     def is_whole(self) -> bool:
-        """True if no paraxial part is split off."""
+        """True if the spectrum is propagated to the window in one step.
+
+        False for the split method, which leaves the paraxial part of the propagation to Fresnel's integral.
+        """
         return self.method == "angular_spectrum"
 
     @cached_property
@@ -49,17 +57,25 @@ class SpectrumSampling:
 
     @cached_property
     def relay(self) -> Grid:
-        """Grid [m] of the relay plane, from which the split method continues with Fresnel's integral."""
+        """Grid [m] of the relay plane of the split method.
+
+        The split method first propagates the spectrum to this plane, without the paraxial part of the phase. Fresnel's
+        integral from this plane to the window adds this part.
+        """
         return Grid.square(self.output_period, self.period / self.output_period)
 
     def part(self, grid: Grid) -> Grid:
-        """Return the samples that represent a plane: a quarter if the field is even, else all."""
+        """Return the part of a grid on which a field is stored: a quarter if the field is even in x and y, else all."""
         return quarter(grid) if self.even else grid
 
     def sum(self, field: Field, start: Grid, period: Scalar, end: Grid, sign: int, first: int = 0) -> Field:
-        """Return the Fourier sum from the samples of one plane to the samples of another, see `fourier.dft2`.
+        """Return the Fourier sum of a field on one grid, computed at the samples of another grid; see `fourier.dft2`.
 
-        first: first row of the field, if it contains only some rows of the plane.
+        start: grid of the field.
+        period: number of samples of the result after which it repeats.
+        end: grid of the result.
+        sign: sign of the exponent.
+        first: index of the field's first row in `start`, if the field contains only some rows of this grid.
         """
         if self.even:
             return even_sum(field, start.shape, period, end, first)
@@ -70,7 +86,10 @@ class SpectrumSampling:
         return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
 
     def sum_bytes(self, start: Grid, end: Grid, dtype: str) -> float:
-        """Return the predicted memory [bytes] of a sum from samples of one plane to samples of another."""
+        """Return the predicted memory [bytes] of the Fourier sum that transforms a field from one grid to another.
+
+        start, end: grids before and after the sum.
+        """
         return predicted_bytes(start.shape, end.shape, ITEM_BYTES[dtype])
 
     def bytes_from_spectrum(self, window: Grid, dtype: str) -> float:
@@ -88,7 +107,15 @@ class SpectrumSampling:
         return to_relay + self.sum_seconds(self.relay, 0.5, window)
 
     def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
-        """Return the field; for a split spectrum, times the phase factor e^{iπr²/λz}/i, which `arrived` omits."""
+        """Return a field over the window with its complete phase.
+
+        The split method propagates light to a relay plane, and from there to the window by Fresnel's integral. A field
+        that was computed in this way lacks the factor e^{iπr²/λz}/i, because the intensity does not depend on it. The
+        field is multiplied by this factor here. r is the distance from the axis in the window, and z is the distance of
+        the window from the pupil.
+
+        field: result of `arrived`.
+        """
         if self.is_whole:
             return field
         types = precision(problem.dtype)
@@ -97,5 +124,9 @@ class SpectrumSampling:
         return field * Field.from_waves(1.0, waves, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`.
+
+        Rounding errors are assumed to be spread evenly over the square. The square lies in the plane of the window. The
+        field in this plane is a Fourier sum, so it repeats periodically. The width of the square is one period.
+        """
         return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx

@@ -1,8 +1,9 @@
-"""PSFs of a stack as one operation of PyTorch, which is faster than one operation for each step.
+"""PSFs of several sources through one pupil, as a single operation of PyTorch with its own derivative.
 
-The light behind the pupil is P = S e^{2πi w}. The phase w [waves] carries derivatives, and the factor S does not. The
-intensity is |U|², where `window_field` computes U from P. For a loss L with the gradient G = ∂L/∂Re P + i ∂L/∂Im P, the
-gradient with respect to the phase is 2π (Re P Im G - Im P Re G).
+This is faster than one operation of PyTorch for each step of the calculation. The light behind the pupil is
+P = S e^{2πi w}. The phase w [waves] of relief and wavefront carries derivatives, and the remaining factor S does not.
+The intensity is |U|², where `window_field` computes U from P. For a loss L with the gradient
+G = ∂L/∂Re P + i ∂L/∂Im P, the gradient with respect to the phase is 2π (Re P Im G - Im P Re G).
 """
 
 from __future__ import annotations
@@ -20,18 +21,29 @@ __all__ = ["is_single", "stack_images"]
 
 
 def is_single(size: Array, waves: Array | None) -> bool:
-    """Return whether `stack_images` can compute the PSFs: in the processor's memory, with derivatives by the phase."""
+    """Return whether `stack_images` can compute the PSFs.
+
+    The light behind the pupil is S e^{2πi w}. The phase w (`waves`) must be a tensor of PyTorch in the processor's
+    memory and carry derivatives. The factor S (`size`) must not carry derivatives.
+
+    size: S, the light without the phase of relief and wavefront.
+    waves: w, the phase of relief and wavefront [waves]; None without relief and wavefront.
+    """
     tensor = waves is not None and library(waves) is not np and on_host(waves)
     return tensor and carries_derivative(waves) and not carries_derivative(size)
 
 
 def stack_images(size: Array, waves: Array, sums: WindowSums, dtype: str, many: int) -> Array:
-    """Return |U|² over the window, (source, y, x), as a tensor of PyTorch.
+    """Return the intensity |U|² over the window as a tensor of PyTorch, (source, y, x).
 
-    size: factor S, (source, η, ξ), complex.
-    waves: phase w [waves], (η, ξ).
+    The light behind the pupil is S e^{2πi w}. Derivatives with respect to w are supported.
+
+    size: S, the light without the phase of relief and wavefront, times the areas of the samples, complex. Its shape is
+        (source, row of the pupil's samples, column).
+    waves: phase w of relief and wavefront [waves], (row, column).
+    sums: arrays with which `window_field` computes the field U over the window from this light.
     dtype: "float32" or "float64".
-    many: largest number of sources whose sums are computed together, which limits the memory.
+    many: largest number of sources for which U is computed at the same time. It limits the memory.
     """
     return _operation(library(waves)).apply(waves, size.numpy(), sums, dtype, many)
 

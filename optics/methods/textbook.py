@@ -1,8 +1,8 @@
-"""The textbook angular spectrum of a pupil's field in plain NumPy: the integral that all other methods compute.
+"""Propagation of a pupil's field by the angular spectrum as in a textbook, in plain NumPy.
 
-Read this module first. Its method is slow, coarse at the pupil's edge, and correct only if the single grid is fine and
-wide enough. Tests compare the other methods with it. References are to Goodman, Introduction to Fourier Optics, third
-edition.
+Read this module first: all other methods compute the same integral. The method here is slow and coarse at the pupil's
+edge. It uses one grid for the pupil and the plane behind it, and is correct only if this grid is fine and wide enough.
+Tests compare the other methods with it. References are to Goodman, Introduction to Fourier Optics, third edition.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ def positions(samples: int, dx: float) -> tuple[np.ndarray, np.ndarray]:
 def lens_path(x: np.ndarray, y: np.ndarray, focal_length: float) -> np.ndarray:
     """Return the optical path [m] through an ideal lens.
 
-    The lens makes all paths to the focus equally long: its path is shorter at (x, y) by the amount by which the
-    distance from (x, y) to the focus is longer. For a small pupil, it is -r²/2f relative to the centre (Goodman, eq.
-    5-10).
+    The lens makes all optical paths to the focus equally long. The distance to the focus is longer from (x, y) than
+    from the centre of the lens, so the path through the lens is shorter at (x, y) than at the centre by the same
+    amount. The path is 0 at the centre. For a small pupil, it is about -r²/2f, where r is the distance from the axis
+    and f the focal length (Goodman, eq. 5-10).
     """
     return focal_length - np.sqrt(x**2 + y**2 + focal_length**2)
 

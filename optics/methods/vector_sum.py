@@ -35,7 +35,8 @@ DIGITS = 8.0  # choice: digits of the quadrature and of the sum
 class VectorSum:
     """Light that passes a pupil and arrives at samples around an image position c, window.centre.
 
-    aplanatic: True if the ray from ξ arrives at c with the sine ξ/z, and all rays arrive in phase.
+    aplanatic: True if all rays arrive at c in phase, and the sine of a ray's angle to the axis is |ξ|/z. ξ is the point
+        of the pupil where the ray starts, relative to the centre, and z is the distance of the window from the pupil.
     """
 
     beam: Beam
@@ -98,7 +99,11 @@ class VectorSum:
         return pupil.radius * turning / beam.wavelength + detail + poles
 
     def _pupil(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return points x, y [m] of the pupil, and the complex amplitudes of their plane waves at the image."""
+        """Return positions x, y [m] of points of the pupil, and a complex amplitude for each point.
+
+        Near the image position, the light from a point is approximated by a plane wave. The amplitude is that of this
+        plane wave at the image position, times the quadrature weight of the point.
+        """
         beam, pupil, types = self.beam, self.beam.pupil, precision("float64")
         k, z, radius = 2 * math.pi * beam.index / beam.wavelength, number(beam.distance), pupil.radius
         nodes = cached_nodes(pupil.aperture, self._cycles, DIGITS)

@@ -1,4 +1,9 @@
-"""Frequencies of the light and of the soft edges of several pupils, for `window_edges`."""
+"""Bands of spatial frequencies of the light in pupils, by which edges are softened and samples are counted.
+
+The light of a ray has a frequency in the pupil's plane: the number of cycles of its phase per radius of the pupil. The
+edge of the pupil diffracts the light of a ray to a band of frequencies around the frequency of the ray. From these
+bands, `window_edges` chooses how gradually the transmittance falls at the edge, and how many samples a pupil needs.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +18,15 @@ EDGES = 4  # choice: number of sharpnesses of the edge per octave; equal ones sh
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Frequencies in cycles per radius, (beam,).
+    """Spatial frequencies of light [cycles per radius], which determine the samples and the soft edge of each pupil.
 
-    density: frequencies that the samples must resolve.
-    passband: passband of the soft edge.
-    around: distance between the frequencies of the edge and those of the light that it sends into the window.
+    The shape of all arrays is (beam,).
+
+    density: numbers of samples per radius of the pupil. The light that is computed from the samples repeats after
+        this number of cycles per radius.
+    passband: frequencies up to which softening the edge does not change the spectrum of the aperture.
+    around: largest changes of frequency by diffraction at the edge. The edge diffracts a ray of one frequency to a band
+        of frequencies around it. Changes to frequencies of light that misses the window do not matter.
     """
 
     density: np.ndarray
@@ -30,21 +39,25 @@ class Bands:
         return Bands(*(np.where(chosen, own, their) for own, their in pairs))
 
     def stepped(self, chosen: np.ndarray) -> Bands:
-        """Return these bands, with the densities of the chosen beams rounded up to a few values per octave.
+        """Return these bands, with the attribute `density` of the chosen beams rounded up to the steps of `in_steps`.
 
-        Pupils with similar light then have equal densities and share all arrays. The passband grows with the density.
+        There are only a few steps, so pupils with similar light get equal numbers of samples per radius, and can share
+        the arrays for their samples. The passband grows by the same factor as the density.
         """
         density = in_steps(self.density)
         return Bands(density, self.passband * (density / self.density), self.around).where(chosen, self)
 
 
 def in_steps(values: np.ndarray, count: int = EDGES) -> np.ndarray:
-    """Return values rounded up to a few per octave; count: their number."""
+    """Return values rounded up to the next of the numbers 2^(k/count), where k is an integer.
+
+    count: number of these values per octave, that is, from a number to its double.
+    """
     return np.asarray(2.0 ** (np.ceil(count * np.log2(values) - 1e-9) / count))
 
 
 def medians(values: np.ndarray) -> np.ndarray:
-    """Return the medians of rows; `np.median` takes several times as long."""
+    """Return the median of each row of a matrix. The function `np.median` takes several times as long."""
     last = values.shape[1] // 2
     first = (values.shape[1] - 1) // 2
     ordered = np.partition(values, sorted({first, last}), axis=1)

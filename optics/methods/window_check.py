@@ -3,9 +3,13 @@
 The check compares the PSF with a sum over other samples, in a few rows and columns of the window. The other samples are
 finer, and the soft edge of their aperture is sharper. Their grid is shifted by a fraction of the pitch that is not a
 simple ratio. The comparison therefore shows the errors due to aliased light, to detail between the samples, and to the
-soft edge. It also shows the error of interpolating the slow factor over the window, because the check interpolates it
-over the pupil instead. Both sums use the slow factor, so the check also compares this factor with the diffraction
-kernel itself. The error of the check's own sum is at most half of the error that the check finds.
+soft edge.
+
+The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The PSF is computed by
+interpolation of this factor over the window, and the check interpolates the factor over the pupil instead. The
+comparison therefore also shows the error of the interpolation over the window. Both sums use the slow factor, so the
+check also compares this factor with the diffraction kernel itself. The interpolation over the pupil has an error, too.
+Its number of points is chosen for an error below half the tolerance, and a larger error is added to the estimate.
 """
 
 from __future__ import annotations
@@ -41,12 +45,14 @@ ORDERS, PHASES = (2, 3, 4, 5, 7, 9, 12, 16), (0.02, 0.3, 0.8, 1.2, 1.8, 3.0, 6.0
 def window_errors(samples: SineStack, path: Path, field: Array, crossings: WindowCrossings, tolerance: float) -> Array:
     """Return the relative L2 errors of intensities over a window, estimated at crossings of rows and columns, (stack,).
 
-    The result is NaN for a window without light. Its library and device are those of the field.
+    The intensities at the crossings are compared with those from a second sum over other, finer samples of the pupils.
+    The result is NaN for a window without light. It is an array of NumPy or PyTorch like `field`, on the same device.
 
-    samples: samples of the pupils for the comparison. They and the path may have a first axis of length 1.
-    field: contribution of each of these samples to the middle of the window, see `SineStack.arriving`, (stack, y, x),
-        an array of NumPy or PyTorch.
-    crossings: intensities at the crossings.
+    samples: the finer samples. If they are the same for all PSFs, the first axis of their arrays has the length 1.
+    path: wavelengths, distances and window.
+    field: contribution of each of the finer samples to the field at the middle of the window, (stack, y, x), an array
+        of NumPy or PyTorch; see `SineStack.arriving`.
+    crossings: the rows and columns, and the intensities to be checked where they cross.
     tolerance: tolerance of the PSFs.
     """
     own, dtype = library(field), str(field.real.dtype).removeprefix("torch.")
@@ -66,17 +72,23 @@ def window_errors(samples: SineStack, path: Path, field: Array, crossings: Windo
 
 @dataclass(frozen=True, eq=False)
 class _CheckSums:
-    """Sums over samples of pupils in rows and columns of a window. Parts independent of the light are cached.
+    """Sums over samples of pupils that yield the field U at points of a window, the crossings of some rows and columns.
 
-    The slow factor, divided by its values A along both axes, is interpolated from a few points (ξ_a, η_b) of the pupil
-    with weights L_a and L_b:
+    Parts that do not depend on the light are cached. The slow factor is the factor by which the diffraction kernel
+    differs from a Fourier kernel, divided by its value at the middle of the window. A_u and A_v are the values of the
+    slow factor along the axes x and y of the window. The quotient G of the slow factor and A_u A_v is interpolated from
+    a few points (ξ_a, η_b) of the pupil with the weights L_a and L_b:
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v) Σ_ηξ L_b A_v e^{-ik v t} P L_a A_u e^{-ik u s}.
 
-    G is this quotient, P the contribution of a sample with the sines (s, t), and k the wave number.
+    P is the contribution of a sample of the pupil to the field at the middle of the window. (s, t) are the x and y
+    components of the unit vector from this middle to the sample, minus those of the unit vector to the pupil's centre.
+    (u, v) is a position relative to the middle of the window, and k the wave number.
 
+    samples: samples of the pupils.
+    path: wavelengths, distances and window.
     dtype: type of real and imaginary parts, "float32" or "float64".
-    most: error of the interpolation at which the search for the number of points ends.
+    most: error of the interpolation below which the number of interpolation points is sufficient.
     """
 
     samples: SineStack
@@ -85,9 +97,11 @@ class _CheckSums:
     most: float
 
     def intensity(self, field: Array, rows: np.ndarray, columns: np.ndarray) -> Array:
-        """Return |U|² at crossings of rows (stack, row) and columns (stack, column), (stack, row, column).
+        """Return the intensity |U|² where rows and columns of the window cross, (stack, row, column).
 
-        field: contribution of each sample to the middle of the window, (stack, y, x). Its library computes the sums.
+        field: contribution of each sample of the pupil to the middle of the window, (stack, y, x). The result is an
+            array of the same library, NumPy or PyTorch.
+        rows, columns: indices of the rows (stack, row) and of the columns (stack, column).
         """
         count = len(self._weight)
         across, down = (
@@ -101,15 +115,26 @@ class _CheckSums:
 
     @property
     def apart(self) -> np.ndarray:
-        """Largest error of the interpolated factor, in the corners of the window, (stack,); see `_interpolation`."""
+        """Largest interpolation error of G, a slowly varying factor of the diffraction kernel (see `_CheckSums`).
+
+        G is interpolated over the pupil. The error is evaluated in the corners of the window (see `_interpolation`).
+        The shape is (stack,).
+        """
         return self._interpolation[1]
 
     @cached_property
     def _interpolation(self) -> tuple[np.ndarray, np.ndarray, RemainingFactor]:
-        """Sines of interpolation points, (pupil, a), errors (see `apart`), and the factor at all pairs of sines.
+        """Interpolation points in the pupil, errors of the interpolation, and values of the interpolated factor G.
 
-        The interpolated factor is compared with that of the kernel itself in the middle and at the rim of the pupil.
-        The search starts with a number of points that is usually sufficient for the phase there.
+        G is a slowly varying factor of the diffraction kernel (see `_CheckSums`). The first result contains the
+        sines of the interpolation points along an axis, (pupil, point). A sine is a component of the unit vector from
+        the window's centre to a point, minus that for the pupil's centre. The second result contains the errors of the
+        interpolation, see `apart`. The third is G for all pairs of these sines, as a `RemainingFactor`.
+
+        Increasing numbers of points are tried. For each, the interpolated G is compared with the value that follows
+        from the diffraction kernel itself, for rays from the middle and from the rim of the pupil to the corners of the
+        window. The number that is tried first depends on the largest phase of G on these rays, and is usually
+        sufficient.
         """
         samples, (left, top) = self.samples, ([0, 1, 0, 1], [0, 0, 1, 1])
         angle, radius = 2 * np.pi * np.arange(12) / 12, samples.outermost[:, None] * np.array([0, *[1] * 12])
@@ -140,14 +165,21 @@ class _CheckSums:
 
     @cached_property
     def _weight(self) -> np.ndarray:
-        """Weights L_a of the interpolation points at the samples, (a, sample).
+        """Weights that interpolate a function along an axis of the pupil, (interpolation point, sample).
 
-        The points and the samples of all pupils are alike, apart from their scale.
+        The value at a sample is the sum over the interpolation points of weight times value. The weights are the same
+        for all pupils, because their interpolation points and samples differ only in scale.
         """
         return lagrange_basis(self.samples.at[0], self._interpolation[0][0]).astype(self.dtype)
 
     def _rows(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the kernels A e^{-ik u s} for columns and rows of the window, (stack, place, sample)."""
+        """Return the diffraction kernels along x, for columns of the window, and along y, for rows.
+
+        They are the kernels A_u e^{-ik u s} and A_v e^{-ik v t} of `_CheckSums`. The shape of each is
+        (stack, column or row, sample).
+
+        columns, rows: indices, (stack, column) and (stack, row).
+        """
         across, down = self._kernels
         if across is not down:
             return across.at(columns), down.at(rows)
@@ -156,7 +188,10 @@ class _CheckSums:
 
     @cached_property
     def _kernels(self) -> tuple[AxisRows, AxisRows]:
-        """Kernels along x and y, which are the same if the window is square and its centre has equal x and y."""
+        """Diffraction kernels along x and along y, whose rows are computed when they are needed.
+
+        Both are the same if the window is square and its centre has equal x and y.
+        """
         (height, width), (x, y) = self.path.window.shape, self.path.window.centre
         across = AxisRows(self.path, self.samples, 0, self.dtype)
         same = height == width and x == y
@@ -164,9 +199,12 @@ class _CheckSums:
 
     @cached_property
     def _along(self) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes and phases [waves] of the factors along x and y in all columns and rows, for a single pupil.
+        """Values of the slow factor along the axes of the window: A_u in all columns and A_v in all rows.
 
-        The shapes are (part, 1, a, 1, column) and (part, b, 1, 1, row).
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel (see `_CheckSums`).
+        The values are for the interpolation points of a single pupil. The first axis of both arrays distinguishes the
+        amplitude (0) and the phase [waves] (1). The shapes are (part, 1, interpolation point along x, 1, column) and
+        (part, interpolation point along y, 1, 1, row).
         """
         factor, (u, v) = self._interpolation[2], self._places
         across = factor.along[0].at(factor.rounded(u[None, None, None, None, :]))
@@ -174,7 +212,13 @@ class _CheckSums:
         return np.stack(across)[:, 0], np.stack(down)[:, 0].swapaxes(-1, -2)
 
     def _ratio(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return the factor G between the interpolation points and crossings of the window, (stack, b, a, v, u)."""
+        """Return G for light from the interpolation points of the pupil to the crossings of rows and columns.
+
+        G is a slowly varying factor of the diffraction kernel (see `_CheckSums`). The shape is
+        (stack, interpolation point along y, interpolation point along x, row, column).
+
+        rows, columns: indices of rows and columns of the window, (stack, row) and (stack, column).
+        """
         factor, (x, y) = self._interpolation[2], self._places
         u, v = factor.rounded(x[columns][:, None, None, None, :]), factor.rounded(y[rows][:, None, None, :, None])
         if len(self.samples.at) > 1:
@@ -190,7 +234,16 @@ def _remaining(
     directions: tuple[np.ndarray, np.ndarray],
     place: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Return the factor of `RemainingFactor`, but computed from the diffraction kernel itself."""
+    """Return the quotient of the diffraction kernel and factors that are computed elsewhere, as a complex array.
+
+    The factors are the kernel's value at the middle of the window, the Fourier kernel, and two axis factors. The slow
+    factor is the factor by which the kernel differs from a Fourier kernel. The axis factors are its values on the x and
+    y axes of the window. `RemainingFactor` computes the same quotient from a formula for the slow factor.
+
+    directions: x and y components (s, t) of the difference of two unit vectors, which point from the window's centre to
+        a point of a pupil and to the pupil's centre.
+    place: positions (u, v) [m] relative to the middle of the window. All arrays are broadcast.
+    """
     (s, t), (u, v) = directions, place
     wavelength, distance = path.numbers(s.ndim)
     x, y = path.window.centre

@@ -1,9 +1,10 @@
 """Crossings of a few rows and columns, where `window_check` computes a PSF once more.
 
-Rows are drawn at even steps of their cumulative probability. The probability is a mixture of four distributions. The
-first is uniform. The second is proportional to the square root of the intensity, like the error of the intensity if the
-error of the amplitude is the same everywhere. The third favours the brightest samples and their neighbours, and the
-last the sides of the window, where phases change fastest.
+Each row has a probability. It is added up from row to row, and a row is chosen wherever the sum reaches the next of
+evenly spaced levels. Columns are chosen in the same way. The probability is a mixture of four distributions. The first
+is uniform. The second is proportional to the square root of the intensity. The error of the intensity is proportional
+to this root, too, if the error of the amplitude is the same everywhere. The third favours the brightest samples and
+their neighbours. The last favours the sides of the window, where phases change fastest.
 """
 
 from __future__ import annotations
@@ -23,11 +24,13 @@ SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities of rows a
 
 @dataclass(frozen=True, eq=False)
 class WindowCrossings:
-    """Crossings of rows and columns of PSFs. The first axis of all arrays counts the PSFs.
+    """Samples of PSFs that are checked: the crossings of a few rows and columns of each PSF.
+
+    The first axis of all arrays, `stack`, counts the PSFs.
 
     rows, columns: indices, (stack, row) and (stack, column).
-    images: |U|² at the crossings, (stack, row, column), in the library and on the device of the PSFs.
-    chance: probability with which each crossing is drawn, (stack, row, column).
+    images: |U|² at the crossings, (stack, row, column), an array of NumPy or PyTorch like the PSFs, on the same device.
+    chance: probability of each crossing, the product of those of its row and column, (stack, row, column).
     total: sum of |U|⁴ over the window, (stack,).
     """
 
@@ -39,9 +42,11 @@ class WindowCrossings:
 
     @classmethod
     def from_images(cls, images: Array) -> WindowCrossings:
-        """Return crossings for PSFs |U|², (stack, y, x), an array of NumPy or PyTorch.
+        """Return a few rows and columns of PSFs, chosen by their intensities, with the intensities at the crossings.
 
-        Only the indices are copied from another device to the processor.
+        If the PSFs are on another device, only the indices of rows and columns are copied to the processor.
+
+        images: PSFs |U|², (stack, y, x), an array of NumPy or PyTorch.
         """
         own, (count, height, width) = library(images), images.shape
         total = own.square(to_double(images)).reshape(count, -1).sum(1)
@@ -63,14 +68,20 @@ class WindowCrossings:
         return cls(*found, drawn, down[:, :, None] * across[:, None, :], total)
 
     def part(self, some: slice) -> WindowCrossings:
-        """Return the crossings of some PSFs."""
+        """Return the same data for some of the PSFs only.
+
+        some: their places along the first axis.
+        """
         return WindowCrossings(*(getattr(self, one.name)[some] for one in fields(self)))
 
 
 def _along_axis(root: Array, bright: Array) -> tuple[Array, Array]:
-    """Return the indices of a few rows, or columns, and the probability with which each is drawn, (stack, row).
+    """Return the indices of a few rows of each PSF, chosen by probability, and their probabilities, (stack, row) each.
 
-    root, bright: sums over each row of the square root of the intensity, and of its square, (stack, row).
+    Columns are chosen in the same way, from their sums instead of those of rows.
+
+    root: sum of the square root of the intensity over each row, (stack, row).
+    bright: sum of the squared intensity over each row, (stack, row).
     """
     own, root, bright = library(root), to_double(root), to_double(bright)
     size = root.shape[1]
@@ -91,5 +102,5 @@ def _along_axis(root: Array, bright: Array) -> tuple[Array, Array]:
 
 
 def _beams(places: Array) -> Array:
-    """Return the index of each entry along the first axis, (stack, 1)."""
+    """Return the indices 0, 1, 2, ... of the PSFs, which lie along the first axis of `places`, array (stack, 1)."""
     return library(places).ones_like(places[:, :1]).cumsum(0) - 1

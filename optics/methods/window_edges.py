@@ -1,13 +1,14 @@
-"""Soft edges for samples of several pupils at coarse tolerances, and the numbers of samples that they need.
+"""Soft edges of several pupils at coarse tolerances, and the numbers of samples that pupils with these edges need.
 
-Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be at least half
-the width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
-diffracted at the edge of the pupil spreads further. A soft edge keeps this light out of the window. Softening the edge
-changes light only far from the geometrical rays of the edge, where there is little light.
+The sine of a sample is that of its direction as seen from the window. Samples are evenly spaced in their sines. If the
+spacing is Δs, the computed light repeats in the window's plane with the period λ/Δs. The period must be at least half
+the width of the window plus the radius of the circle around its middle in which nearly all light arrives. Light that
+the edge of the pupil diffracts spreads further. A soft edge keeps it out of the window. Softening changes light only
+far from the places where geometrical rays through the edge arrive. There is little light so far away.
 
-If most light of a strongly curved wave misses the window, and the aperture is a disk or a ring, the wave itself can be
-smoothed with the edge (`curved_disk`). This removes light in directions far from the window. The number of samples is
-then almost independent of the directions of the rays at the edge.
+The edge is softened by convolution with a kernel. For a disk or a ring, a strongly curved wave can be convolved with
+this kernel, too (`curved_disk`), if most of its light misses the window. This removes light far from the window.
+The number of samples is then almost independent of the directions of the rays at the edge.
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ class WindowEdges:
     """Soft edges of several pupils for one window.
 
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: additional needs of the PSFs if derivatives are requested, else None.
-    smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
+    derivatives: requested derivatives, which need narrower edges and more samples; None if none are requested.
+    smoothed: True if strongly curved waves may be convolved with the kernel of the edge; ignored with derivatives.
     """
 
     stack: LightStack
@@ -75,28 +76,31 @@ class WindowEdges:
 
     @cached_property
     def curvature(self) -> np.ndarray:
-        """Curvatures of waves that are smoothed with the edge, in cycles per radius at the rim; else 0, (beam,)."""
+        """Curvatures of the waves that are convolved with the kernel of the soft edge, 0 for all other waves, (beam,).
+
+        The curvature is the local frequency of the wave at the rim in cycles per radius.
+        """
         return self._choice[0]
 
     @property
     def density(self) -> np.ndarray:
-        """Numbers of samples per radius, which are also the numbers of cycles per radius that they resolve, (beam,)."""
+        """Numbers of samples per radius. The light repeats after this number of cycles per radius, (beam,)."""
         return self._choice[1].density
 
     @property
     def stepped(self) -> np.ndarray:
-        """True for beams whose densities have steps, (beam,): those whose densities vary most between pupils."""
+        """True for beams whose numbers of samples per radius are rounded up to the steps of `in_steps`, (beam,)."""
         return self.stack.mapped | (self.stack.rim_slopes is not None)
 
     @cached_property
     def edges(self) -> list[SoftAperture]:
-        """Soft apertures of the samples, (beam,)."""
+        """Soft aperture of each pupil, from which its samples are computed, (beam,)."""
         wide = partial(self._wide, self._choice[1].passband, self._ripples(self.curvature)[0])
         return self._unless_mapped(wide, partial(self._narrow, self.density, CARRIED_RIPPLES[0]))
 
     @cached_property
     def finer_edges(self) -> list[SoftAperture]:
-        """Soft apertures for the finer samples of `window_check`, up to SHARPER times as sharp as `edges`, (beam,)."""
+        """Soft apertures like `edges`, but up to SHARPER times as sharp, for finer samples that check PSFs, (beam,)."""
         return self._unless_mapped(self._finer_wide, partial(self._narrow, FINER * self.density, CARRIED_RIPPLES[1]))
 
     def _finer_wide(self) -> list[SoftAperture]:
@@ -107,9 +111,10 @@ class WindowEdges:
     def _unless_mapped(
         self, wide: Callable[[], list[SoftAperture]], narrow: Callable[[], list[SoftAperture]]
     ) -> list[SoftAperture]:
-        """Return wide soft edges, and narrow ones for derivatives and for maps.
+        """Return a soft aperture for each beam, with a narrow or a wide edge.
 
-        The fine detail of maps sends light from the edge in all directions.
+        The edge is narrow if derivatives are requested, or if a relief or wavefront is a map, whose fine detail sends
+        light from the edge in all directions. The functions `wide` and `narrow` compute the apertures of all beams.
         """
         mapped = self.stack.mapped
         if self.derivatives is not None or mapped.all():
@@ -120,7 +125,7 @@ class WindowEdges:
 
     @cached_property
     def _choice(self) -> tuple[np.ndarray, Bands]:
-        """Curvatures of the smoothed waves, and the bands of the light."""
+        """Values of the property `curvature`, and frequency bands for the samples and the soft edges of the pupils."""
         none = np.zeros(len(self.tolerance))
         flat = self._bands(none)
         if not self.smoothed or self.derivatives is not None:
@@ -135,7 +140,11 @@ class WindowEdges:
 
     @cached_property
     def _rim_curvature(self) -> np.ndarray:
-        """Mean cycles per radius of the rays at the rim, away from the axis, rounded to CURVATURE_STEP, (beam,)."""
+        """Curvatures c of the light at the rims of the pupils, relative to waves that converge to the window, (beam,).
+
+        Near the rim, the light resembles such a wave times e^{iπcr²}, with r in pupil radii. c is a frequency at r = 1
+        [cycles per radius], rounded to multiples of CURVATURE_STEP, and positive if the light diverges.
+        """
         slopes, (along_x, along_y) = self.stack.slopes, self._to_middle
         r2 = np.square(slopes.x) + np.square(slopes.y)
         rim = self.geometry.to_middle(slopes.across).rim
@@ -143,7 +152,10 @@ class WindowEdges:
         return np.asarray(np.rint(outward / CURVATURE_STEP) * CURVATURE_STEP)
 
     def _bands(self, curvature: np.ndarray) -> Bands:
-        """Return the bands of waves that are smoothed with these curvatures, (beam,)."""
+        """Return the frequency bands for the samples and the soft edge of each pupil.
+
+        curvature: frequency at the rim if the wave is convolved with the kernel of the soft edge, else 0, (beam,).
+        """
         slopes, bend, cycles, mapped = self.stack.slopes, curvature[:, None], self.geometry.cycles, self.stack.mapped
         along, curved = self._along, bool(curvature.any())
         rest = _unbent(self._to_middle, slopes, curvature) if curved else along
@@ -169,10 +181,10 @@ class WindowEdges:
         return Bands(density, passband, near).stepped(self.stepped)
 
     def _carried(self, rim: np.ndarray, direct: np.ndarray) -> Bands:
-        """Return the bands of light that carries derivatives.
+        """Return the frequency bands [cycles per radius] for PSFs with derivatives. They have sharper edges.
 
-        rim: median cycles per radius of the rays at the edge, (beam,).
-        direct: cycles per radius that other light needs, (beam,).
+        rim: median frequencies of the rays at the edge, (beam,).
+        direct: numbers of samples per radius that would be enough without diffraction at the edge, (beam,).
         """
         # High modes grow outside the circle, so that their derivatives need a sharper edge.
         fronts = [beam.pupil.wavefront for beam in self.stack.beams]
@@ -186,19 +198,19 @@ class WindowEdges:
 
     @property
     def _widest(self) -> np.ndarray:
-        """Least densities of samples at which the narrow edges of the check end within EDGE_REACH, (beam,)."""
+        """Samples per radius below which a narrow soft edge would extend beyond EDGE_REACH, (beam,)."""
         widest = _transition(CARRIED_RIPPLES[1]) / (1 - CARRIED_PASSBAND) * 2.0 ** (1 / EDGES)
         return np.asarray(widest + self.geometry.cycles / 2)
 
     @cached_property
     def _masks(self) -> np.ndarray:
-        """Cycles per radius of the masks, (beam,)."""
+        """Cycles per radius above which masks change amplitudes by less than min(tolerance, 0.1), (beam,)."""
         return self.stack.mask_cycles(np.minimum(self.tolerance, 0.1))
 
     def _reach(self, along: np.ndarray) -> np.ndarray:
-        """Return the cycles per radius up to which nearly all light reaches, (beam,).
+        """Return the frequencies [cycles per radius] that only a negligible part of all rays exceeds, (beam,).
 
-        along: cycles per radius of rays, (beam, ray).
+        along: frequencies of the rays [cycles per radius], (beam, ray).
         """
         share = NEGLECTED * np.minimum(self.tolerance / 0.01, 1.0) ** 2
         last = np.maximum(0, np.ceil(along.shape[1] * (1 - share)).astype(int) - 1)
@@ -207,11 +219,15 @@ class WindowEdges:
 
     @cached_property
     def _along(self) -> np.ndarray:
-        """Cycles per radius of the paths to the middle of the window, the larger of both axes, (beam, ray)."""
+        """Maximum of the absolute frequencies of each ray along x and y [cycles/radius], see `_paths`, (beam, ray)."""
         return np.asarray(np.maximum(*map(np.abs, self._to_middle)))
 
     def _steepest(self, curvature: np.ndarray) -> np.ndarray | float:
-        """Return the cycles per radius of nearly all rays at the rim behind polynomials of high order, (beam,)."""
+        """Return upper bounds [cycles per radius] of the light's frequency at nearly all points of the rim, (beam,).
+
+        They are 0 for maps, and if no relief or wavefront is a polynomial of high order, as these are steepest there.
+        The frequency of a curved wave, `curvature` at the rim, is subtracted before (see `_unbent`).
+        """
         slopes = self.stack.rim_slopes
         if slopes is None:
             return 0.0
@@ -225,12 +241,12 @@ class WindowEdges:
         return self._paths(self.stack.slopes)
 
     def _paths(self, slopes: StackSlopes) -> tuple[np.ndarray, np.ndarray]:
-        """Return cycles per radius of the paths to the middle of the window, along x and along y, (beam, ray)."""
+        """Return frequencies of rays along x and y [cycles/radius], 0 for rays to the window's middle, (beam, ray)."""
         path = self.geometry.to_middle(slopes.across)
         return (slopes.along_x + path.along_x) * path.cycles, (slopes.along_y + path.along_y) * path.cycles
 
     def _ripples(self, curvature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return ripples of the soft edges of samples and of finer samples, (beam,), rounded down to steps."""
+        """Return errors allowed in spectra of soft apertures, of `edges` and of `finer_edges`, (beam,) each."""
         share = self._ripple_share
         if curvature.any():
             share = np.where(curvature != 0, SMOOTHED_RIPPLE, 1.0) * share
@@ -238,7 +254,7 @@ class WindowEdges:
 
     @cached_property
     def _ripple_share(self) -> np.ndarray:
-        """Ripples of soft edges, relative to those at a tolerance of 0.01, (beam,)."""
+        """Ratios of the errors in `_ripples` to those that are allowed at a PSF tolerance of 0.01, (beam,)."""
         share = np.minimum(2.0 ** np.floor(np.log2(self.tolerance / 0.01)), 1.0)
         return np.asarray(share**RIPPLE_EXPONENT)
 
@@ -248,7 +264,7 @@ class WindowEdges:
         return self._soft(passband, passband + _transitions(ripples), ripples)
 
     def _narrow(self, density: np.ndarray, ripple: float) -> list[SoftAperture]:
-        """Return soft apertures that are as narrow as a density of samples allows."""
+        """Return soft apertures with the narrowest edges that samples of this density [1/radius] can represent."""
         stopband = np.maximum(density - self.geometry.cycles / 2, density / 2)
         stopband = 2.0 ** (np.floor(EDGES * np.log2(stopband)) / EDGES)
         return self._soft(CARRIED_PASSBAND * stopband, stopband, np.full(len(stopband), ripple))
@@ -260,15 +276,21 @@ class WindowEdges:
 
 
 def _unbent(paths: tuple[np.ndarray, np.ndarray], slopes: StackSlopes, curvature: np.ndarray) -> np.ndarray:
-    """Return cycles per radius of paths without the curvature of smoothed waves, the larger of both axes."""
+    """Return the frequency of each ray minus the frequency of a curved wave at the same point, (beam, ray).
+
+    Frequencies [cycles per radius] are subtracted along x and along y, and the larger absolute value is returned.
+
+    paths: frequencies of the rays along x and along y.
+    curvature: frequency of the curved wave at the rim, (beam,). It is proportional to the distance from the axis.
+    """
     parts = zip(paths, (slopes.x, slopes.y), strict=True)
     return np.asarray(np.maximum(*(np.abs(part - curvature[:, None] * at) for part, at in parts)))
 
 
 def _transitions(ripples: np.ndarray) -> np.ndarray:
-    """Return the smallest widths of the transition from passband to stopband, in cycles per radius.
+    """Return the smallest allowed differences between passband and stopband of soft apertures [cycles per radius].
 
-    A narrower transition needs a wider soft edge, and the soft edge must not extend beyond EDGE_REACH.
+    A smaller difference needs a wider soft edge, and the soft edge must not extend beyond EDGE_REACH.
     """
     return np.array([_transition(ripple) for ripple in ripples.tolist()])
 

@@ -1,6 +1,7 @@
-"""The part of a plan for a window that depends neither on reliefs, wavefronts and masks nor on the tolerance.
+"""Geometry of pupils and a window, by which `window_plan` chooses samples.
 
-Users often compute many PSFs of one window whose wavefronts differ. The geometry of a single beam is therefore cached.
+The geometry depends neither on reliefs, wavefronts and masks nor on the tolerance. Users often compute many PSFs with
+different wavefronts, but the same beam and window. The geometry of a single beam is therefore cached.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ KEPT = 64  # choice, limited by memory: number of values that are kept for one w
 
 
 class PathSlopes(NamedTuple):
-    """Paths from points of the pupils to the middle of a window.
+    """Gradients of the optical paths from points of the pupils to the middle of a window.
 
-    along_x, along_y: gradients of the paths, (beam, point).
-    cycles: cycles per radius for a gradient of 1, (beam, 1).
+    along_x, along_y: gradients along x and y of the pupil, (beam, point).
+    cycles: frequency of the light for a gradient of 1, in cycles of the phase per radius of the pupil, (beam, 1).
     rim: indices of the points near the rim.
     """
 
@@ -42,15 +43,18 @@ class PathSlopes(NamedTuple):
 
 
 class PlannedRays(NamedTuple):
-    """Points of the pupils whose rays determine how many Chebyshev points interpolate the slow factor (its rank).
+    """Some points of the pupils, with one ray each, from which a plan determines the rank of the slow factor.
 
-    some: their indices in `disk_points`.
-    at: points (x, y) [m] relative to the middle of the window, (beam, ray).
-    scale: displacement [m] of a ray at the window that a slope of 1 of the optical path causes, (beam, ray).
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. Its rank is the number
+    of Chebyshev points per axis of the window that are enough to interpolate it.
+
+    some: indices of the points in `disk_points`.
+    at: positions (x, y) [m] of the points relative to the middle of the window, (beam, ray).
+    scale: distance [m] in the window by which a ray moves if the slope of its optical path grows by 1, (beam, ray).
     blur: distance [m] by which diffraction spreads the light, (beam, 1).
-    directions: sines of the lines from the middle of the window to the points, minus those of the line to the pupil's
-        centre, (beam, ray).
-    sine2: sum of the squares of both sines, (beam, ray).
+    directions: sines along x and y of the lines from the middle of the window to the points, minus those of the line to
+        the pupil's centre, (beam, ray).
+    sine2: sum of the squares of these differences along x and y, (beam, ray).
     """
 
     some: slice
@@ -63,14 +67,20 @@ class PlannedRays(NamedTuple):
 
 @dataclass(frozen=True)
 class WindowGeometry:
-    """A window, and the light without reliefs, wavefronts and masks."""
+    """Geometry of several beams and of their window.
+
+    Reliefs, wavefronts and masks are not part of the geometry. Results that depend only on it are computed once.
+
+    light: radii of the pupils, distances, wavelengths, media, ideal lenses and sources.
+    window: samples of the window.
+    """
 
     light: LightGeometry
     window: Grid
 
     @cached_property
     def half(self) -> float:
-        """Distance [m] from the middle of the window within which interpolation points lie."""
+        """Half the width [m] of a square around the window's middle, in which all interpolation points lie."""
         return half_window(self.window)
 
     @cached_property
@@ -79,12 +89,21 @@ class WindowGeometry:
 
     @cached_property
     def cycles(self) -> np.ndarray:
-        """Cycles per radius of the Fourier kernel at the sides of the window, (beam,)."""
+        """Spatial frequencies of the light that arrives at the sides of the window, (beam,).
+
+        A frequency is the number of cycles of the light's phase per radius of the pupil, in the plane of the pupil. It
+        is 0 for light that arrives at the middle of the window.
+        """
         radius, distance, *_ = self.light.arrays
         return np.asarray(self.half * radius / (self.light.wavelength * distance))
 
     def to_middle(self, across: int) -> PathSlopes:
-        """Return the paths from `disk_points` to the middle of the window."""
+        """Return the gradients of the optical paths from points of the pupils to the middle of the window.
+
+        The gradients are derivatives with respect to the position of the point in the pupil.
+
+        across: number of points across the pupil, see `disk_points`.
+        """
 
         def computed() -> PathSlopes:
             (x, y), length = self._apart(across, slice(None))
@@ -96,7 +115,12 @@ class WindowGeometry:
         return found
 
     def rays(self, across: int) -> PlannedRays:
-        """Return some of the `disk_points`, which are spread evenly over the disks."""
+        """Return some points of each pupil, with the data of the rays that start there.
+
+        They are every n-th point of a square grid in the pupil (see `disk_points`), about 100 to 200 points.
+
+        across: number of points of this grid along a diameter of the pupil.
+        """
 
         def computed() -> PlannedRays:
             some = slice(None, None, max(1, len(disk_points(across)[1]) // RAYS))
@@ -119,7 +143,10 @@ class WindowGeometry:
         return (x, y), np.sqrt(x * x + y * y + np.square(distance))
 
     def rims(self, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the `rim_sines` of soft edges that extend by `reach` radii beyond the rim, (beam,)."""
+        """Return three properties of the outer ends of soft edges, as seen from the window; see `rim_sines`.
+
+        reach: distances in pupil radii by which the soft edges extend beyond the rims, (beam,).
+        """
         radius, distance, *_ = self.light.arrays
         found: tuple[np.ndarray, np.ndarray, np.ndarray] = self.known.get(
             ("rims", reach.tobytes()), lambda: rim_sines((1 + reach) * radius, self.window.centre, distance)
@@ -127,7 +154,14 @@ class WindowGeometry:
         return found
 
     def ray_factor(self, across: int, steepest: np.ndarray, elsewhere: np.ndarray) -> RemainingFactor:
-        """Return the remaining factor for `rays`. Further arguments: see `SineGeometry`."""
+        """Return the slow factor divided by its values on the x axis and by those on the y axis of the window.
+
+        The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. It depends on the
+        point of the pupil where light starts. The points are those that the method `rays` returns.
+
+        across: number of points across the pupil, see `disk_points`.
+        steepest, elsewhere: see `SineGeometry`.
+        """
 
         def computed() -> RemainingFactor:
             geometry = SineGeometry(self.light.arrays[1], self.window.centre, steepest, elsewhere)
@@ -139,17 +173,22 @@ class WindowGeometry:
 
     @cached_property
     def known(self) -> KeptValues:
-        """Cached values that depend on the geometry and on their key."""
+        """Cached results of methods. The key of a result holds the arguments of the method."""
         return KeptValues(KEPT)
 
 
 def half_window(window: Grid) -> float:
-    """Return the distance [m] from the middle of a window within which interpolation points lie."""
+    """Return half the width [m] of a square around a window's middle, in which all interpolation points lie."""
     return max(window.own_half_width, window.dx)
 
 
 def window_geometry(stack: LightStack, window: Grid) -> WindowGeometry:
-    """Return the geometry of light and a window. The geometry of a single beam is cached."""
+    """Return the quantities that depend on sources, ideal lenses, media, distances and the window only.
+
+    Reliefs, wavefronts and masks do not change them. The result for a single beam is cached.
+
+    stack: light of the beams.
+    """
     light = stack.geometry
     return _kept(light, window) if len(stack.beams) == 1 else WindowGeometry(light, window)
 

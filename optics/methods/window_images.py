@@ -1,4 +1,7 @@
-"""PSFs of several pupils over one window at coarse tolerances, as stacked matrix products, and their errors."""
+"""PSFs of several pupils over one window, computed together as matrix products, and estimated errors of the PSFs.
+
+The method is used for PSFs with coarse tolerances.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +27,15 @@ __all__ = ["window_image_errors", "window_images"]
 def window_images(
     stack: LightStack, samples: SineStack, rank: int, crossed: bool, window: Grid, dtype: str
 ) -> np.ndarray:
-    """Return |U|² over the window for unit amplitude at the pupils, (beam, y, x).
+    """Return the intensities |U|² over the window for unit amplitude at the pupils, as an array (beam, y, x).
 
-    samples: samples of the pupils, one for each beam or one for all.
-    rank: rank of the slow factor over the window.
-    crossed: True to include `cross_term`, which replaces interpolation of the slow factor.
+    U is a sum over the samples of a pupil. The diffraction kernel of the sum is a Fourier kernel times a factor that
+    varies slowly over the window, the slow factor.
+
+    samples: grids of samples, one for each beam's pupil, or one for all pupils.
+    rank: number of interpolation points along each axis of the window, from which the slow factor is interpolated.
+    crossed: True to approximate the slow factor without interpolation. It is then the product of its values along both
+        axes of the window, corrected by `cross_term`. This requires rank 1.
     dtype: "float32" or "float64".
     """
     path = Path(stack.wavelength, stack.distance, window)
@@ -53,7 +60,9 @@ def window_image_errors(
 ) -> np.ndarray:
     """Return the relative L2 errors of the results of `window_images`, (beam,), see `window_errors`.
 
-    finer: samples of the check, see `WindowPlan.samples`.
+    The images are compared with sums over finer samples of the pupils, in a few rows and columns of the window.
+
+    finer: these finer samples, the second result of `WindowPlan.samples`.
     images: result of `window_images`, (beam, y, x).
     """
     path = Path(stack.wavelength, stack.distance, window)
@@ -62,10 +71,13 @@ def window_image_errors(
 
 
 def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dtype: str) -> list[tuple[Any, Any]]:
-    """Return pairs of matrices (`_along`) for rows and columns, which PSFs with the same samples share.
+    """Return pairs of matrices: diffraction kernels (see `_along`) for rows and for columns of the window.
 
-    With `cross_term`, there is a second pair. Mirrored matrices remain two pairs. Plain matrices are joined to one
-    pair, (pupil, y, 2 · sample) and (pupil, 2 · x, sample), because a large product takes less time.
+    PSFs with the same samples share the matrices. Without `crossed`, there is one pair. If `crossed` is True, there are
+    two pairs, the second one for `cross_term`. Each pair yields a field over the window, and the sum of both fields is
+    the field of the PSF. If the matrices are mirrored (`MirroredMatrix`), the list holds two pairs. Else the two are
+    joined to one larger pair, because one large product takes less time than two. The larger pair has the shapes
+    (pupil, y, 2 · sample) and (pupil, 2 · x, sample).
     """
     window = path.window
 
@@ -90,7 +102,12 @@ def _terms(path: Path, samples: SineStack, nodes: np.ndarray, crossed: bool, dty
 
 
 def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: str) -> np.ndarray:
-    """Return the kernel along x (0) or y (1) times interpolation weights of the nodes, (pupil, place, a · sample)."""
+    """Return the diffraction kernel along x (`axis` 0) or y (1), multiplied by interpolation weights, complex.
+
+    The kernel depends on the position in the window (place) and on the sample of the pupil. Between the nodes, which
+    are points of the window, values are interpolated. The weight of a node is its Lagrange polynomial at the place. The
+    last axis counts all pairs of a node and a sample, so the shape is (pupil, place, node · sample).
+    """
     kernel = window_kernel(path, samples, axis, dtype)
     if len(nodes) == 1:
         return kernel
@@ -101,9 +118,12 @@ def _along(path: Path, samples: SineStack, axis: int, nodes: np.ndarray, dtype: 
 
 
 def _node_factors(path: Path, samples: SineStack, nodes: np.ndarray, dtype: str) -> np.ndarray:
-    """Return the slow factor at nodes of the window, divided by its values along both axes and in the middle.
+    """Return a slowly varying factor of the diffraction kernel at nodes (points) of the window.
 
-    The shape is (pupil, b, a, η, ξ).
+    The slow factor is the quotient of the diffraction kernel and a Fourier kernel, divided by the value of this
+    quotient at the middle of the window. The result is the slow factor at a node, divided by the values of the slow
+    factor on the x axis and on the y axis of the window (see `RemainingFactor`). It differs from 1 only off these axes.
+    The shape is (pupil, node along y, node along x, row of samples, column of samples).
     """
     s, t = samples.at[:, None, None, None, :], samples.at[:, None, None, :, None]
     u, v = nodes[None, None, :, None, None], nodes[None, :, None, None, None]

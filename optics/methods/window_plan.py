@@ -1,4 +1,7 @@
-"""Samples of several pupils at coarse tolerances: as few as the light in the window needs (`window_edges`)."""
+"""Choice of the samples of several pupils, for PSFs with coarse tolerances.
+
+There are only the samples that are necessary for the light that arrives in the window (see `window_edges`).
+"""
 
 from __future__ import annotations
 
@@ -32,11 +35,13 @@ MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of th
 
 @dataclass(frozen=True, eq=False)
 class WindowPlan:
-    """Samples of several pupils for one window.
+    """Choice of the samples of several pupils. The PSFs over one window are computed by sums over these samples.
 
+    stack: light of the beams, each with its pupil.
     tolerance: tolerances of the PSFs, (beam,).
-    derivatives: additional needs of the PSFs if derivatives are requested, else None.
-    smoothed: True if strongly curved waves may be smoothed. This is impossible with derivatives.
+    derivatives: kinds of derivatives that are requested, which need more samples; None if none are.
+    smoothed: True if strongly curved waves may be smoothed at the edge of the pupil, which takes fewer samples. This is
+        impossible with derivatives.
     """
 
     stack: LightStack
@@ -47,7 +52,10 @@ class WindowPlan:
 
     @cached_property
     def geometry(self) -> WindowGeometry:
-        """The window, and the light without reliefs, wavefronts and masks."""
+        """The window, and what determines the light apart from reliefs, wavefronts and masks.
+
+        These are radii, distances, wavelengths, refractive indices, ideal lenses and sources.
+        """
         return window_geometry(self.stack, self.window)
 
     @cached_property
@@ -57,9 +65,10 @@ class WindowPlan:
 
     @cached_property
     def counts(self) -> np.ndarray:
-        """Numbers n of samples between the middle and either end, (beam,); 0 if the method is not suitable.
+        """Numbers n of samples of each pupil from its middle to its rim, along x and along y, (beam,).
 
-        A pupil has 2n + 1 samples along either axis.
+        A pupil has 2n + 1 samples along either axis. The number is 0 for pupils that cannot be sampled in this way,
+        because rays are too oblique, or because too many samples or interpolation points would be necessary.
         """
         suitable, across = self._rims[2] & self._finer_rims[2], self._rims[0]
         needed = np.where(suitable, across / self._pitch(self.edges.density), 0)
@@ -75,17 +84,30 @@ class WindowPlan:
 
     @staticmethod
     def finer_count(count: np.ndarray) -> np.ndarray:
-        """Return how many samples the finer set for `window_check` has between the middle and either end."""
+        """Return the number n of finer samples from a pupil's middle to its rim, with which `window_check` checks PSFs.
+
+        A pupil has 2n + 1 finer samples along either axis.
+
+        count: number of the PSF's own samples from the middle to the rim, see `counts`.
+        """
         return np.ceil(FINER * count + SHIFT).astype(int)
 
     @property
     def ranks(self) -> np.ndarray:
-        """Ranks of the slow factor over the window, (beam,); 0 if the method is not suitable."""
+        """Numbers of points along an axis of the window between which the slow factor is interpolated, (beam,).
+
+        The slow factor is the quotient of the diffraction kernel and a Fourier kernel. The number is 0 if more than
+        MOST_RANK points would be necessary.
+        """
         return self._ranks[0]
 
     @property
     def crossed(self) -> np.ndarray:
-        """True for sums that include `cross_term`, (beam,)."""
+        """True for beams whose slow factor is approximated with `cross_term` instead of interpolation, (beam,).
+
+        The slow factor is the quotient of the diffraction kernel and a Fourier kernel. It is approximated by the
+        product of its values on the x and y axes of the window, times a correction from `cross_term`.
+        """
         return self._ranks[1]
 
     @cached_property
@@ -94,7 +116,12 @@ class WindowPlan:
 
     @cached_property
     def elsewhere(self) -> np.ndarray:
-        """Sines for `SineGeometry`, rounded to 1/ELSEWHERE of the largest, so that PSFs can share arrays, (beam,)."""
+        """Typical sines of the points of the pupils as seen from the window, minus those of the centres, (beam,).
+
+        The diffraction kernel along one axis is computed for points with this sine along the other axis (see
+        `SineGeometry`). The sines are values of `WindowRays.mean_sine`, rounded to multiples of a step, so that similar
+        PSFs can share arrays. The step is 1/ELSEWHERE of the largest sine at the rim.
+        """
         step = np.minimum(self._rims[1], 1.0) / ELSEWHERE
         return np.asarray(np.rint(self._rays.mean_sine / step) * step)
 
@@ -105,9 +132,11 @@ class WindowPlan:
         return window_ranks(self.geometry, factor, self._rays, self.tolerance, self.derivatives)
 
     def samples(self, places: np.ndarray) -> tuple[SineStack, SineStack]:
-        """Return the samples of some pupils, which have the same count, and the finer samples of the check.
+        """Return the samples of the pupils of chosen beams, and finer samples of the same pupils.
 
-        places: indices of the beams.
+        `window_check` estimates the errors of the PSFs from sums over the finer samples.
+
+        places: indices of the chosen beams. All these beams must have the same number of samples (`counts`).
         """
         count = int(self.counts[places[0]])
         sets = (count, 0.0, self._rims, self.edges.edges), (
@@ -123,12 +152,12 @@ class WindowPlan:
 
     @cached_property
     def seconds(self) -> np.ndarray:
-        """Predicted times of single PSFs [s], (beam,)."""
+        """Predicted computing times [s] of the PSFs of the beams, each computed alone, (beam,)."""
         return self._costs[0]
 
     @cached_property
     def bytes(self) -> np.ndarray:
-        """Predicted memory of single PSFs, (beam,)."""
+        """Predicted memory [bytes] for computing the PSFs of the beams, each computed alone, (beam,)."""
         return self._costs[1]
 
     @cached_property
@@ -137,10 +166,12 @@ class WindowPlan:
         return plan_costs(self.window, self.ranks, across, finer, self.crossed)
 
     def _pitch(self, density: np.ndarray) -> np.ndarray:
-        """Return the largest spacing of sines at which a pupil has at least `density` samples per radius everywhere.
+        """Return the largest spacing at which a pupil has at least `density` samples per radius everywhere, (beam,).
 
-        The distance of two points in the pupil is at most z/cos³θ times the distance of their sines, where z is the
-        distance of the window, and θ the angle of the steepest ray.
+        The sines of a point of the pupil are the x and y components of the unit vector from the middle of the window to
+        the point. Samples are evenly spaced in their sines, and the result is a difference of sines. The distance of
+        two points is at most z/cos³θ times the difference of their sines. z is the distance of the window, and θ the
+        angle of the steepest ray.
         """
         steepest = np.minimum(self._rims[1], 1 - 1e-12)
         found: np.ndarray = self.stack.radius * (1 - np.square(steepest)) ** 1.5 / (self.stack.distance * density)
@@ -161,8 +192,12 @@ class WindowPlan:
 def plan_costs(window: Grid, rank: Any, across: Any, finer: Any, crossed: Any = False) -> tuple[Any, Any]:
     """Return the predicted time [s] and memory [bytes] of a PSF; the arguments are numbers or arrays (beam,).
 
-    across, finer: numbers of samples along an axis of the pupil, and of those for the check.
-    crossed: whether the sum includes `cross_term`.
+    rank: number of interpolation points along each axis of the window, from which the slow factor is interpolated. The
+        slow factor is the factor by which the diffraction kernel differs from a Fourier kernel.
+    across: number of samples along an axis of the pupil.
+    finer: number of samples along an axis of a second, finer grid, with which `window_check` estimates the PSF's error.
+    crossed: True if the slow factor is not interpolated, but approximated with a correction by `cross_term`. This takes
+        a second sum over the pupil.
     """
     (height, width), inner = window.shape, rank * across
     products = (inner * inner * width + height * inner * width) * np.where(crossed, 2, 1)

@@ -1,6 +1,8 @@
-"""The rank of the slow factor at coarse tolerances, if samples are chosen for the light that arrives in a window.
+"""Number of points (rank) between which the slow factor of the diffraction kernel is interpolated over a window.
 
-The rank is the number of points per axis of the window between which the slow factor is interpolated.
+The slow factor is the quotient of the diffraction kernel and a Fourier kernel. It varies slowly over the window, so it
+is interpolated there. The rank is the number of interpolation points along an axis of the window. This module computes
+it for coarse tolerances, from the rays that hit the window.
 """
 
 from __future__ import annotations
@@ -40,11 +42,11 @@ RANK_OF_DISTANCE = 3  # least rank for derivatives by the distance, which are qu
 
 @dataclass(frozen=True)
 class Derivatives:
-    """Additional needs of a PSF whose derivatives are requested.
+    """Requests for those derivatives of a PSF that require more samples than the PSF alone.
 
-    moves: whether derivatives with respect to the distance are requested.
-    cells: cells between the knots of maps, across the pupil; 0 if no derivatives with respect to samples of maps are
-        requested.
+    moves: whether derivatives with respect to the distance of the window are requested.
+    cells: number of intervals between the knots of an interpolated map (relief or wavefront), along a diameter of the
+        pupil; 0 if no derivatives with respect to the samples of a map are requested.
     """
 
     moves: bool = False
@@ -55,10 +57,13 @@ class Derivatives:
 class WindowRays:
     """Some rays from each pupil, and where they hit a window.
 
-    window: positions (u, v) [m] relative to the middle of the window, (beam, ray). They are the hit points of the rays,
-        moved outwards by the width of diffraction and, if they then lie outside the window, to its nearest side.
-    weight: weights of the rays, with a mean of 1, (beam, ray).
-    mean_sine: root mean square of the sines along an axis, (beam,).
+    window: positions (u, v) [m] relative to the middle of the window, one for each ray, (beam, ray). Each is the point
+        that the ray hits, moved outwards along both axes by the distance over which diffraction spreads the light.
+        Positions outside the window are then moved to the nearest side of the window.
+    weight: weights of the rays, with a mean of 1, (beam, ray). Rays that miss the window have a small weight.
+    mean_sine: weighted root mean square of the x and y components of vector differences, (beam,). For each ray, two
+        unit vectors start in the middle of the window: one points to the start of the ray in the pupil, the other to
+        the pupil's centre. The components are those of their difference.
     """
 
     window: tuple[np.ndarray, np.ndarray]
@@ -67,10 +72,13 @@ class WindowRays:
 
     @classmethod
     def from_slopes(cls, slopes: StackSlopes, geometry: WindowGeometry) -> WindowRays:
-        """Return rays from points that are spread evenly over the disks.
+        """Return rays from points that are spread evenly over the disks of the pupils.
 
-        To first order, a ray hits the window at D/n times the slope of its path to the middle of the window, where D is
-        the distance from the ray's point of the pupil to this middle.
+        Let L be the optical path from the source, through a point p of the pupil, to the middle of the window. To first
+        order, the ray through p hits the window at D/n · ∇L relative to this middle. ∇L is the gradient of L with
+        respect to p, D the distance from p to the middle, and n the refractive index behind the pupil.
+
+        slopes: gradients of the optical paths behind the pupils.
         """
         half, planned = geometry.half, geometry.rays(slopes.across)
         blur, pairs = planned.blur, zip((slopes.along_x, slopes.along_y), planned.at, strict=True)
@@ -88,13 +96,19 @@ def window_ranks(
     tolerance: np.ndarray,
     derivatives: Derivatives | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the necessary ranks, (beam,), and whether `cross_term` is necessary. Ranks above MOST_RANK become 0.
+    """Return the ranks of the slow factor that the tolerance requires, and whether `cross_term` is used.
 
-    The rank is sufficient at the end points of rays, around which the light arrives. If derivatives are requested,
-    light may move anywhere. The rank is then also sufficient on average over the whole window.
+    The slow factor is the quotient of the diffraction kernel and a Fourier kernel. It is interpolated between points of
+    the window. The rank is the number of these points along an axis. It is 0 if more than MOST_RANK points are needed,
+    and 1 if the formula `cross_term` replaces the interpolation. Both results have the shape (beam,).
 
-    factor: the factor for the points of the pupils from which the rays come.
-    tolerance: tolerances, (beam,).
+    The interpolation is tested near the points where the rays hit the window, because the light arrives there. If
+    derivatives are requested, a change of the pupil may send light to any point of the window. The error is then also
+    tested on average over the whole window.
+
+    factor: F(u, v) / (F(u, 0) F(0, v)), where F is the slow factor at a position (u, v) of the window. The light comes
+        from the points of the pupils where the rays start.
+    tolerance: tolerances of the PSFs, (beam,).
     """
     half, path, directions = geometry.half, factor.path, factor.directions
     # The relative error of the intensity is twice that of the amplitude. A gradient contains the error of the amplitude
@@ -142,10 +156,13 @@ def interpolation_errors(
     nodes: np.ndarray,
     exact: np.ndarray,
 ) -> np.ndarray:
-    """Return the root mean square errors of the slow factor that is interpolated from nodes of the window, (beam,).
+    """Return the weighted root mean square errors of interpolating a factor between nodes of the window, (beam,).
 
-    place: positions (u, v) [m] relative to the middle of the window.
-    exact: the slow factor at these positions.
+    factor: F(u, v) / (F(u, 0) F(0, v)), where F is the slow factor: the diffraction kernel divided by a Fourier kernel.
+    place: positions (u, v) [m] relative to the middle of the window, at which the errors are computed.
+    weight: weights of the positions, with a mean of 1.
+    nodes: interpolation points along an axis [m], relative to the middle of the window.
+    exact: values of `factor` at the positions.
     """
     (u, v), total = place, np.zeros(1)
     if len(nodes) == 1:

@@ -1,7 +1,9 @@
-"""The method "low_rank" at coarse tolerances, for a single PSF: as few samples of the pupil as its light needs.
+"""The method "low_rank" for a single PSF at coarse tolerances.
 
-The samples and the rank are those of a stack of one (`window_plan`). All of these values are estimates. Every PSF is
-therefore compared with a sum over finer samples in a few rows and columns (`window_check`).
+The pupil has only as many samples as the light that reaches the window requires. Their number, and the number of
+interpolation points in the window (the rank), are planned as for several PSFs at once (`window_plan`). Both numbers
+are estimates. Every PSF is therefore checked in a few rows and columns of the window, where it is compared with a sum
+over finer samples of the pupil (`window_check`).
 """
 
 from __future__ import annotations
@@ -39,9 +41,15 @@ CROSSED_RANK = 3  # Rank 2 is less accurate than `cross_term`.
 
 @dataclass(frozen=True)
 class WindowSampling:
-    """Samples of the pupil, finer samples for the check, and the rank of the slow factor over the window.
+    """Samples of the pupil, from which a PSF over a window is summed, and finer samples that check the result.
 
-    crossed: whether `plain_intensity` includes `cross_term`. Other sums have at least the rank CROSSED_RANK instead.
+    The diffraction kernel of the sum is a Fourier kernel times a factor that varies slowly over the window, the slow
+    factor.
+
+    rank: number of interpolation points of the slow factor along an axis of the window.
+    crossed: True if `plain_intensity` computes the slow factor by a formula (`cross_term`) instead of interpolation.
+        This formula is not used for the complex field or for intensities with derivatives. For these, the slow factor
+        is interpolated, with a rank of at least CROSSED_RANK.
     half_width: distance [m] from the middle of the window within which the interpolation points lie.
     """
 
@@ -84,13 +92,20 @@ class WindowSampling:
         return recorded_field(light, beam.distance, sums, problem.window)
 
     def sums(self, path: Path, dtype: str) -> WindowSums:
-        """Return the arrays of the sums. The wavelength may be longer than the one that determined the samples."""
+        """Return the matrices with which `WindowSums` computes the field over the window from the light of the pupil.
+
+        path: wavelength, distance and window. The wavelength may be longer than the one that determined the samples.
+        dtype: "float32" or "float64".
+        """
         return _window_sums(
             self.pupil, max(self.rank, CROSSED_RANK) if self.crossed else self.rank, self.half_width, path, dtype
         )
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the square over which rounding errors are spread, see `Sampling.plane`."""
+        """Return the width [m] of the square over which rounding errors are assumed to be evenly spread.
+
+        Their size in the window is estimated from this width, see `Sampling.plane`.
+        """
         return problem.wavelength / self.pupil.grid.dx
 
     @property
@@ -108,7 +123,10 @@ class WindowSampling:
 
 
 def window_sampling(problem: Problem) -> WindowSampling | None:
-    """Return the samples for a coarse tolerance. The result is None if the method is not suitable."""
+    """Return the samples with which the method "low_rank" computes a PSF at a coarse tolerance.
+
+    The result is None if the tolerance is below TIGHTEST, or if the problem does not permit this way of sampling.
+    """
     fine = problem.tolerance < TIGHTEST or problem.reach is not None or math.isfinite(problem.widest_band)
     if fine or problem.all_light:
         return None
@@ -134,7 +152,7 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
 
 
 def _single(stack: SineStack) -> SineSamples:
-    """Return a stack of one as samples of a single pupil."""
+    """Return the samples of a single pupil, given a stack that contains only this pupil."""
     edge, pitch = PupilEdge(stack.edges[0], float(stack.radius[0])), float(stack.pitch[0])
     count = stack.at.shape[1]
     shift = float(stack.at[0, count // 2])
@@ -157,7 +175,10 @@ def _window_sums(pupil: WindowSamples, rank: int, half: float, path: Path, dtype
     kernel = kernel / (axis_factor(path, pupil, 0, column, u) * axis_factor(path, pupil, 1, row, v))
 
     def by_distance() -> np.ndarray:
-        """Return the derivative of the kernel z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to the distance z."""
+        """Return the derivative of the kernel z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to the distance z.
+
+        D and ρ are the distances of a point of the window from a sample of the pupil and from the pupil's centre.
+        """
         turns = 2j * np.pi / path.wavelength * (z / distance - z / np.sqrt(x * x + y * y + z * z))
         near_by = -(near.real * z / distance**2) / near
         return np.asarray(kernel * (1 / z - 2 * z / distance**2 + turns + near_by), complex_dtype)

@@ -1,8 +1,9 @@
 """PSFs of several sources and wavelengths through one pupil, from the same samples of the pupil, at coarse tolerances.
 
-The light behind the pupil is the product of two factors: the wave of the source, bent by the ideal lens, and the phase
-of relief and wavefront with the amplitude of aperture and mask. Heights are computed once for all PSFs, and the second
-factor once for each wavelength. The sums over the pupil are stacked matrix products (`window_sums`).
+The light behind the pupil is the product of two factors. The first is the wave of the source, bent by the ideal lens
+and attenuated by aperture and mask. The second is the phase that the relief and the wavefront add. The wavefront and
+the height of the relief are computed once for all PSFs, and the second factor once for each wavelength. The sums over
+the pupil are stacked matrix products (`window_sums`).
 """
 
 from __future__ import annotations
@@ -39,13 +40,13 @@ MOST_BYTES = 64e6  # choice, limited by memory: all waves that are cached
 class WindowStack:
     """Light of several sources and wavelengths through a pupil to a window at one distance.
 
-    The distance, the numbers of the sources and those of the pupil, except its radius, may carry derivatives of
-    PyTorch.
+    The distance, the parameters of the sources, and all parameters of the pupil except its radius may be tensors of
+    PyTorch that require a gradient.
 
     wavelengths: wavelengths [m] in vacuum.
     distance: distance [m] of the window behind the pupil.
     dtype: "float32" or "float64".
-    convert: function that converts a NumPy array to the library of the computation, NumPy or PyTorch.
+    convert: function that converts a NumPy array to the library that computes the PSFs, NumPy or PyTorch.
     """
 
     pupil: Pupil
@@ -65,7 +66,8 @@ class WindowStack:
     def errors(self, sampling: WindowSampling, images: Array, tolerance: float) -> Array:
         """Return the relative L2 error of each PSF over the window, see `window_errors`, (source, wavelength).
 
-        images: result of `intensity` without derivatives, in the library and on the device of `convert`.
+        images: result of `intensity` without derivatives. The array has the library and the device of the arrays that
+            the attribute `convert` returns.
         tolerance: tolerance of the PSFs.
         """
         seen, finer = (images * self.pupil.area).swapaxes(0, 1), single_stack(sampling.finer)
@@ -85,8 +87,9 @@ class WindowStack:
     def _factors(self, samples: WindowSamples) -> Iterator[tuple[Array, Array | None]]:
         """Yield factors of the light behind the pupil for each wavelength, see `_product`.
 
-        The first factor is the light without relief and wavefront times the areas of the samples, (source, η, ξ). The
-        second is the phase of relief and wavefront [waves], (η, ξ); None without these.
+        The first factor is the light that a pupil without relief and wavefront would pass, multiplied by the areas of
+        the samples, (source, η, ξ). The second is the phase of relief and wavefront [waves], (η, ξ); None without
+        these. η and ξ count the rows and columns of samples.
         """
         pupil = self.pupil
         height, ahead = (found(pupil, samples, self.convert) for found in (sampled_height, sampled_wavefront))
@@ -102,9 +105,11 @@ class WindowStack:
             yield size, None if path is None else path / wavelength
 
     def _straight(self, samples: WindowSamples, wavelength: float) -> Array:
-        """Return the waves behind the ideal lens times areas and transmittance of the samples, (source, η, ξ).
+        """Return the complex amplitudes of the waves behind the ideal lens, for unit amplitude at the pupil.
 
-        If no number of lens and sources carries a derivative, NumPy computes the waves.
+        Each amplitude is multiplied by the area of its sample and the transmittance of the aperture there. NumPy
+        computes the waves, unless the focal length or a parameter of a source carries a derivative. The shape is
+        (source, η, ξ), where η and ξ count rows and columns of samples.
         """
         pupil = self.pupil
         indices = pupil.index_before(wavelength), pupil.index_behind(wavelength)
@@ -114,7 +119,10 @@ class WindowStack:
         return self.convert(_fixed_waves(lens.plain, samples))
 
     def _image(self, size: Array, waves: Array | None, sampling: WindowSampling, path: Path) -> Array:
-        """Return |U|² over the window, (source, y, x), from the factors of the light behind the pupil."""
+        """Return the intensity |U|² over the window, (source, y, x).
+
+        size, waves: the two factors whose product is the light behind the pupil, see `_product`.
+        """
         sums = sampling.sums(path, self.dtype)
         many = max(1, int(MOST_ENTRIES / sums.down.shape[-1] / sums.across.shape[-1]))
         if is_single(size, waves) and not carries_derivative(self.distance):
@@ -159,7 +167,10 @@ class _LensLight:
         return replace(self, focal_length=focal, sources=tuple(source.plain for source in self.sources))
 
     def waves(self, x: Array, y: Array, size: Array) -> Array:
-        """Return the waves at points (x, y) [m], with amplitude `size`, (source, y, x)."""
+        """Return the wave of each source at points (x, y) [m], array (source, y, x).
+
+        size: amplitude of the waves.
+        """
         before, behind = self.indices
         found = library(x).stack([source.path(x, y) for source in self.sources]) * (before / self.wavelength)
         if self.focal_length is not None:
@@ -169,6 +180,9 @@ class _LensLight:
 
 @cached_arrays(MOST_BYTES, lambda waves: waves.nbytes)
 def _fixed_waves(lens: _LensLight, samples: WindowSamples) -> np.ndarray:
-    """Return the waves of `WindowStack._straight` without derivatives. Pupils often have the same lens and sources."""
+    """Return the result of `_LensLight.waves` at the samples of a pupil, for numbers without derivatives.
+
+    It is cached, because successive pupils often have the same lens and sources.
+    """
     found: np.ndarray = lens.waves(*samples.layout)
     return found

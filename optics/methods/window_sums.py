@@ -2,11 +2,15 @@
 
     U[y, x] = Σ_ba Σ_ηξ down[y, bη] P[η, ξ] kernel[b, a, η, ξ] across[x, aξ]
 
+The diffraction kernel is a Fourier kernel times a factor that varies slowly over the window, the slow factor. The slow
+factor is interpolated between the points (b, a) of the window. The number of these points along an axis is the rank.
+
 P is the light behind the pupil, times the areas of its samples. `down` and `across` are Fourier kernels times the
-interpolation weights of the points (b, a) of the window, and `kernel` is the slow factor at these points, times
-1/(iλz). `down` and `across` may also contain the slow factor along their axes, by which `kernel` is then divided. At
-rank 1, there is one such point, and the sum is the matrix Fourier transform of P times one factor. `down`, `across` and
-`kernel` describe the geometry alone, so all light that passes the same samples shares them.
+interpolation weights of the points, and `kernel` is the slow factor at the points, times 1/(iλz). `down` may also
+contain the values of the slow factor along the y axis of the window, and `across` those along the x axis. `kernel` is
+then divided by these values. At rank 1, there is one point, and U is the matrix Fourier transform of the product
+P · kernel. `down`, `across` and `kernel` describe the geometry alone, so they are shared by all light of one wavelength
+that passes the same samples.
 
 `window_field` and `pupil_gradient` accept arrays of any library with the operators of NumPy, such as PyTorch, and any
 number of leading axes (pupil, depth, wavelength), which are broadcast.
@@ -31,9 +35,14 @@ __all__ = ["WindowSums", "intensity_of", "pupil_gradient", "recorded_field", "we
 def window_field(pupil: Any, kernel: Any, down: Any, across: Any) -> Any:
     """Return the field U over the window, (..., y, x), complex.
 
+    η and ξ count the rows and columns of samples of the pupil. b and a count the rows and columns of interpolation
+    points in the window.
+
     pupil: light behind the pupil times the areas of the samples, (..., η, ξ), complex.
-    kernel: slow factor, (..., b, a, η, ξ), complex.
-    down, across: Fourier kernels along y and x, (..., y, b·η) and (..., x, a·ξ), complex.
+    kernel: slow factor, the quotient of the diffraction kernel and a Fourier kernel, at the interpolation points,
+        (..., b, a, η, ξ), complex.
+    down, across: Fourier kernels along y and x, times the interpolation weights of the points, (..., y, b·η) and
+        (..., x, a·ξ), complex.
     """
     return down @ weighted(pupil, kernel) @ across.swapaxes(-1, -2)
 
@@ -41,7 +50,7 @@ def window_field(pupil: Any, kernel: Any, down: Any, across: Any) -> Any:
 def pupil_gradient(cotangent: Any, kernel: Any, down: Any, across: Any) -> Any:
     """Return the gradient of a loss L with respect to the pupil's light P, ∂L/∂Re P + i ∂L/∂Im P, (..., η, ξ).
 
-    It is the adjoint of `window_field`, whose result is U, and takes about as long.
+    This function is the adjoint of `window_field`, which returns U, and takes about as much time as `window_field`.
 
     cotangent: ∂L/∂Re U + i ∂L/∂Im U, (..., y, x). For a loss on the intensity |U|², it is 2U ∂L/∂|U|².
     """
@@ -61,14 +70,14 @@ def weighted(pupil: Any, kernel: Any) -> Any:
 
 
 def intensity_of(field: Any) -> Any:
-    """Return |U|², an array of the same library."""
+    """Return the intensity |U|² of a field U, as an array of the same library as `field`."""
     re, im = field.real, field.imag
     return re * re + im * im
 
 
 @dataclass(frozen=True, eq=False)
 class WindowSums:
-    """The arrays of `window_field` for one pupil and one window, without leading axes.
+    """The arrays with which `window_field` computes the field of one pupil, at one wavelength, over one window.
 
     by_distance: function that returns the derivative [1/m³] of `kernel` [1/m²] with respect to the window's distance.
     """
@@ -100,7 +109,10 @@ def recorded_field(pupil: Field, distance: Scalar, sums: WindowSums, window: Gri
     moves = carries_derivative(distance)
 
     class WindowField(dr.CustomOp):
-        """`sums.field` as one operation of Dr.Jit. The pupil's light is kept for the derivative by distance."""
+        """The sum over the pupil (`WindowSums.field`) as one operation of Dr.Jit.
+
+        The operation keeps the light of the pupil, because the derivative with respect to the distance depends on it.
+        """
 
         def eval(self, re: Array, im: Array, distance: Array) -> tuple[Array, Array]:
             self.pupil = _complex(re, im, shape)

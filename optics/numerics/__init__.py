@@ -1,4 +1,4 @@
-"""Numbers, arrays and sums over them. Little in this package is specific to light.
+"""Numbers, arrays, and sums over arrays. Little in this package is specific to light.
 
 accuracy        Plan and AccuracyError: predicted errors of results
 arguments       checks of user input
@@ -15,11 +15,11 @@ fourier         centred Fourier sums of any size and period
 fourier_matrices  Fourier sums as products of matrices
 grid            sample positions
 interpolation   linear, Lagrange, B-splines; tabulated functions
-kept_values     values that are computed once and kept, up to a number of them or an amount of memory
+kept_values     values that are computed once and kept, within a limit on their number or memory
 matrices        matrix products of Dr.Jit tensors
 number_types    checks of users' arrays: half precision, masked elements, PyTorch's lazy conjugation and negation
 precision       float32 and float64 in Dr.Jit
-quadrature      Gauss-Legendre nodes, and the number of nodes that a wave needs
+quadrature      Gauss-Legendre nodes, and the number of nodes that the integral of a wave needs
 radial_profile  rotationally symmetric images, computed along one radius
 read_only       read-only arrays of results
 renamed         deprecated names that warn once

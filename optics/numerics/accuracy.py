@@ -65,7 +65,8 @@ class Plan:
     """The chosen method with its samples and predicted error, and the reason for the choice.
 
     samples: numbers of samples of the pupil (y, x), or numbers of nodes: (radial, angular), or (count, 1).
-    padding: period of the pupil's transform divided by the number of its samples; 1 without a period.
+    padding: period of the Fourier transform of the pupil, in samples, divided by the number of samples across it.
+        It is 1 if the method uses no periodic transform.
     predicted_error: relative L2 error of the intensity over the window.
     scalar_error: upper bound on the error of scalar theory, for light of any polarisation. It depends on the steepest
         ray and adds to `predicted_error`. All methods of `optics.psf` have this error; only `optics.vector_focus`
@@ -113,7 +114,10 @@ class Plan:
 
 
 def above(error: float, tolerance: float) -> str:
-    """Return an error as text, with enough digits to show that it exceeds a tolerance: "0.0011" if that is 0.001."""
+    """Return an error as text, with enough digits to show that it exceeds a tolerance.
+
+    An error of 0.00108 becomes "0.0011" if the tolerance is 0.001.
+    """
     shown = (f"{error:.{digits}g}" for digits in range(1, 17))
     return next((text for text in shown if float(text) > tolerance), f"{error!r}")
 
@@ -125,7 +129,7 @@ def rounded_up(error: float) -> float:
 
 
 def size_of(count: float) -> str:
-    """Return a number of bytes in words, such as "1.3 GB"."""
+    """Return a number of bytes as text, such as "1.3 GB"."""
     return f"{count / 1e9:.2g} GB" if count >= 1e8 else f"{count / 1e6:.2g} MB"
 
 

@@ -43,9 +43,9 @@ LINE = 200  # most characters of a value in a message
 
 
 def shown(value: Any) -> str:
-    """Return `value` as a user would type it. NumPy's print options, which colour-science sets, do not affect numbers.
+    """Return `value`, or each entry of a tuple or list, as Python code; by type and shape if it exceeds one line.
 
-    A value, or an entry of a tuple or list, is described by its type and shape if it does not fit on one line.
+    NumPy numbers are shown as Python numbers, because the package colour-science changes NumPy's print options.
     """
     if isinstance(value, np.generic):
         return repr(value.item())
@@ -71,7 +71,7 @@ def finite(name: str, value: float, *, carried: bool = False) -> float:
 
 
 def flag(name: str, value: Any) -> bool:
-    """Return `value` as a bool; ValueError about `name` unless it is True or False."""
+    """Return `value` as a bool. Raise a ValueError about the argument `name` if `value` is neither True nor False."""
     if not is_boolean(value):
         raise ValueError(f"{name} = {shown(value)}: must be True or False")
     return bool(value)
@@ -80,7 +80,9 @@ def flag(name: str, value: Any) -> bool:
 def positive(
     name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False, most: float = LARGEST
 ) -> float:
-    """Return `value` as a float; ValueError about `name` unless it is in [1e-15, `most`], where squares are accurate.
+    """Return `value` as a float, or raise a ValueError about the argument `name` unless 1e-15 <= value <= most.
+
+    The default limits keep squares, and ratios of squares, within the range of double precision.
 
     unit: unit of `value`, for the message. infinite: True if infinity is allowed. carried: see `finite`.
     """
@@ -95,9 +97,10 @@ def positive(
 
 
 def without_derivative(name: str, value: Any) -> Any:
-    """Return `value`; ValueError about `name` if it, or an entry of it, carries a derivative, which would be lost.
+    """Return `value`, or raise a ValueError about the argument `name` if `value` or an entry carries a derivative.
 
-    The other checks of numbers include this check, except `pair`, `plain_reals` and those with carried=True.
+    The derivative would be lost. The functions of this module that check numbers call this one. Only `pair`,
+    `plain_reals`, and functions called with carried=True do not, because they accept derivatives.
     """
     if type(value) is float:
         return value  # fast path: planning calls this thousands of times
@@ -112,10 +115,7 @@ def without_derivative(name: str, value: Any) -> Any:
 
 
 def vacuum_wavelength(value: Any) -> float:
-    """Return `value` [m] as a float; ValueError unless it lies in [1e-15, 1].
-
-    The upper limit catches wavelengths in nanometres.
-    """
+    """Return `value` [m] as a float; ValueError outside [1e-15, 1], for example if a user gives 550 (nanometres)."""
     wavelength = _number("wavelength", value)
     if not SMALLEST <= wavelength <= LONGEST_WAVE:
         raise ValueError(
@@ -165,7 +165,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
 
 
 def one_of(name: str, value: Any, options: Iterable[str]) -> str:
-    """Return `value`; ValueError about `name`, with a similar option if any, unless it is one of the options."""
+    """Return `value`; ValueError about `name` unless it is one of the options. The error may suggest a similar one."""
     known = tuple(options)
     if not isinstance(value, str) or value not in known:
         raise ValueError(
@@ -181,10 +181,7 @@ def did_you_mean(word: Any, known: Iterable[str], cutoff: float = 0.5) -> str:
 
 
 def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | None:
-    """Return the most similar known word, ignoring case.
-
-    None if difflib's ratio is below `cutoff` for all of them.
-    """
+    """Return the most similar known word, ignoring case; None if difflib's ratio is below `cutoff` for all words."""
     import difflib  # imported here, because only error messages need it
 
     plain = {option.lower(): option for option in known}
@@ -193,13 +190,16 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
-    """Return (x, y) as floats; ValueError about `name`, as in `pair`, unless both are numbers within ±1e15."""
+    """Return `value`, a pair (x, y), as floats. Raise a ValueError unless both are numbers within ±1e15."""
     x, y = pair(name, without_derivative(name, value), what)
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 
 def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
-    """Return both entries of `value`, with derivatives; ValueError unless it has two (`what`, for the message)."""
+    """Return both entries of `value`, which may carry derivatives. Raise a ValueError unless there are exactly two.
+
+    what: description of the two entries for the message, such as "lengths (x, y) [m]".
+    """
     try:
         x, y = value
     except (TypeError, ValueError):
@@ -217,7 +217,7 @@ def reals(name: str, values: Any) -> np.ndarray:
 
 
 def plain_reals(name: str, values: Any) -> np.ndarray:
-    """Return `values`, which may carry derivatives, as a float64 array without them; other checks as in `reals`."""
+    """Return `values` as a float64 array, like `reals`, but accept values with derivatives and drop the derivatives."""
     return plain(full_precision(name, values)) if is_differentiable(values) else reals(name, values)
 
 
@@ -233,7 +233,7 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
     """Return `value` as a float32 array (band, Y, X).
 
     Raises:
-        ValueError: the array has not `bands` bands, is smaller than `least`, or holds more than finite real numbers.
+        ValueError: the shape is not (`bands`, Y, X), Y or X is below `least`, or a value is not a finite real number.
     """
     radiance = reals("radiance", value).astype(np.float32)
     fits = radiance.ndim == 3 and radiance.shape[0] == bands
@@ -257,7 +257,7 @@ def is_sized(value: Any) -> bool:
 
 
 def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
-    """Return `values` as a tuple; ValueError about `name`, with `example`, unless all are instances of `kind`."""
+    """Return `values` as a tuple. Raise a ValueError that shows `example` unless all are instances of `kind`."""
     try:
         found = tuple(values)
     except TypeError:
@@ -280,7 +280,7 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
 
 
 def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
-    """Return `value`; ValueError about `name`, with `example`, unless it is an instance of `kind`."""
+    """Return `value`. Raise a ValueError that shows `example` unless `value` is an instance of `kind`."""
     if not isinstance(value, kind):
         raise ValueError(f"{name} = {shown(value)}: must be a kind of {kind.__name__}, such as {example}")
     return value

@@ -1,8 +1,8 @@
 """Operations on arrays of NumPy, PyTorch or Dr.Jit whose names or forms differ between these libraries.
 
-Optical elements compute with the operators of the arrays that they receive, so they evaluate on all three. Plans use
-NumPy, graphs of PyTorch use its tensors, and compiled kernels use Dr.Jit. No function imports PyTorch: a caller who
-passes a tensor has imported it.
+Optical elements compute with the operators of the arrays that they receive, so the same code works with all three
+libraries. Plans use NumPy, graphs of PyTorch use its tensors, and compiled kernels use Dr.Jit. No function imports
+PyTorch: a caller who passes a tensor has imported it.
 """
 
 from __future__ import annotations
@@ -72,7 +72,10 @@ def like(x: Array, value: Any) -> Array:
 
 
 def beside(x: Array, values: np.ndarray) -> Array:
-    """Return an array of NumPy as an array of the library and the device of `x`, NumPy or PyTorch, of the same type."""
+    """Return a NumPy array as an array of the library of `x`, NumPy or PyTorch, on the device of `x`.
+
+    Unlike `like`, it keeps the element type of `values`.
+    """
     own = library(x)
     return values if own is np else own.from_numpy(values).to(x.device)
 
@@ -86,12 +89,15 @@ def on_processor(x: Array) -> np.ndarray:
 
 
 def to_double(x: Array) -> Array:
-    """Return an array of NumPy or PyTorch in double precision, a copy unless it has this precision."""
+    """Return an array of NumPy or PyTorch in double precision. An array that is already double is not copied."""
     return x.astype(np.float64, copy=False) if library(x) is np else x.double()
 
 
 def matrix_like(x: Array, value: Any) -> Array:
-    """Return the matrix `value` as an array, or as a tensor of Dr.Jit, of the type of `x`. See `like`."""
+    """Return the matrix `value` in the library, precision and device of `x`, see `like`.
+
+    For Dr.Jit, the result is a tensor with the shape of the matrix, because arrays of Dr.Jit are flat.
+    """
     flat = like(x, value)
     own = library(x)
     return own.tensor_t(type(x))(flat, value.shape) if own.__name__ == "drjit" else flat
@@ -106,7 +112,10 @@ def indices(x: Array) -> Array:
 
 
 def gather(values: Array, at: Any) -> Array:
-    """Return the elements of `values`, counted row by row, at an index or an array of `indices`."""
+    """Return one element of `values`, or several. Elements are counted row by row, as in a flat array.
+
+    at: index of the element, or an array of indices that the function `indices` has returned.
+    """
     own = library(values)
     if own is np:
         return values.take(at)
@@ -126,8 +135,9 @@ def fma(a: Array, b: Array, c: Array) -> Array:
 def sparse_product(matrix: Any, values: Array) -> Array:
     """Return the product of a sparse matrix of SciPy and a vector of NumPy or PyTorch.
 
-    Derivatives of PyTorch are the product with the transposed matrix. SciPy multiplies tensors on the processor, and
-    PyTorch those on another device, so that no number leaves the device.
+    SciPy multiplies tensors on the processor. PyTorch multiplies those on another device, so that no number leaves the
+    device. PyTorch can differentiate the product: the gradient with respect to `values` is the transposed matrix times
+    the gradient with respect to the result.
     """
     own = library(values)
     if own is np:
@@ -138,12 +148,19 @@ def sparse_product(matrix: Any, values: Array) -> Array:
 
 
 def on_host(x: Array) -> bool:
-    """Return whether an array of NumPy or PyTorch lies in the memory of the processor, which both share."""
+    """Return whether an array of NumPy or PyTorch lies in the memory of the processor.
+
+    NumPy and PyTorch can both compute with such an array without a copy.
+    """
     return library(x) is np or bool(x.device.type == "cpu")
 
 
 def _sum_of_products(values: Array, matrix: Any) -> Array:
-    """Return the product of a sparse matrix and a tensor on any device, from selected numbers of the tensor."""
+    """Return the product of a sparse matrix and a vector `values` of PyTorch, on the device of the vector.
+
+    Each entry of the matrix is multiplied by the element of the vector whose index is the column of the entry. The
+    products are then added row by row.
+    """
     own, key = library(values), (id(matrix), str(values.device), str(values.dtype))
     # The matrix is kept with its entries, so that no other matrix has its id.
     _, places, weight = _ENTRIES.get(key, lambda: (matrix, *_entries(values, matrix)))
@@ -151,9 +168,10 @@ def _sum_of_products(values: Array, matrix: Any) -> Array:
 
 
 def _entries(values: Array, matrix: Any) -> tuple[Array, Array]:
-    """Return columns, flat, and values, (row, entry), of the entries of a sparse matrix, on the device of `values`.
+    """Return the column indices of the entries of a sparse matrix, and the entries, on the device of `values`.
 
-    Rows with fewer entries than others are filled up with zeros.
+    The entries have the shape (row, entry of the row). Rows with fewer entries than others are filled up with zeros.
+    The column indices are a flat array. Its order is that of the entries, one row after the other.
     """
     counts = np.diff(matrix.indptr)
     column = np.arange(max(int(counts.max(initial=0)), 1)) < counts[:, None]
@@ -166,7 +184,7 @@ def turned(size: Any, waves: Array, dtype: str) -> Array:
     """Return size · e^{2πi waves} as a complex array of NumPy or PyTorch.
 
     size: real number or array that broadcasts with `waves`.
-    waves: float64 array. Whole waves are subtracted before it is rounded.
+    waves: float64 array of phases in waves. Whole waves are subtracted before the phases are rounded to `dtype`.
     dtype: "float32" or "float64", the type of the real and imaginary parts.
     """
     own = library(waves)

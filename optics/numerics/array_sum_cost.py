@@ -1,4 +1,4 @@
-"""Predicted times of Fourier sums of complex NumPy arrays, which `optics.propagate` computes.
+"""Predicted times of the Fourier sums that `optics.propagate` computes, over complex NumPy arrays.
 
 Sums of Dr.Jit fields need products of real matrices, which cost twice as much (optics.numerics.fourier_matrices).
 """
@@ -15,7 +15,9 @@ Shape = tuple[int, int]
 
 
 def lines_seconds(lines: int, period: int, real: str) -> float:
-    """Return the time [s] of transforms of contiguous lines, including padding and the selection of results.
+    """Return the time [s] of the fast Fourier transforms of some lines of an array, each padded to `period` samples.
+
+    The time includes the padding and the copy of the needed results. The samples of a line are contiguous in memory.
 
     real: type of real and imaginary parts, "float32" or "float64".
     """
@@ -23,7 +25,7 @@ def lines_seconds(lines: int, period: int, real: str) -> float:
 
 
 def products_seconds(shape_in: Shape, shape_out: Shape, real: str, terms: int = 1) -> float:
-    """Return the time [s] of products with one matrix per axis, summed over `terms` such pairs of matrices."""
+    """Return the time [s] to multiply an array by one matrix along y and one along x, for `terms` such pairs."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return 8 * terms * (my * ny * nx + my * nx * mx) / ARRAY_MATMUL_FLOPS[real]
 
@@ -33,7 +35,14 @@ def fft_seconds(shape_in: Shape, period: int, shape_out: Shape, real: str) -> fl
 
 
 def fft_wins(shape_in: Shape, period: float, shape_out: Shape, real: str) -> bool:
-    """Return whether Fourier transforms compute the sum faster than products with matrices that are already known."""
+    """Return whether fast Fourier transforms compute a two-dimensional Fourier sum faster than products with matrices.
+
+    The time for computing these matrices is not counted.
+
+    shape_in, shape_out: numbers of rows and columns of samples, and of results.
+    period: period of the sum in samples. Fast Fourier transforms require a whole number.
+    real: type of real and imaginary parts, "float32" or "float64".
+    """
     if not float(period).is_integer():
         return False
     return fft_seconds(shape_in, int(period), shape_out, real) < products_seconds(shape_in, shape_out, real)

@@ -1,4 +1,8 @@
-"""Parameters that may carry derivatives. The planner uses them as numbers, the computation as arrays."""
+"""Parameters that may carry derivatives: their types, and the conversion to plain numbers.
+
+The choice of a method for a PSF uses the plain numbers. The PSF itself is computed from the parameters as arrays, so
+that it carries derivatives.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +43,7 @@ Scalar = Any  # a number, or a Dr.Jit array of one element that carries a deriva
 def is_differentiable(value: Any) -> bool:
     """Return whether `value` is an array of Dr.Jit, or a tensor of PyTorch that requires a gradient.
 
-    Python's and NumPy's numbers carry no derivatives. Tensors that require none are treated as numbers.
+    Python's and NumPy's numbers carry no derivatives. A tensor that requires no gradient is treated like them.
     """
     return type(value) is not float and (type(value).__module__.startswith("drjit") or of_torch(value))
 
@@ -82,7 +86,11 @@ def carries_derivative(value: Any) -> bool:
 
 
 def entries(row: Any) -> Any:
-    """Return a row of numbers whose entries carry its derivatives. A tensor of PyTorch is copied to the host once."""
+    """Return a row of numbers; a tensor of PyTorch that requires a gradient becomes a tuple of its entries.
+
+    Each entry is then a tensor of its own, through which gradients flow back to the row. The numbers of all entries are
+    copied to the host together.
+    """
     if not of_torch(row) or row.ndim == 0:
         return row
     found = tuple(row)
@@ -92,14 +100,18 @@ def entries(row: Any) -> Any:
 
 
 def is_known(tensor: Array) -> bool:
-    """Return whether a copy of the numbers of a tensor is kept, see `keep_copy`."""
+    """Return whether a tensor has a copy of its numbers on the host, which `keep_copy` attached."""
     return hasattr(tensor, COPY)
 
 
 def keep_copy(tensor: Array, numbers: np.ndarray) -> None:
-    """Keep the numbers of a tensor of PyTorch, which never change, so that `plain` need not copy them from its device.
+    """Attach to a tensor of PyTorch a copy of the tensor's numbers in the memory of the processor.
 
-    tensor: a tensor that no user has, since users may change theirs.
+    The function `plain` then need not copy the numbers from the tensor's device.
+
+    tensor: a tensor that only this package can reach. Users may change the numbers of their tensors, which
+        would make the copy wrong.
+    numbers: the numbers of the tensor, in the memory of the processor.
     """
     setattr(tensor, COPY, numbers)
 
@@ -109,7 +121,8 @@ def number(value: Any) -> float:
 
     Raises:
         TypeError: the type of `value` is not numeric, or a NumPy array does not have one element.
-        ValueError: an array of Dr.Jit or a tensor with a gradient does not have one element, or a text is no number.
+        ValueError: an array of Dr.Jit, or a tensor that requires a gradient, does not have one element; or `value` is a
+            text that is no number.
         BackendError: the array is on a device other than the selected one.
     """
     if type(value) is float:

@@ -1,9 +1,9 @@
 """The LLVM library with which Dr.Jit compiles: search, test in a child process, and selection.
 
 Dr.Jit loads LLVM as a shared library. If the library is too old, Dr.Jit raises an exception. Some versions (15 and 16
-with Dr.Jit 1.5) abort the whole process at the first ``maximum``, which exception handlers cannot prevent. A child
-process therefore tests the library. The verdicts "good" and "aborts" are cached for the file and the versions of Dr.Jit
-and Python.
+with Dr.Jit 1.5) abort the whole process when ``drjit.maximum`` is first computed. Exception handlers cannot prevent
+this abort. A child process therefore tests the library. The verdicts "good" and "aborts" are cached for the file and
+the versions of Dr.Jit and Python.
 """
 
 from __future__ import annotations
@@ -90,7 +90,10 @@ def candidates() -> Iterator[str]:
 
 
 def _version_in_name(path: str) -> tuple[int, ...]:
-    """Return the version: (19, 1) for libLLVM.so.19.1, and (15,) for libLLVM-15.so.1, which ends with an ABI number."""
+    """Return the version in the name of an LLVM library, such as (19, 1) for libLLVM.so.19.1.
+
+    It is (15,) for libLLVM-15.so.1. A number at the end of such a name is the ABI number, not the version.
+    """
     match = re.search(r"libLLVM(?:-(\d+(?:\.\d+)*))?\.(?:so|dylib)(?:\.(\d+(?:\.\d+)*))?", os.path.basename(path))
     digits = (match.group(1) or match.group(2) or "0") if match else "0"
     return tuple(int(part) for part in digits.split("."))
@@ -132,7 +135,10 @@ def _cache_file() -> Path:
 
 
 def _cache_key(path: str) -> str:
-    """Return a cache key for this file and the versions of Dr.Jit and Python, since verdicts depend on them."""
+    """Return the key under which the test result of the LLVM library at `path` is cached.
+
+    The result depends on the file and on the versions of Dr.Jit and Python, so the key contains them.
+    """
     stat = os.stat(path) if os.path.exists(path) else None
     size, modified = (stat.st_size, stat.st_mtime_ns) if stat else (0, 0)
     return f"{path}|{size}|{modified}|drjit {_drjit_version()}|python {sys.version_info[:2]}"
@@ -141,8 +147,8 @@ def _cache_key(path: str) -> str:
 def _drjit_version() -> str:
     """Return Dr.Jit's version from the name of its dist-info folder.
 
-    importlib.metadata is imported only if there is not exactly one such folder, because the import takes as long as a
-    PSF.
+    importlib.metadata is imported only if there is not exactly one such folder, because the import takes as long as
+    the computation of a PSF.
     """
     found = find_spec("drjit")
     if found is not None and found.origin is not None:
@@ -207,7 +213,7 @@ def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm 
 def require() -> Llvm:
     """Make sure that Dr.Jit can use LLVM in this process. Call this function before any use of Dr.Jit.
 
-    Sets ``DRJIT_LIBLLVM_PATH`` to the library and returns the result of its test.
+    Sets ``DRJIT_LIBLLVM_PATH`` to the first usable library, and returns the result of that library's test.
 
     Raises:
         BackendError: no library is usable. The message lists the tested libraries and states the remedy.

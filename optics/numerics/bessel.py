@@ -1,4 +1,6 @@
-"""Bessel functions: J₀ of Dr.Jit arrays, and J_m of NumPy arrays, for which SciPy is imported only if they are large.
+"""Bessel functions: J₀ of Dr.Jit arrays, and J_m of NumPy arrays.
+
+J_m of a small array is computed without SciPy, whose import takes longer. SciPy computes J_m of a large array.
 
 Dr.Jit has no Bessel functions, so J₀ is computed from Chebyshev series, which are fitted once to SciPy's values.
 
@@ -66,9 +68,12 @@ def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
 
 @lru_cache(maxsize=3)
 def _series(rounding: str) -> tuple[list[float], list[float], list[float]]:
-    """Return Chebyshev coefficients of J₀ in x² over [0, 8], and of P and of Q · x/8 in (8/x)² beyond 8.
+    """Return the Chebyshev coefficients of three functions: J₀(x), P(x) and Q(x) · x/8.
 
-    P and Q are defined at the top of the module.
+    J₀ is a series in x² for x in [0, 8]. P and Q · x/8 are series in (8/x)² for x > 8. There,
+    J₀(x) = √(2/(πx)) Re[(P + iQ) e^{i(x - π/4)}].
+
+    rounding: key of TERMS, which contains the numbers of coefficients.
     """
     from scipy.special import hankel1e, j0
 

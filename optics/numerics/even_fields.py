@@ -1,7 +1,8 @@
 """Fields that are even in x and y, stored on a quarter of the plane, and their Fourier sums.
 
 In sums over an even field, only the cosine of the factor exp(2πi jk/period) contributes. A sum therefore takes a
-sixteenth of the products, and a phase factor needs a quarter of the sines.
+sixteenth of the products. A phase factor e^{iφ} is computed only on the quarter, so it takes a quarter of the sines and
+cosines.
 
 Sample n//2 is the centre. If n is even, one side has one more sample than the other. The quarter extends from the
 centre to the last sample of the longer side. This sample has no mirror image on the shorter side, so its weight is
@@ -23,7 +24,11 @@ Shape = tuple[int, int]
 
 
 def quarter(grid: Grid) -> Grid:
-    """Return the quarter of a centred grid, from its centre to the end of the longer sides."""
+    """Return the grid of one quarter of a centred grid, with n//2 + 1 of the n samples along each axis.
+
+    The quarter starts at the centre sample n//2. If n is even, one side of the centre has one more sample than the
+    other, and the quarter covers this longer side. Its coordinates are distances from the centre.
+    """
     height, width = (n // 2 + 1 for n in grid.shape)
     return Grid((height, width), grid.dx, (width // 2 * grid.dx, height // 2 * grid.dx))
 
@@ -35,9 +40,13 @@ def even_seconds(shape_in: Shape, shape_out: Shape) -> float:
 
 
 def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int = 0) -> Field:
-    """Return Σ_j u[j] exp(± 2πi j·k / period), as in `fourier.dft2`, for samples k of the quarter of `grid`.
+    """Return the Fourier sum of an even field u, Σ_j u[j] exp(± 2πi j·k / period), on one quarter of `grid`.
 
-    field: values u on the quarter of a plane of `shape` samples, or on some of its rows, which start at row `first`.
+    j and k are counted from the centre sample, as in `fourier.dft2`. Along each axis, the field and the result contain
+    only the samples from the centre to one end, see `quarter`. If the number of samples is even, one side of the centre
+    has one more sample than the other, and the samples of this longer side are contained.
+
+    field: u on the quarter of a plane of `shape` samples, or on some rows of this quarter, which start at row `first`.
     """
     types, (ny, nx), (my, mx) = field.types, shape, grid.shape
     quarters = field.evaluated().grid.shape
@@ -54,9 +63,9 @@ def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int 
 def _cosines(
     types: Precision, n_out: int, n_in: int, period: Scalar, first: int = 0, count: int | None = None
 ) -> Array:
-    """Return the matrix (k, j) of the cosines by which samples j contribute to frequencies k, counted from 0.
+    """Return the matrix (k, j) of the cosines by which samples j contribute to frequencies k.
 
-    An entry is the contribution of sample j plus that of its mirror image.
+    j and k are counted from the centre. An entry is the contribution of sample j plus that of its mirror image.
 
     first, count: first sample j and number of samples. None: all samples from `first` on.
     """

@@ -1,4 +1,4 @@
-"""A sampled complex field, or a phase factor by which it is multiplied."""
+"""The class `Field`: complex numbers on a grid, which represent a light field or a phase factor."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
 """Centred two-dimensional Fourier sums of any size and period.
 
-`dft2` computes this sum for fields of Dr.Jit, and `fourier_sum` for NumPy arrays:
+`dft2` computes the following sum for fields of Dr.Jit, and `fourier_sum` computes it for NumPy arrays:
 
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
 The period may have any value, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT
 can be used instead. `dft2` selects the faster of the two by their predicted times (optics.numerics.cost). Dr.Jit's
-matrix product executes more operations per second, but SciPy's FFT needs fewer operations. Matrices are therefore
-faster for small windows, and the FFT is faster for large windows. In `dft2`, both are differentiable.
+matrix product executes more operations per second, but SciPy's FFT needs fewer, so matrices are faster for small
+windows, and the FFT for large ones. In `dft2`, both are differentiable.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def dft2(
 
 
 def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int) -> np.ndarray:
-    """Return the sum of `dft2` for a complex NumPy array, computed without Dr.Jit and without derivatives."""
+    """Return the Fourier sum that `dft2` computes, for a complex NumPy array, without Dr.Jit and derivatives."""
     shape_in = (u.shape[0], u.shape[1])
     if fft_wins(shape_in, period, shape, u.real.dtype.name):
         for axis in (1, 0):
@@ -99,9 +99,9 @@ def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int)
 
 @lru_cache(maxsize=16)
 def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> np.ndarray:
-    """Return the matrix of a sum along one axis: exp(±2πi k j / period) in row k and column j, counted from n//2.
+    """Return the matrix of a sum along one axis: exp(±2πi k j / period), k = row - n_out//2, j = column - n_in//2.
 
-    Whole waves are subtracted from k j / period first, because they would reduce the precision of the remainder.
+    Only the fractional part of k j / period matters. The whole part is subtracted before the exponential is computed.
     """
     k, j = np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2
     waves = np.outer(k, j) / period
@@ -109,9 +109,8 @@ def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> n
 
 
 def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
-    """Return u[j] exp(±2πi j·c / period), whose sum at samples k equals the sum of u at samples k + c.
+    """Return u[j] exp(±2πi j·c / period) for a field u. The `dft2` of this product at k is the `dft2` of u at k + c.
 
-    field: u.
     by: ±c, (x, y), in samples of the output. Fractions are allowed.
     """
     types = field.types
@@ -123,8 +122,8 @@ def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
 def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
     """Return Σ_j u[j] exp(-2πi j·k / period) for a complex NumPy array u (y, x) that is at most one period wide.
 
-    The result is (fx, fy) in FFT order: `across` frequencies fx, which are `kept_indices(across)`, and `period`
-    frequencies fy. fy is the last axis, because transforms of contiguous lines are twice as fast.
+    The result is (fx, fy) in FFT order: all frequencies fy, but only the `across` frequencies fx nearest 0, which are
+    `kept_indices(across)`. fy is the last axis, because transforms of contiguous lines are twice as fast.
     """
     from scipy import fft
 
@@ -193,7 +192,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
         return _fft_of_parts(parts, period, to, turn, types)
 
     class FourierSum(dr.CustomOp):
-        """The Fourier sum, differentiable. Its adjoint is the sum with the opposite sign, from output to input."""
+        """The Fourier sum, differentiable. Its adjoint sums over the output, with the opposite sign of the exponent."""
 
         def eval(self, re: Array, im: Array) -> tuple[Array, Array]:
             return transform(re, im, shape, shape_in, sign)
@@ -213,7 +212,10 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
 def _fft_of_parts(
     parts: tuple[np.ndarray, np.ndarray], period: int, to: tuple[int, int], sign: int, types: Precision
 ) -> tuple[Array, Array]:
-    """Return the sum over both axes, computed in blocks of lines because a padded plane exceeds the cache."""
+    """Return the Fourier sum of `dft2`, by FFTs, as flat real and imaginary part. `parts`: the same parts of the field.
+
+    The FFTs are computed for blocks of lines, because a whole plane, padded to one period, exceeds the cache.
+    """
     from scipy import fft
 
     turned, norm = (fft.fft, None) if sign < 0 else (fft.ifft, "forward")
@@ -240,15 +242,15 @@ def _fft_of_parts(
 
 
 def _lines(n: int, period: int) -> list[slice]:
-    """Return slices that divide n lines, each one period long, into blocks."""
+    """Return slices that divide n lines of `period` samples into blocks, whose FFTs are computed together."""
     step = max(FEWEST_LINES, AT_A_TIME // period)
     return [slice(start, min(start + step, n)) for start in range(0, n, step)]
 
 
 def _runs(n: int, period: int) -> list[tuple[slice, slice]]:
-    """Return pairs of slices: of n centred samples, and of their positions within one period in FFT order.
+    """Return pairs of slices that divide n centred samples into runs which are contiguous in FFT order.
 
-    Samples beyond one period are aliased onto it.
+    The first slice selects a run, the second its place within one period. Samples beyond a period are aliased onto it.
     """
     found, start = [], 0
     while start < n:

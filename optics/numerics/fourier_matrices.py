@@ -1,8 +1,10 @@
-"""Fourier sums as matrix products in Dr.Jit. The period may have any value and may carry a derivative.
+"""Fourier sums Σ_j u[j] exp(±2πi j·k / period) as matrix products in Dr.Jit.
 
-If j and k are counted from the centre, the cosine of e^{iθjk} is even and the sine odd, in j and in k. Large sums
-therefore use u[j] ± u[-j] for j >= 0, and two real matrices with a quarter of the entries. A quarter of the products
-then gives the results for k and for -k.
+The period of a sum may have any value and may carry a derivative. Samples j of the field u and frequencies k are
+counted from the centre. cos(2πjk/period) is even in j and in k, and sin(2πjk/period) is odd in both. Large sums
+therefore use u[j] ± u[-j] for j >= 0, and a real matrix of cosines and one of sines for j, k >= 0. Each has a quarter
+of the entries of the whole complex matrix. The results for k and for -k follow from the same products, so that only a
+quarter of the products is needed.
 """
 
 from __future__ import annotations
@@ -37,7 +39,7 @@ def halves_pay(shape_in: Shape, shape_out: Shape) -> bool:
 
 
 def _products(shape_in: Shape, shape_out: Shape) -> tuple[int, int]:
-    """Return the numbers of multiplications in the sum along x, and in the sum along y that follows."""
+    """Return the numbers of multiplications in the two steps of a Fourier sum: along x, and then along y."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return ny * nx * mx, ny * mx * my
 
@@ -76,7 +78,11 @@ def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) 
 
 
 def by_halves(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """Return the sum of `by_whole_matrices`, computed from u[j] ± u[-j], first along x and then along y."""
+    """Return the same Fourier sum as `by_whole_matrices`, by real matrices with a quarter of the entries.
+
+    These are matrices of cosines, multiplied by u[j] + u[-j], and of sines, multiplied by u[j] - u[-j], for j >= 0. The
+    sum along x is computed first, then the sum along y.
+    """
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     cosine, sine = along_y = _quarter(types, mx, nx, period, sign)
     even, odd = _folded_columns(field)
@@ -98,7 +104,10 @@ def _quarter(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int)
 
 
 def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
-    """Return [re, im] of u[y, j] + u[y, -j] and u[y, j] - u[y, -j] for j from 0; at j = 0, u[y, j] counts as 0."""
+    """Return [re, im] of u[y, j] + u[y, -j], and of u[y, j] - u[y, -j], for columns j >= 0 counted from the middle.
+
+    At j = 0, the sum is u[y, 0], not twice this value, because the first term is replaced by 0.
+    """
     types, (ny, nx) = field.types, field.evaluated().grid.shape
     shape = ny, nx // 2 + 1
     j, y = _counted(shape, types)
@@ -110,10 +119,16 @@ def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
 
 
 def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
-    """Return the sums and the differences of rows j and -j, after the sum along x.
+    """Return v[j, k] + v[-j, k] and v[j, k] - v[-j, k], where v is the Fourier sum of a field along x alone.
 
-    across: sums along x in the form that `_both_sides` combines.
-    size: number of rows j and number of results along x.
+    The row j >= 0 is counted from the middle row of the field. k is the frequency along x, of either sign. Each result
+    is a list of real and imaginary part, (j, k). At j = 0, the sum is v[0, k], not twice this value, because the first
+    term is replaced by 0.
+
+    across: four tensors (row, |k|), from which `_both_sides` computes v for k of either sign. The first two are the
+        real and imaginary part of the sum along x of cosines times the part of the field that is even in x. The last
+        two are those of the sum of sines times the odd part.
+    size: number of rows of the field, and number of frequencies k.
     """
     ny, mx = size
     shape = ny // 2 + 1, mx
@@ -141,11 +156,13 @@ def _unfolded_rows(down: list[Array], shape: Shape, types: Precision) -> Parts:
 
 
 def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, there: Array = True) -> Parts:
-    """Return the real and imaginary part of Σ (even cos + i odd sin) for k of either sign.
+    """Return the real and imaginary part of C + iS if k >= 0, and of C - iS if k < 0.
 
-    halves: sums for |k| of the even parts, followed by sums of the odd parts, each real and imaginary.
-    place: flat index of |k| in these sums.
-    there: mask of the entries that exist; all others are 0.
+    C is the sum of cosines times the even part of a field, and S the sum of sines times its odd part, both for |k|.
+
+    halves: real and imaginary part of C, followed by those of S.
+    place: flat index in these arrays for each entry of the result.
+    there: mask of the entries to be read; all others are 0.
     """
     import drjit as dr
 
@@ -155,7 +172,7 @@ def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, t
 
 
 def _read(part: Array, ahead: Array, behind: Array, there: Array) -> Parts:
-    """Return the elements at the indices `ahead`, with 0 outside the mask `there`, and those at `behind`."""
+    """Return the elements at the indices `ahead` (0 where the mask `there` is False), and those at `behind`."""
     import drjit as dr
 
     return dr.gather(type(part), part, ahead, there), dr.gather(type(part), part, behind)

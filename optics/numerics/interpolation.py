@@ -1,7 +1,7 @@
 """Interpolation between samples (linear, Lagrange polynomials, cubic B-splines), and tabulated functions.
 
 `lagrange_weights`, `cubic_bsplines` and `tensor_product` accept arrays of NumPy, PyTorch and Dr.Jit. `Interpolant.at`
-requires Dr.Jit arrays, and the other functions of positions require NumPy arrays.
+requires Dr.Jit arrays. `linear_weights`, `lagrange_basis` and `chebyshev_basis` require NumPy arrays.
 """
 
 from __future__ import annotations
@@ -42,9 +42,12 @@ MARGIN = TABLE_TAPS // 2 - 1  # number of samples beyond either end of a table t
 
 @dataclass(frozen=True, eq=False)
 class Interpolant:
-    """Samples of a function at first + i step, i = -2 ... n + 1, of which n lie within its range.
+    """Table of a function between two ends, with evenly spaced samples. Beyond the ends, the function is constant.
 
-    The function is constant beyond the ends.
+    first: position of the lower end.
+    step: distance between samples.
+    samples: values at the positions first + i step, i = -2 ... n + 1. The n samples from i = 0 to n - 1 reach from end
+        to end. Beyond each end there are two more, which six-point interpolation needs.
     """
 
     first: float
@@ -55,11 +58,15 @@ class Interpolant:
     def from_function(
         cls, function: Callable[[np.ndarray], np.ndarray], ends: tuple[float, float], cycles: float, error: float
     ) -> Interpolant:
-        """Return a table of a function with at most `cycles` cycles between the ends and constant values beyond.
+        """Return a table of a function that varies only between two ends, with at most `cycles` cycles between them.
 
         The function is expensive, so it is evaluated only at Chebyshev nodes, from which the table is computed. With N
         samples per cycle, six-point interpolation of a unit wave has the error (225/64)/720 (2π/N)⁶. A twentieth of
-        this error is assumed, because the functions are steps, whose spectrum falls with frequency.
+        this error is assumed, because tabulated functions are smoothed steps, such as the edge of a soft aperture: most
+        of their spectrum lies far below the highest frequency.
+
+        ends: the positions beyond which the function is constant.
+        error: permitted error of interpolated values.
         """
         per_cycle = 2 * pi * (2.4e-4 / error) ** (1 / 6)
         n = int(cycles * per_cycle + 64)  # choice: at least 64 samples
@@ -101,7 +108,7 @@ def _cosine_sums(values: np.ndarray) -> np.ndarray:
 
 
 def lagrange_weights(t: Array, taps: int) -> list[Array]:
-    """Return the Lagrange weights of `taps` samples (an even number), which are 1 apart.
+    """Return the weights of Lagrange interpolation at t from an even number `taps` of samples at distances of 1.
 
         L_i(t) = Π_{j≠i} (t - x_j) / (x_i - x_j),   x_i = i + 1 - taps/2,   i = 0 ... taps - 1.
 

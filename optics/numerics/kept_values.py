@@ -1,4 +1,4 @@
-"""Values that are computed once and kept for later use, up to a number of them or an amount of memory."""
+"""Values that are computed once and kept for later use, within a limit on their number or on their memory."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ __all__ = ["KeptValues", "cached_arrays"]
 
 
 class KeptValues:
-    """Values by key. If their sizes exceed a limit together, those whose last use is longest ago are dropped.
+    """Values by key. If the sum of their sizes exceeds a limit, the least recently used values are dropped.
 
-    A value that exceeds the limit alone is not kept. A key must determine its value, so it consists of all numbers from
-    which the value is computed.
+    A value whose own size exceeds the limit is not kept. A key must determine its value, so it consists of all numbers
+    from which the value is computed.
 
-    most: the limit.
-    size: function that returns the size of a value. None: each value has the size 1, so that `most` is their number.
+    most: largest sum of the sizes.
+    size: function that returns the size of a value. None: each value has the size 1, so that `most` is the largest
+        number of values.
     """
 
     def __init__(self, most: float, size: Callable[[Any], float] | None = None):
@@ -30,7 +31,10 @@ class KeptValues:
         return len(self._values)
 
     def get(self, key: Hashable, compute: Callable[[], Any]) -> Any:
-        """Return the value of a key. `compute` returns it if it is not kept."""
+        """Return the value that is kept for a key. If there is none, call `compute` and keep its result.
+
+        A result whose size alone exceeds the limit is returned, but not kept.
+        """
         with self._lock:
             if key in self._values:
                 self._values.move_to_end(key)

@@ -48,9 +48,10 @@ def _by_four(left: Parts, right: Parts, transposed: bool) -> Parts:
 
 
 def _by_three(left: Parts, right: Parts, transposed: bool) -> Parts:
-    """Return the real part ac - bd and the imaginary part (a + b)(c + d) - ac - bd.
+    """Return the product of the matrices a + ib (`left`) and c + id (`right`) as real and imaginary part.
 
-    Three products replace four (Gauss's method). Relative to its norm, the result is equally accurate.
+    The real part is ac - bd, and the imaginary part (a + b)(c + d) - ac - bd. Three real products thus replace four
+    (Gauss's method). Relative to the norm of the product, the errors are as small as with four.
     """
     (a, b), (c, d) = left, right
     ac, bd = matmul(a, c, transposed), matmul(b, d, transposed)

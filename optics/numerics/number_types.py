@@ -1,6 +1,7 @@
 """Checks of numbers and arrays from the user.
 
-They find Booleans, refuse half precision and masked elements, and carry out lazy operations of PyTorch.
+They recognise Booleans, and refuse half precision and masked elements. PyTorch's tensors that are only marked as
+conjugate or negative are converted to ordinary tensors.
 """
 
 from __future__ import annotations
@@ -53,9 +54,10 @@ def readable(name: str, value: Any) -> Any:
 
 
 def full_precision(name: str, value: Any) -> Any:
-    """Return `value` as `readable` does; ValueError if the value, or an entry of it, is in half precision or less.
+    """Return `value`, converted by `readable`; ValueError if it, or an entry of it, is less precise than float32.
 
-    Near 1 µm, the step of float16 is 60 nm, a tenth of a wavelength.
+    `readable` converts tensors of PyTorch that NumPy cannot read. Near 1 µm, the step of float16 is 60 nm, a tenth of a
+    wavelength.
     """
     kind = _half(value)
     if kind:

@@ -61,8 +61,8 @@ def _precision(dtype: str, place: Device) -> Precision:
 def aligned(count: int, dtype: Any) -> np.ndarray:
     """Return a flat array of zeros that starts at a multiple of PACKET bytes and can be read beyond its end.
 
-    Dr.Jit compiles a kernel again if an input is aligned differently, which for NumPy's own memory is a matter of
-    chance.
+    Dr.Jit compiles a kernel again if the alignment of an input changes. The alignment of NumPy's own memory is a matter
+    of chance.
     """
     size = count * np.dtype(dtype).itemsize
     room = np.zeros(size + 2 * PACKET, np.uint8)
@@ -71,7 +71,7 @@ def aligned(count: int, dtype: Any) -> np.ndarray:
 
 
 def padded_for_packets(values: np.ndarray) -> np.ndarray:
-    """Return the same numbers as a flat array, in aligned memory that can be read beyond the end of the array.
+    """Return a flat copy of an array, in aligned memory that can be read beyond the end of the copy.
 
     Dr.Jit uses NumPy's memory without a copy. Its kernels read whole packets of numbers, sixteen with AVX-512, and
     ignore the numbers beyond the end. If the next memory page is not mapped, reading it crashes the process. This can

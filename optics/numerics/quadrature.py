@@ -3,8 +3,8 @@
 The errors of equidistant nodes on a circle and of Gauss-Legendre nodes are due to aliasing. With n equidistant nodes on
 a circle, harmonics of e^{iz cos φ} of orders m >= n alias. Their amplitudes are J_m(z) (Jacobi-Anger expansion). n
 Gauss-Legendre nodes are exact for polynomials up to degree 2n - 1. The Chebyshev series of a wave whose phase is ±z
-radians at the ends has the coefficients 2 J_m(z). The same number therefore determines both rules: the smallest m from
-which on 2 |J_m(z)| stays below the requested error.
+radians at the ends has the coefficients 2 J_m(z). Both numbers of nodes therefore follow from the smallest m such that
+2 |J_k(z)| is below the requested error for all orders k >= m.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ STEPS = 16  # choice: values per octave in `stepped_up`; on average, cycles incr
 
 
 def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
-    """Return the smallest m from which on Bessel's functions fulfil 2 |J_m| <= 10^-digits for arguments up to z.
+    """Return the smallest order m such that 2 |J_n(x)| <= 10^-digits for all orders n >= m and all x from 0 to z.
 
-    The search starts at Debye's estimate, which is usually the result, so that two Bessel functions are enough.
+    J_n are Bessel functions. The search starts at Debye's estimate of m. Usually the estimate is already the result, so
+    that values of only two Bessel functions are needed.
     """
     z = np.asarray(z, dtype=np.float64)
     # Beyond m = z, |J_m(z)| falls steadily with m and is below (ez/2m)^m. This bounds the search, since e/2 is 1.36.
@@ -68,9 +69,11 @@ def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
 
 @lru_cache(maxsize=4096)
 def _degree(cycles: float, digits: float) -> int:
-    """Return the degree of a polynomial that represents a wave with `cycles` cycles on an interval to 10^-digits.
+    """Return the degree of a polynomial that represents a wave on an interval with an error of at most 10^-digits.
 
-    The degree is cached, because the rules for the many parts of an aperture often need the same degree.
+    The degree is cached, because the quadrature rules for the many parts of an aperture often need the same degree.
+
+    cycles: number of cycles of the wave on the interval.
     """
     return int(harmonics(np.array(pi * cycles), digits))
 
@@ -79,9 +82,9 @@ def _degree(cycles: float, digits: float) -> int:
 def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Return Gauss-Legendre nodes and weights on [0, 1].
 
-    On [-1, 1], the nodes are the roots x of Legendre's polynomial P. Newton's method computes them, starting from
-    Tricomi's estimate. The weights there are 2 / ((1 - x²) P'²) (Davis & Rabinowitz, Methods of Numerical Integration,
-    §2.7).
+    They are computed on [-1, 1], where the nodes are the roots x of Legendre's polynomial P of degree n, and the
+    weights are 2 / ((1 - x²) P'²) (Davis & Rabinowitz, Methods of Numerical Integration, §2.7). Newton's method
+    computes the roots, starting from Tricomi's estimate.
     """
     half = (n + 1) // 2  # the other half of the nodes follows by symmetry
     x = (1 - (n - 1) / (8.0 * n**3)) * np.cos(pi * (4 * np.arange(1, half + 1) - 1) / (4 * n + 2))
@@ -113,8 +116,8 @@ def _legendre(n: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stepped_up(cycles: float) -> float:
-    """Return `cycles` rounded up to one of a few values.
+    """Return a number of cycles, rounded up to one of 16 values per octave; 0 if it is not positive.
 
-    Similar problems then use the same cached rules.
+    Waves with similar numbers of cycles then share one cached result, such as a quadrature rule.
     """
     return 2.0 ** (ceil(STEPS * log2(cycles) - 1e-9) / STEPS) if cycles > 0 else 0.0

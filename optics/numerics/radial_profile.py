@@ -31,8 +31,8 @@ class RadialProfile:
     """A rotationally symmetric image up to the radius `rim` [m], as a function of the radius r. It is even in r.
 
     The image is computed at Chebyshev points on [0, radius], interpolated to a finer, evenly spaced table, and
-    interpolated from the table onto the grid. If the matrix between points and table would be too large, the image is
-    computed at the positions of the table instead.
+    interpolated from the table onto the grid. If the matrix that interpolates from the points to the table would be too
+    large, the image is computed at the positions of the table instead.
 
     An even function is approximated by a polynomial in r², so the Chebyshev points are radius · cos α with angles α in
     a quarter turn. `radius` exceeds the rim, because interpolation from the table reads points beyond the rim.
@@ -45,12 +45,13 @@ class RadialProfile:
 
     @classmethod
     def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialProfile:
-        """Return points that resolve spatial frequencies up to `band` [1/m] with a relative error of about `error`.
+        """Return a profile that resolves spatial frequencies up to `band` [1/m] with a relative error of about `error`.
 
-        The number of points follows from Chebyshev coefficients over [-R, R], with the profile's `radius` R. Those of a
-        wave of frequency b are 2 J_m(2πbR). Obliquity factors have poles at r = ±iz, with the `distance` z [m] from the
-        pupil, so their coefficients fall like e^{-m asinh(z / R)}. The pitch h of the table follows from the error of
-        eight-point interpolation, LAGRANGE_8 (2πbh)⁸.
+        The number of Chebyshev points follows from the decay of the image's Chebyshev coefficients with their order m
+        over [-R, R], where R is the profile's `radius`. The coefficients of a wave of frequency b are 2 J_m(2πbR).
+        Obliquity factors have poles at r = ±iz, with the `distance` z [m] from the pupil, so their coefficients fall
+        like e^{-m asinh(z / R)}. The pitch h of the table follows from the error of eight-point interpolation,
+        LAGRANGE_8 (2πbh)⁸.
         """
         digits = -math.log10(error)
         turns = 2 * math.pi * band * rim + 2 * rim / distance
@@ -64,32 +65,46 @@ class RadialProfile:
 
     @property
     def is_table(self) -> bool:
-        """True if the image is computed at the positions of the table."""
+        """True if the image is computed at the evenly spaced radii from which it is interpolated onto the grid.
+
+        If False, the image is computed at Chebyshev points, and interpolated from these to the evenly spaced radii.
+        """
         return self.points == self.table + TAPS - 1
 
     def pays(self, outputs: int) -> bool:
-        """Return whether computation along the radius needs fewer points than the window has samples (`outputs`).
+        """Return whether the image is computed at fewer radii than the window has samples.
 
-        It may need more for a window far off the axis, which contains only a small part of the radii up to the rim.
+        outputs: number of samples of the window.
+
+        The radii always extend from the axis to `rim`. A window far off the axis contains only a small part of this
+        range, so it may have fewer samples than there are radii.
         """
         return self.points < outputs
 
     @property
     def entries(self) -> int:
-        """Number of entries of the matrix that maps points to the table; 0 if `is_table`."""
+        """Number of entries of the matrix that interpolates the image from Chebyshev points to evenly spaced radii.
+
+        It is 0 if `is_table`, because no matrix is then needed.
+        """
         return 0 if self.is_table else self.points * self.table
 
     @property
     def positions(self) -> np.ndarray:
-        """Radii [m] of the Chebyshev points or, if `is_table`, of the positions in the order of the table."""
+        """Radii [m] at which the image is computed: Chebyshev points or, if `is_table`, evenly spaced radii.
+
+        The evenly spaced radii begin beyond the axis, where they are negative and their absolute values are given. They
+        end beyond the rim.
+        """
         if self.is_table:
             return np.abs(self.rim * _places(self.table))
         return self.radius * np.cos(np.pi * (np.arange(self.points) + 0.5) / (2 * self.points))
 
     def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
-        """Return the values at the samples of the window, flat, interpolated from values at `positions`.
+        """Return the image at the window's samples as a flat array, interpolated from its values at `positions`.
 
-        The result is 0 beyond the rim. Negative results are replaced by 0 unless `signed` is True.
+        The result is 0 beyond the radius `rim` of the image. Negative results are replaced by 0 unless `signed` is
+        True.
         """
         import drjit as dr
 
@@ -106,7 +121,7 @@ class RadialProfile:
         return dr.select(within, total if signed else dr.maximum(total, 0), 0)
 
     def _refined(self, values: Array, types: Precision) -> Array:
-        """Return the values of the table, given values at Chebyshev points."""
+        """Return the image at evenly spaced radii, interpolated from its values at Chebyshev points."""
         matrix = types.Tensor(*_refinement(self.points, self.table, self.rim / self.radius, types.dtype))
         return matmul(matrix, types.Tensor(values, (self.points, 1))).array
 
@@ -146,7 +161,7 @@ class DistinctRadii:
         return 0
 
     def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
-        """Return the values at the samples of the window, flat, from values at `positions`."""
+        """Return the image at the window's samples as a flat array, given its values at the distinct radii."""
         import drjit as dr
 
         return dr.gather(types.Float, types.Float(values), types.Index(self._distinct[1]))
@@ -164,17 +179,22 @@ _small_distinct, _large_distinct = (lru_cache(maxsize=count)(_distinct) for coun
 
 
 def _places(table: int) -> np.ndarray:
-    """Return the positions of the table in units of the rim."""
+    """Return evenly spaced radii of an image, as fractions of the radius of its rim.
+
+    Three of them lie beyond the axis, where they are negative, and four beyond the rim.
+
+    table: number of radii from the axis (0) to the rim (1), both included.
+    """
     found: np.ndarray = np.arange(-BESIDE, table + BESIDE + 1) / (table - 1)
     return found
 
 
 @lru_cache(maxsize=32)
 def _refinement(points: int, table: int, rim: float, dtype: str) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Return the flat matrix (table + 7, points) that interpolates from Chebyshev points to the table, and its shape.
+    """Return a flat matrix that interpolates from Chebyshev points to evenly spaced radii, and the matrix's shape.
 
-    The interpolating polynomial is even. The table has evenly spaced positions, which are numbered from -3 to table +
-    3. The axis is position 0, and `rim`, which is in units of the profile's radius, is position table - 1.
+    The shape is (table + 7, points). The interpolating polynomial is even. The evenly spaced radii are numbered from -3
+    to table + 3. Number 0 is the axis, and number table - 1 is the radius `rim`, in units of the profile's radius.
     """
     radius = rim * _places(table)
     nodes = np.cos(np.pi * (np.arange(points) + 0.5) / (2 * points))

@@ -16,7 +16,10 @@ def warn_renamed(old: str, new: str, stacklevel: int = 3) -> None:
 
 
 def warn_once(subject: str, message: str, stacklevel: int = 4) -> None:
-    """Warn once per process and subject that a name or the form of a call changes."""
+    """Issue a warning that a name or the form of a call changes. It is issued once per process for each subject.
+
+    subject: the old name, or a text that identifies the call, such as "heights of optics.torch".
+    """
     if subject not in _warned:
         _warned.add(subject)
         warnings.warn(message, FutureWarning, stacklevel)
@@ -28,7 +31,7 @@ def renamed(new: str) -> Any:
 
 
 class _Renamed:
-    """Descriptor of an attribute's old name."""
+    """Python descriptor for an old name: it warns once, and returns the attribute with the new name."""
 
     def __init__(self, new: str) -> None:
         self._new, self._old = new, ""

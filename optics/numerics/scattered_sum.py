@@ -30,11 +30,14 @@ TRANSFORM_NODES = 40
 
 
 class ScatteredSum:
-    """Fourier sums over scattered points, S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)} at samples k, and their transpose.
+    """Fourier sums over scattered points at the samples of a grid, and sums over these samples at the points.
 
-    p, q: coordinates of the points [turns per sample], flat.
-    shape: number of samples (y, x) of the sums.
-    digits: digits of the sums relative to Σ|u|.
+    The sum over points j with amplitudes u_j is S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)}, at the sample with the
+    indices k. The sum over samples is its transpose, with the same exponential.
+
+    p, q: coordinates of the points, (point,): the turns of the phase, each of 2π, from one sample to the next.
+    shape: number of samples (y, x) of the grid.
+    digits: number of accurate digits of the sums, relative to Σ|u|.
     """
 
     def __init__(self, p: np.ndarray, q: np.ndarray, shape: tuple[int, int], digits: float = 6.0) -> None:
@@ -60,9 +63,11 @@ class ScatteredSum:
         return found * self._factor()
 
     def at(self, samples: np.ndarray) -> np.ndarray:
-        """Return the sums u (sum, point), complex, at the points: the transpose of `evaluate`.
+        """Return the sums over the grid's samples k at each scattered point j, complex, (sum, point).
 
-        samples: values S (sum, y, x).
+        The sums are Σ_k S_k e^{2πi (p_j k_x + q_j k_y)}, the transpose of those that `evaluate` returns.
+
+        samples: values S at the samples, (sum, y, x).
         """
         parts = samples * self._factor()
         held = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.held, 1) for one in parts])
@@ -70,7 +75,13 @@ class ScatteredSum:
         return found
 
     def _factor(self) -> np.ndarray:
-        """Return the phase factor of the cells' position, divided by the transform of the spreading kernel, (y, x)."""
+        """Return the factors that correct the Fourier sums for the kernel that spreads each point, (y, x).
+
+        To compute the sums, a kernel spreads each scattered point over some cells, the squares of a finer grid. The
+        values of the cells are then Fourier transformed. Only the block of cells that contains the spread points is
+        stored. Each factor is a phase factor for the position of this block on the finer grid, divided by the Fourier
+        transform of the kernel. There is one factor for each sample of the sums.
+        """
         axes = []
         for first, n in zip(self.first, self.shape, strict=True):
             turns = (np.arange(n) - n // 2) * first / self.period
@@ -79,16 +90,19 @@ class ScatteredSum:
 
 
 def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
-    """Return the real and imaginary part of `sums.at` for real samples, with derivatives.
+    """Return the real and imaginary part of `sums.at` for real values at the grid's samples, with derivatives.
 
-    Both are flat Float64 arrays (sum, point).
+    `sums.at` computes sums over the samples at scattered points. Both parts are flat Float64 arrays (sum, point).
     """
     import drjit as dr
 
     types = precision("float64")
 
     class SumsAt(dr.CustomOp):
-        """Sums at the points as a differentiable operation. The adjoint is the real part of the sum at the samples."""
+        """`ScatteredSum.at`, which maps grid samples to sums at scattered points, as a differentiable operation.
+
+        The samples are real, so the adjoint is the real part of `ScatteredSum.evaluate`, which maps points to samples.
+        """
 
         def eval(self, samples: Array) -> tuple[Array, Array]:
             found = sums.at(samples.numpy().reshape(-1, *sums.shape))
@@ -106,7 +120,14 @@ def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
 
 
 def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first cell that each point's spreading kernel covers, and the kernel's weights (point, cell)."""
+    """Return the first cell over which a kernel spreads each point along an axis, and the weights (point, cell).
+
+    The cells are the squares of the finer, periodic grid on which Fourier sums over points are computed.
+
+    turns: coordinate of each point, in units of the grid's period.
+    period: number of cells in the grid.
+    width: width of the kernel in cells.
+    """
     place = np.asarray(turns, dtype=np.float64) * period
     first = np.ceil(place - width / 2).astype(np.int64)
     z = (np.arange(width) + first[:, None] - place[:, None]) * (2 / width)
@@ -115,7 +136,12 @@ def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.
 
 @lru_cache(maxsize=64)
 def _transform(width: int, period: int, n: int) -> np.ndarray:
-    """Return the transform of the spreading kernel at the n samples of the sum."""
+    """Return the Fourier transform of the kernel that spreads a point over cells, for one axis.
+
+    width: width of the kernel in cells.
+    period: number of cells in the finer, periodic grid.
+    n: number of samples of the Fourier sums along this axis. Their indices k are the frequencies of the result.
+    """
     node, weight = gauss_legendre(TRANSFORM_NODES)
     z, weight = 2 * node - 1, width * weight
     shape = weight * np.exp(SLOPE * width * (np.sqrt(1 - z * z) - 1))

@@ -40,9 +40,10 @@ class Once(torch.autograd.Function):
 
 
 def once(numbers: Mapping[str, torch.Tensor], values: Mapping[str, Any]) -> dict[str, torch.Tensor]:
-    """Return tensors by name that can be differentiated only once.
+    """Return tensors, by name, that equal those given, but can be differentiated only once.
 
-    values: their numbers, see `plain_numbers`.
+    values: NumPy copies of the given tensors from `plain_numbers`. They are attached to the new tensors, so that they
+        need not be copied from a GPU again.
     """
     found = {name: Once.apply(tensor) for name, tensor in numbers.items()}
     for name, tensor in found.items():
@@ -134,8 +135,9 @@ def common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
 def computing_device(numbers: Mapping[str, torch.Tensor], otherwise: torch.device) -> torch.device:
     """Return the device on which PyTorch computes with these tensors.
 
-    It is the device of the tensors with axes. If they have several, or there are none, it is `otherwise`. If it is
-    one of ON_PROCESSOR, the device of Dr.Jit is returned.
+    It is the device that the tensors share. Single numbers on the CPU are not considered, because they fit any device.
+    If the tensors are on several devices, or only such single numbers are given, it is `otherwise`. If the device found
+    in this way is of the type cpu, mps or meta, the device on which Dr.Jit computes is returned instead.
     """
     places = {tensor.device for tensor in numbers.values() if tensor.ndim or tensor.device.type != "cpu"}
     found = places.pop() if len(places) == 1 else otherwise
@@ -143,9 +145,9 @@ def computing_device(numbers: Mapping[str, torch.Tensor], otherwise: torch.devic
 
 
 def plain_numbers(numbers: Mapping[str, torch.Tensor]) -> dict[str, Any]:
-    """Return the numbers of tensors by name, without derivatives, as NumPy arrays or numbers.
+    """Return the values of tensors, by name, as NumPy arrays or single numbers without derivatives.
 
-    Those of tensors on a GPU are copied together, because the program waits for each copy.
+    If several tensors are on one GPU, their values are copied together, because the program waits for each copy.
     """
     away = {name: t for name, t in numbers.items() if t.device.type not in ON_PROCESSOR and not is_known(t)}
     copied: dict[str, Any] = {}
@@ -157,6 +159,6 @@ def plain_numbers(numbers: Mapping[str, torch.Tensor]) -> dict[str, Any]:
 
 
 def on_device(place: torch.device, values: np.ndarray) -> torch.Tensor:
-    """Return an array of NumPy as a tensor on a device. On the processor, both share their memory."""
+    """Return an array of NumPy as a tensor on a device. On the processor, tensor and array share memory."""
     tensor = torch.from_numpy(values)
     return tensor if place.type == "cpu" else tensor.to(place)

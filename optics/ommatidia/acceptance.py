@@ -1,4 +1,4 @@
-"""Acceptance function of an ommatidium: its angular sensitivity at several wavelengths, tabulated on a grid of sines.
+"""Acceptance function of an ommatidium: its sensitivity at several wavelengths, tabulated on a grid of directions.
 
 A renderer draws rays from such a table, and a table's integral is the solid angle from which an ommatidium collects
 light.
@@ -27,10 +27,13 @@ DIGITS = 4.0  # choice: digits of amplitudes
 
 @dataclass(frozen=True)
 class AcceptanceFunction(ReadOnlyArrays):
-    """Fraction that a rhabdom absorbs of a distant point source's light on its facet, for a grid of directions.
+    """Sensitivity of an ommatidium to the direction of a distant point source, on a grid of directions.
 
-    sines: sines of the source's direction along x and y, ascending, (n,). Both axes have the same sines.
-    values: fraction for each wavelength, (band, y, x); 0 outside the unit circle.
+    The sensitivity is the power that the rhabdom absorbs, as a fraction of the power incident on the facet.
+
+    sines: sines of the source's direction along one axis of the grid, ascending, (n,). The axes x and y have the same
+        sines.
+    values: sensitivity for each wavelength, 0 outside the unit circle, (band, y, x).
     """
 
     sines: np.ndarray
@@ -53,18 +56,19 @@ class AcceptanceFunction(ReadOnlyArrays):
 
 
 def acceptance_function(ommatidium: Ommatidium, wavelengths: np.ndarray, loss: float = 5e-3) -> AcceptanceFunction:
-    """Return the acceptance function of an ommatidium.
+    """Return the acceptance function of an ommatidium: its sensitivity on a grid of directions.
 
-    Calls with the same ommatidium and equal other arguments return the same object. The grid is widened until it
-    contains all but the fraction `loss` of the light that the modes accept from all directions, at each wavelength. Its
-    half width is at most a sine of 0.5, so wider fields lose more.
+    Calls with the same ommatidium and with equal wavelengths and loss return the same object. The grid is widened
+    until, at each wavelength, it contains all but the fraction `loss` of the light that the modes accept from all
+    directions. It extends at most to sines of ±0.5 along each axis. If the ommatidium accepts light from a wider field,
+    the grid misses more light than `loss`.
 
     wavelengths: vacuum wavelengths [m], (band,).
     loss: fraction in [1e-5, 0.1].
 
     Raises:
-        ValueError: an argument is outside its valid range, the rhabdom guides no mode, or see `Waveguide.modes`. The
-            pupil has a relief of pixels, or a number of it carries a derivative.
+        ValueError: an argument is outside its valid range, the rhabdom guides no mode, the pupil's relief is a
+            `PixelRelief`, or one of the pupil's parameters carries a derivative. See also `Waveguide.modes`.
     """
     of_kind("ommatidium", ommatidium, Ommatidium, "Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6))")
     at = tuple(float(one) for one in wavelength_row(wavelengths))
@@ -91,7 +95,10 @@ def _tabulated(ommatidium: Ommatidium, wavelengths: tuple[float, ...], loss: flo
 
 
 def _accepted(ommatidium: Ommatidium, wavelength: float, grid: Grid) -> tuple[np.ndarray, float]:
-    """Return the accepted fraction for a grid of sines (y, x), and its integral relative to that over all sines."""
+    """Return the sensitivity on a grid of sines of the light's direction, (y, x), and the part that the grid contains.
+
+    This part is the integral of the sensitivity over the grid, divided by its integral over all sines.
+    """
     steepest = math.hypot(grid.dx * grid.shape[0] / 2, grid.dx * grid.shape[1] / 2)
     coupled: ModesAtPupil = coupled_modes(ommatidium, wavelength, next((s for s in STEEPEST if s >= steepest), 1.0))
     taken = np.array([ommatidium.rhabdom.absorbed(mode) for mode in ommatidium.modes(wavelength)])

@@ -84,9 +84,12 @@ class ModesAtPupil:
         return found / self.area
 
     def total(self, taken: np.ndarray) -> float:
-        """Return the integral of `power_on` over all sines, (λ/n₀)² Σ |P Ψ|² dξ / area, by Parseval's theorem.
+        """Return the integral of `power_on` over the sines of all directions of the light.
 
-        λ/n₀ is the wavelength in front of the pupil, and P Ψ dξ are the `weights`.
+        `power_on` is the fraction of the pupil's light that each mode accepts, times the mode's weight, summed over
+        modes. By Parseval's theorem, the integral for one mode is (λ/n₀)² Σ |P Ψ|² dξ / area. λ/n₀ is the wavelength in
+        front of the pupil, P the amplitude that the pupil transmits, and Ψ the mode's field at a node with the area dξ.
+        The sum is over the nodes, for which `weights` contains P Ψ dξ.
 
         taken: weight of each mode.
         """
@@ -101,14 +104,15 @@ def modes_at_pupil(
     place: tuple[float, float] = (0.0, 0.0),
     digits: float = DIGITS,
 ) -> ModesAtPupil:
-    """Propagate modes of a waveguide back to the pupil. The waveguide's end lies in the plane at the beam's distance.
+    """Propagate modes of a waveguide back to the pupil. The waveguide's end lies at `beam.distance` behind it.
 
-    steepest: largest sine of the light's directions, relative to the beam's source.
-    place: position (x, y) [m] of the end off the axis.
+    steepest: largest difference between the sines of the light's direction and those of the direction of the beam's
+        source.
+    place: position (x, y) [m] of the waveguide's end, relative to the pupil's axis.
     digits: digits of the sums over the pupil.
 
     Raises:
-        ValueError: the pupil has a relief of pixels, or an argument carries a derivative.
+        ValueError: the pupil's relief is a `PixelRelief`, or an argument carries a derivative.
     """
     pupil, wavelength, z = beam.pupil, beam.wavelength, number(beam.distance)
     if pupil.pixels:

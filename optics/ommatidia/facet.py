@@ -26,9 +26,9 @@ class FacetLens:
     radius_front, radius_back: radii of curvature [m], positive if the centre lies behind the surface. A biconvex lens
         has a negative radius_back.
     thickness: thickness [m] of the lens on its axis, 0 or more.
-    n, object_n, medium_n: refractive indices of the lens, of the medium in front of it, and of the cone behind it. Each
-        is a number or a dispersion curve. With curves, the focus of an `Ommatidium` with this lens depends on the
-        wavelength, but `pupil` has the same focus for all wavelengths.
+    n, object_n, medium_n: refractive indices of the lens, of the medium in front of the lens, and of the crystalline
+        cone behind the lens. Each is a number or a dispersion curve. With curves, the focus of an `Ommatidium` with
+        this lens depends on the wavelength, but `pupil` has the same focus for all wavelengths.
     shape: "hexagon", with corners along y, or "circle".
 
     Raises:
@@ -74,9 +74,10 @@ class FacetLens:
         return self._index("medium_n", wavelength) / self.power(wavelength)
 
     def object_focal_length(self, wavelength: float = MIDDLE) -> float:
-        """Return the focal length f [m] in front of the lens: the index there, divided by the power.
+        """Return the focal length f [m] in front of the lens.
 
-        A receptor of width d sees the angle d/f.
+        It is the index of the medium in front of the lens, divided by the power of the lens. A receptor of width d sees
+        the angle d/f.
         """
         return self._index("object_n", wavelength) / self.power(wavelength)
 

@@ -70,8 +70,9 @@ class AppositionEye:
     def field(self, wavelength: float = 500e-9) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return directions x, y [rad] relative to the ommatidium's axis, flat, and their weights, which sum to 1.
 
-        The directions are every second sample of `acceptance_function`. They contain at least 99 % of the accepted
-        light, unless the field reaches a sine of 0.5.
+        The directions are every second sample of `acceptance_function`. They end at the latest at sines of ±0.5 along
+        each axis. They contain at least 99 % of the light that the ommatidium accepts, unless more than 1 % comes from
+        beyond this limit.
 
         wavelength: vacuum wavelength [m].
 

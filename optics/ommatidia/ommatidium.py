@@ -55,7 +55,9 @@ class Ommatidium:
         return self.lens.pupil() if isinstance(self.lens, FacetLens) else self.lens
 
     def _beam(self, wavelength: float) -> Beam:
-        """Return axial light of a vacuum wavelength [m], from the lens to the end of the rhabdom that faces it.
+        """Return light that travels along the axis, from the lens to the near end of the rhabdom.
+
+        wavelength: vacuum wavelength [m].
 
         Raises:
             ValueError: the principal plane of the lens lies behind the end of the rhabdom.
@@ -71,17 +73,19 @@ class Ommatidium:
         return self.rhabdom.modes(wavelength)
 
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Return the fraction of a distant point source's light on the facet that enters each mode, (mode, ...).
+        """Return the fraction of the light on the facet that enters each mode, for a distant point source, (mode, ...).
 
-        angle_x, angle_y: angles [rad] between the axis of the lens and the direction of the source, projected onto the
-            planes (x, z) and (y, z). The light travels in the opposite direction, so its `PointSource` has the negative
-            angles. The arrays are broadcast together, to the shape (...).
+        Here ... is the shape to which the angles are broadcast.
+
+        angle_x, angle_y: angles [rad] from the axis of the lens to the direction in which the source lies, projected
+            onto the planes (x, z) and (y, z). A `PointSource` instead has the angles of the direction in which its
+            light travels. The `PointSource` for angles a and b therefore has the angles -a and -b.
         wavelength: vacuum wavelength [m].
 
         Raises:
-            ValueError: an angle has a sine above 0.5 or below -0.5, the shapes of the angles cannot be broadcast, or
-                the rhabdom has no modes. The pupil has a relief of pixels, or a number of it carries a derivative. See
-                also `Waveguide.modes`.
+            ValueError: an angle has a sine above 0.5 or below -0.5, the shapes of the angles cannot be broadcast, the
+                rhabdom has no modes, the pupil's relief is a `PixelRelief`, or one of the pupil's parameters carries a
+                derivative. See also `Waveguide.modes`.
         """
         x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)
         try:
@@ -99,9 +103,10 @@ class Ommatidium:
         return found.reshape(len(found), *x.shape)
 
     def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Return the fraction that the rhabdom absorbs of a distant point source's light on the facet.
+        """Return the power that the rhabdom absorbs from a distant point source, divided by the power on the facet.
 
-        angle_x, angle_y: see `mode_power`. The result has the shape to which both broadcast.
+        angle_x, angle_y: see `mode_power`. The result has the shape to which both are broadcast.
+        wavelength: vacuum wavelength [m].
 
         Raises:
             ValueError: see `mode_power`.
@@ -112,14 +117,14 @@ class Ommatidium:
     def acceptance_angle(self, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
         """Return the acceptance angle Δρ [rad]: the full width at half maximum of the sensitivity.
 
-        It is measured along a line through the axis at an azimuth from x. If the sensitivity has several lobes, the
-        angle is that between the two outermost directions at half maximum.
+        The direction of the source varies in a plane that contains the axis of the lens. If the sensitivity has several
+        lobes, the angle is measured between the two outermost directions at half maximum.
 
-        azimuth_deg: azimuth [degrees] from x towards y, -360 to 360.
+        azimuth_deg: azimuth [degrees] of this plane, counted from x towards y, -360 to 360.
 
         Raises:
-            ValueError: the azimuth is outside its range, the rhabdom is so far from the focus that no peak is found, or
-                see `mode_power`.
+            ValueError: the azimuth is outside its range, or the rhabdom is so far from the focus that no peak is found.
+                See also `mode_power`.
         """
         pupil = self.pupil
         turn = math.radians(in_range("azimuth_deg", azimuth_deg, -360, 360))
@@ -150,7 +155,10 @@ class Ommatidium:
         return float(at[1]) if bend >= 0 else float(at[1]) + step * (left - right) / (2 * bend)
 
     def _half(self, low: float, high: float, peak: float, turn: float, wavelength: float) -> float:
-        """Return the angle between `low` and `high` at which the sensitivity is half of `peak`, by a cubic fit."""
+        """Return the angle [rad], in the range from `low` to `high`, at which the sensitivity is half of `peak`.
+
+        In this range, the angle is fitted by a cubic polynomial of the sensitivity.
+        """
         at = np.linspace(low, high, 4)
         seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
         return float(np.polynomial.polynomial.polyval(peak / 2, np.polynomial.polynomial.polyfit(seen, at, 3)))
@@ -185,8 +193,9 @@ def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wave
     waveguide.
 
     diameter, rhabdom: diameters D of the facet and d of the rhabdom [m].
-    focal_length: focal length f [m] in front of the lens, the index there divided by the power of the lens.
-    wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
+    focal_length: focal length f [m] in front of the lens. It is the refractive index of the medium in front of the
+        lens, divided by the power of the lens.
+    wavelength: vacuum wavelength λ [m], for an eye in air. For an eye under water, divide it by the index of water.
 
     Raises:
         ValueError: a length is not positive, or the wavelength is above 1 m.

@@ -69,9 +69,16 @@ def radiated(
 
 
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return a function that maps a mode's index to its G D² at points with the distances D = z/cos θ.
+    """Return a function for the field of each mode at points of the pupil, for a waveguide on the pupil's axis.
 
-    The values are interpolated linearly between closely spaced points. G is defined at the top of the module.
+    The function maps a mode's index to values of G D², (point,). G(sin θ, D) is proportional to the field that the mode
+    radiates to a point at the distance D from the waveguide's end. θ is the angle from the waveguide's axis to the line
+    between the waveguide's end and the point. G is an integral over the waveguide's end, see the top of the module. For
+    a waveguide on the axis, D is z/cos θ, where z is the distance of the end from the pupil, so G depends on θ alone.
+    It is computed at closely spaced θ, and interpolated linearly between them.
+
+    sine, distance: sin θ and D of the points, (point,).
+    k: wavenumber [1/m].
     """
     z = float((distance * np.sqrt(1 - sine**2)).mean())
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
@@ -88,9 +95,15 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """Return a function that maps a mode's index to its G D² at points with arbitrary sines and distances D.
+    """Return a function for the field of each mode at points of the pupil, for a waveguide off the pupil's axis.
 
-    G is defined at the top of the module.
+    The function maps a mode's index to values of G D², (point,). G(sin θ, D) is proportional to the field that the mode
+    radiates to a point at the distance D from the waveguide's end. θ is the angle from the waveguide's axis to the line
+    between the waveguide's end and the point. G is an integral over the waveguide's end, see the top of the module. It
+    is interpolated in sin θ and in 1/D, which are independent of each other.
+
+    sine, distance: sin θ and D of the points, (point,).
+    k: wavenumber [1/m].
     """
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
     nearness = (1 - CLEAR) / float(distance.max()), (1 + CLEAR) / float(distance.min())
@@ -105,9 +118,14 @@ def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: f
 
 
 def _in_guide_frame(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
-    """Return sin θ, φ and D of points of a pupil, in the frame of the waveguide's end.
+    """Return sin θ, φ and D, the spherical coordinates of points of a pupil about the waveguide's end, each (point,).
 
-    This frame is the pupil's frame, rotated along the shortest arc from the pupil's axis to the waveguide's axis.
+    θ is the angle from the waveguide's axis, φ the azimuth about this axis, and D the distance [m] from the centre of
+    the waveguide's end. The azimuth is counted in the pupil's frame after a rotation along the shortest arc from the
+    pupil's axis to the waveguide's axis.
+
+    x, y: positions [m] of the points on the pupil.
+    end: position (x, y, z) [m] of the waveguide's end.
     """
     there = np.stack([x - end[0], y - end[1], np.full(len(x), -end[2])])
     axis, normal = -np.array(end) / math.hypot(*end), np.array([0.0, 0.0, -1.0])
@@ -125,12 +143,20 @@ def _scaled(at: np.ndarray, ends: Ends) -> np.ndarray:
 
 
 def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
-    """Return Chebyshev points for a function whose phase changes by `radians` over half the range."""
+    """Return Chebyshev points in the range `ends` for a function whose phase changes by `radians` over half of it."""
     return (ends[0] + ends[1] + (ends[1] - ends[0]) * chebyshev_points(math.ceil(1.2 * radians) + spare)) / 2
 
 
 def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> np.ndarray:
-    """Return G D² at places (sin θ, D), (mode, place), by quadrature. G is defined at the top of the module."""
+    """Return values of G D² by quadrature over the modes' fields, for pairs of sin θ and D, (mode, pair).
+
+    G(sin θ, D) is proportional to the field that a mode radiates to a point at the distance D from the waveguide's end
+    and at the angle θ from the waveguide's axis. G is the integral of ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} over the
+    waveguide's end, where ψ(x) is the mode's field at a position x on this end, and d the distance from x to the point.
+
+    sine, distance: sin θ and D [m] of each pair, (pair,).
+    k: wavenumber [1/m].
+    """
     u, v, weight = _mode_nodes(modes, k * float(sine.max()))
     # G is the same for the modes with sin lφ and with cos lφ. Only the cosine is nonzero at φ = 0, so it is used.
     amplitude = np.stack([weight * replace(mode, sine=False).field(u, v) for mode in modes], axis=1)

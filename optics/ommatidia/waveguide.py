@@ -43,8 +43,9 @@ class Mode:
     def field(self, x: Any, y: Any) -> np.ndarray:
         """Return the amplitude ψ [1/m] at (x, y) [m], with ∫ψ² = 1.
 
-        It is proportional to J_l(Ur/b) in the core of radius b and to K_l(Wr/b) outside, with Bessel's functions J and
-        K at the distance r from the axis, times cos lφ or sin lφ.
+        The amplitude is proportional to J_l(Ur/b) cos lφ in the core and to K_l(Wr/b) cos lφ outside, or sin lφ instead
+        of cos lφ. Here r is the distance from the axis, φ the azimuth, and b the radius of the core. J and K are
+        Bessel's functions, and U and W are the solutions `u` and `w` of the mode equation.
 
         x, y: positions relative to the waveguide's axis, in arrays whose shapes broadcast.
 
@@ -95,18 +96,20 @@ class Waveguide:
 
     In a taper, light enters the modes of the tip, and each mode keeps its light while it becomes the local mode of the
     thinner guide (Snyder & Love, ch. 19). A mode that reaches its cut-off loses its remaining light. This model holds
-    for slow tapers, whose radius shrinks by less than itself over a beat length 2π/(β₁ - β₂). β₁ belongs to the mode
-    LP01, and β₂ to LP02 or, without it, to the surroundings (Love et al., IEE Proc. J 138, 343, 1991). Tapers that are
-    too fast at the tip are refused.
+    for slow tapers: the slope of the radius b along the guide is at most b divided by the beat length 2π/(β₁ - β₂). β₁
+    is the propagation constant of the mode LP01, and β₂ that of LP02 or, if LP02 is not guided, of light in the
+    surroundings (Love et al., IEE Proc. J 138, 343, 1991). Tapers that exceed this slope at the tip are refused.
 
     diameter: diameter [m] of the core at the tip, where light enters.
     n_core, n_clad: refractive indices of core and surroundings, constant or dispersive. The index of the core should be
         only slightly larger, because modes are computed for weak guiding.
     length: length [m] over which light is absorbed (None: all guided light is absorbed).
     absorption: absorption coefficient of the core [1/m] at the pigment's peak. A mode loses the fraction 1 -
-        exp(-absorption · core_share · length) of its light.
-    proximal_diameter: diameter [m] of the core at its far, proximal end, at most `diameter` (None: equal to it). In
-        between, the diameter is linear, and core_share is averaged over the length on which the mode is guided.
+        exp(-absorption · core_share · length) of its light, where `Mode.core_share` is the fraction that travels in the
+        core.
+    proximal_diameter: diameter [m] of the core at its far, proximal end, at most `diameter` (None: equal to it). The
+        diameter falls linearly between the ends, and core_share is averaged over the length on which the mode is
+        guided.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -152,7 +155,7 @@ class Waveguide:
         return v
 
     def modes(self, wavelength: float) -> tuple[Mode, ...]:
-        """Return the modes that the tip guides at a vacuum wavelength [m], the best confined first.
+        """Return the modes guided at the tip, where light enters, at a vacuum wavelength [m], the best confined first.
 
         Modes with l >= 1 come in pairs. The result is empty if V is very small, such as 0.3: light then travels almost
         only outside the core.
@@ -191,11 +194,12 @@ class Waveguide:
         return self.length if end > mode.cut_off or end == v else self.length * (v - mode.cut_off) / (v - end)
 
     def absorbed(self, mode: Mode) -> float:
-        """Return the fraction of a mode's light that is absorbed along the length, or up to its cut-off.
+        """Return the fraction of a mode's light that the waveguide absorbs; 1 if `length` is None.
 
-        It is 1 if `length` is None.
-
-        For a taper, the mean of core_share comes from a quadrature over the length, with an error below 2e-6.
+        The light of a mode is absorbed along the whole length or, in a taper that becomes too narrow for the mode, only
+        up to the place from which on the mode is not guided. The absorption per length is proportional to
+        `Mode.core_share`, the fraction of the light that travels in the core. In a taper, this fraction changes along
+        the guide. Its mean is computed by quadrature, with an error below 2e-6.
         """
         if self.length is None:
             return 1.0
@@ -229,7 +233,11 @@ def _core_share(l: int, m: int, v: float) -> float:
 
 @lru_cache(maxsize=4096)
 def _brackets(l: int, count: int) -> list[tuple[float, float]]:
-    """Return (cut-off, largest U) of the first `count` modes of azimuthal order l. The largest U is a zero of J_l."""
+    """Return the least and the largest U of each of the first `count` modes of azimuthal order l.
+
+    U is the mode parameter for the core, which increases with the waveguide parameter V. At the mode's cut-off, the
+    least V at which the mode is guided, U equals V. The largest U, the limit for large V, is a zero of J_l.
+    """
     from scipy.special import jn_zeros
 
     cutoffs = [0.0, *jn_zeros(1, count)] if l == 0 else list(jn_zeros(l - 1, count))
@@ -246,7 +254,8 @@ def _roots(l: int, v: float) -> tuple[float, ...]:
 def _root(l: int, low: float, high: float, v: float) -> float | None:
     """Return the root of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W) between low and high; None without a root.
 
-    Here W² = v² - U². Each mode above its cut-off has one root, between a zero of J_{l-1} and the next zero of J_l.
+    Here W² = v² - U². The roots are the mode parameters U of a waveguide with the waveguide parameter V = v. Each
+    guided mode of azimuthal order l has one root, between a zero of J_{l-1} and the next zero of J_l.
     """
     from scipy.optimize import brentq
     from scipy.special import jv, kve

@@ -53,16 +53,18 @@ def arriving_light(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]
 
 
 def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
-    """Return the fraction of the light that passes the mask and is not evanescent, and its uncertainty, (wavelength,).
+    """Return the fraction of the pupil's light that is not evanescent, and this fraction's uncertainty, (wavelength,).
+
+    The fraction excludes light that the pupil's mask absorbs.
 
     The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge.
     For rays along the axis and an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent.
-    For other rays, this fraction is multiplied by the result of `_at_edge`. It is also multiplied by the mask's
-    transmission along the edge, relative to that of the whole aperture. Light that the relief bends beyond grazing is
-    evanescent, too.
+    For other rays, this fraction is multiplied by the factor for oblique rays that `_at_edge` returns. It is also
+    multiplied by the mask's transmission along the edge, relative to that of the whole aperture. Light that the relief
+    bends so far that its sine would exceed 1 is evanescent, too.
 
-    If this estimate is too uncertain, and the pupil is at most some wavelengths wide, the spectrum of the light behind
-    the pupil is summed instead.
+    If this estimate is too uncertain, and the pupil is not too wide, the fraction is instead the sum of the power
+    spectrum of the light behind the pupil (`_summed`).
     """
     import drjit as dr
 
@@ -91,7 +93,10 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
 
 
 def _mean(result: PSFResult, values: Sequence[Array]) -> Array:
-    """Return values, one for each request of a PSF, as one array; or their weighted mean if the PSF is a mean."""
+    """Return the values of a PSF as one array or, if the PSF is a mean over wavelengths, their weighted mean.
+
+    values: one value for each wavelength for which the PSF was computed.
+    """
     import drjit as dr
 
     types = precision("float64")
@@ -100,18 +105,22 @@ def _mean(result: PSFResult, values: Sequence[Array]) -> Array:
 
 
 def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
-    """Return the result of `_mean` for numbers or tuples of numbers, as a NumPy array."""
+    """Return the values of a PSF or, if the PSF is a mean over wavelengths, their weighted mean, as a NumPy array.
+
+    values: a number or a tuple of numbers for each wavelength for which the PSF was computed.
+    """
     found = np.array(values)
     return found if result.shares is None else np.atleast_1d(result.shares @ found)
 
 
 def _at_edge(request: Request) -> Array:
-    """Return the evanescent light that the aperture's edge diffracts, relative to that for rays parallel to the axis.
+    """Return the factor by which oblique rays increase the evanescent light that the aperture's edge diffracts.
 
-    A point of the edge spreads its light along the line s + t n of frequencies, in units of 1/λ. Here s is the
-    frequency of the ray, and n is the normal of the edge. The power of this light is proportional to 1/t². The line
-    leaves the unit circle at t = -s·n ± √((s·n)² + 1 - s²). The power outside the circle is √((s·n)² + 1 - s²) / (1 -
-    s²) times the power for s = 0. The result is the mean over the edge.
+    The factor is 1 for rays parallel to the axis. A point of the edge spreads its light along a line of spatial
+    frequencies, s + t n, in units of 1/λ. Here s is the frequency of the ray at this point, and n is the normal of the
+    edge. The power of this light is proportional to 1/t². The line leaves the unit circle, beyond which light is
+    evanescent, at t = -s·n ± √((s·n)² + 1 - s²). The power outside the circle is √((s·n)² + 1 - s²) / (1 - s²) times
+    the power for s = 0. The result is the mean of this factor over the edge.
     """
     import drjit as dr
 
@@ -134,9 +143,12 @@ def _at_edge(request: Request) -> Array:
 
 
 def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
-    """Return the fraction of the pupil's light that the relief bends beyond grazing, and its uncertainty.
+    """Return the fraction of the pupil's light that does not propagate according to ray optics, and its uncertainty.
 
-    Diffraction spreads the light of a ray over sines of about √(λ/R), with the wavelength λ and the pupil's radius R.
+    The sine of the angle between a ray and the axis is the slope of the optical path behind the pupil, divided by the
+    refractive index. A ray with a sine of 1 or more does not propagate. Diffraction changes the sine by about √(λ/R),
+    with the wavelength λ and the pupil's radius R. The uncertainty is the fraction of rays with a sine above
+    1 - √(λ/R).
     """
     pupil, problem = request.beam.pupil, request.problem
     slopes = pupil.slopes(request.beam.wavelength, request.beam.source)
@@ -147,13 +159,14 @@ def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
 
 
 def _summed(request: Request, unsure: float = 1.0) -> Array | None:
-    """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum cannot be fast enough.
+    """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum would take too long.
 
-    The fraction is ∫ |F(u)|² df / A over |f| < 1/λ, with the field u behind the pupil and the area A of its aperture.
-    Lengths are in units of the radius. |F(u)|² has no structure finer than one cycle per diameter. The result is also
-    None for pixelated reliefs and for pupils with more than 100 cycles per radius.
+    The fraction is computed as a sum that replaces a less certain estimate. It is ∫ |F(u)|² df / A over |f| < 1/λ, with
+    the field u behind the pupil and the area A of its aperture. Lengths are in units of the radius. |F(u)|² has no
+    structure finer than one cycle per diameter. The result is also None for pixelated reliefs and for pupils with more
+    than 100 cycles per radius.
 
-    unsure: uncertainty of the estimate. The larger it is, the longer the sum may take.
+    unsure: uncertainty of this estimate. The larger it is, the longer the sum may take.
     """
     beam, asked = request.beam, request.problem
     problem = Problem.from_beam(beam, asked.window, asked.tolerance, asked.dtype, derivatives=False)
@@ -177,8 +190,8 @@ def _summed(request: Request, unsure: float = 1.0) -> Array | None:
 class _Sum:
     """Sum of the power spectrum behind a pupil over frequencies inside a circle.
 
-    x, y, weight: nodes of the pupil, in units of its radius R
-    seen: nodes of the unit circle of frequencies, in units of 1/λ
+    x, y, weight: quadrature nodes in the pupil, in units of its radius R
+    seen: quadrature nodes in the circle of frequencies, in units of its radius 1/λ
     """
 
     x: np.ndarray
@@ -190,10 +203,10 @@ class _Sum:
         """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ and the pupil's radius R.
 
         W is the optical path in waves. The outer sum is over the frequencies (sx, sy) of weight w, the inner sum over
-        the pupil's nodes with amplitudes u.
+        the pupil's nodes (x, y) with amplitudes u.
 
-        Derivatives come from the adjoint of the sum, which consists of three sums of the same size. It is computed only
-        if a number of the beam carries a derivative.
+        Derivatives come from the adjoint of the sum, which consists of three sums of the same size. The adjoint is
+        computed only if h, W or u carries a derivative.
         """
         import drjit as dr
 
@@ -217,11 +230,17 @@ class _Sum:
 
     @staticmethod
     def _slopes(at: Sequence[Array], places: Sequence[Array], back: Sequence[Array], total: Array) -> tuple[Array, ...]:
-        """Return the derivatives of `fraction` with respect to h, and to the waves and the amplitudes of the nodes.
+        """Return the derivatives of `fraction`, the power inside a circle of frequencies, with respect to h, W and u.
 
-        at: h, waves and amplitudes
-        places: x, y of the nodes, and sx, sy of the frequencies
-        back: w times the conjugate of the spectrum at each frequency, real and imaginary part
+        h is the radius of the pupil divided by the wavelength. At each node of the pupil, W is the optical path [waves]
+        and u the amplitude. The spectrum at a frequency (sx, sy) is the sum of u exp(2πi (W - h (sx x + sy y))) over
+        the nodes (x, y). `fraction` is h² times the weighted sum of the spectrum's squared modulus over the
+        frequencies.
+
+        at: h, and W and u of all nodes.
+        places: coordinates x, y of the nodes, followed by the coordinates sx, sy of the frequencies.
+        back: real and imaginary part of the spectrum's complex conjugate, multiplied by the weight of each frequency.
+        total: the value of `fraction`.
         """
         import drjit as dr
 

@@ -38,14 +38,16 @@ __all__ = ["PSFBatch", "psf_batch"]
 
 @dataclass(frozen=True, eq=False)
 class PSFBatch(OnWindow):
-    """PSFs of many eyes.
+    """PSFs of many eyes, at several source distances (depths) and wavelengths.
 
-    tensor: PSFs [1/m²] as a Dr.Jit tensor (eye, depth, wavelength, y, x) with derivatives.
+    tensor: PSFs [1/m²] as a Dr.Jit tensor with derivatives, (eye, depth, wavelength, y, x).
     psf: the same as a NumPy array.
     dx: pitch [m] of the samples.
     plans: one plan per PSF, in the same order, as a flat tuple.
-    members: light of each PSF, in the order of `plans`.
-    setup: parameters that all PSFs share, with the source and the sensor's distance of the first PSF.
+    members: the light from which each PSF was computed (pupil, source, wavelength and sensor's distance), in the order
+        of `plans`.
+    setup: window, tolerance, method and dtype, which all PSFs share. The source and the sensor's distance in `setup`
+        are those of the first PSF only.
 
     See PSFResult for conventions.
     """
@@ -120,10 +122,11 @@ def psf_batch(
     source_distances: sequence of distances [m] of sources on the axis.
     dx, shape, tolerance, method, dtype: see `optics.psf`.
 
-    At tolerances of 3e-4 or more, with the method "auto", "exact" or "low_rank", all PSFs are planned together, and
-    PSFs with equal numbers of samples are computed as stacks of matrix products. The error of each PSF is checked.
-    Pupils with derivatives or pixels are excluded, as are PSFs that remain inaccurate or take long. These are planned
-    one by one, before the first of them is computed.
+    At tolerances of 3e-4 or more, with the method "auto", "exact" or "low_rank", the samples for all PSFs are chosen
+    together, and PSFs with equal numbers of samples are computed as stacks of matrix products. The error of each PSF is
+    checked. All other PSFs are planned and computed one by one: PSFs of pupils with derivatives or with a
+    `PixelRelief`, and PSFs that would otherwise be inaccurate or take long. The first of them is computed after all of
+    them have been planned.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.
@@ -178,9 +181,10 @@ def _members(
 def _joined(
     known: dict[int, tuple[np.ndarray, Plan]], rest: dict[int, tuple[Array, Plan]], types: Precision
 ) -> tuple[Array, list[Plan]]:
-    """Return all PSFs in one array, and their plans.
+    """Return all PSFs as one flat array in the order of their indices, and their plans in the same order.
 
-    known, rest: PSFs of stacks, and all other PSFs, by index.
+    known: PSF and plan, by index, of the PSFs that were computed together as stacks of matrix products.
+    rest: PSF and plan, by index, of all other PSFs, which were computed one by one.
     """
     import drjit as dr
 

@@ -7,8 +7,9 @@ distance ρ from the centre, the weight is
 
     w(ρ, R) = 2π R ∫ G(f) J₁(2πRf) J₀(2πρf) df
 
-Weights are even in ρ and in R, and no frequency in them exceeds the end of G. They are therefore interpolated between
-evenly spaced distances and radii. Lengths are in units of 1/cutoff, frequencies in units of the cutoff.
+Weights are even in ρ and in R, and contain no frequencies above the one from which on G is 0. They are therefore
+interpolated between evenly spaced distances and radii. Lengths are in units of 1/cutoff, frequencies in units of the
+cutoff.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class SoftCircles:
     w(ρ, R) is the weight of a sample at the distance ρ from the centre for a circle of radius R. J₀ and J₁ are Bessel's
     functions.
 
-    near: indices of the samples that contribute to any circle.
+    near: indices of the samples that contribute to at least one circle.
     samples: interpolation between these samples and evenly spaced distances (sample, distance), sparse.
     to_spectrum: J₀ (distance, frequency).
     from_spectrum: J₁ with the weights of the quadrature (frequency, radius).
@@ -54,9 +55,14 @@ class SoftCircles:
 
     @classmethod
     def around(cls, distance: np.ndarray, radii: np.ndarray, kernel: SoftEdge) -> SoftCircles:
-        """Return the sums over samples at these distances (sample,) for circles of these radii (radius,).
+        """Return the matrices for weighted sums over samples within circles about one centre.
 
-        Distances and radii are in units of 1/cutoff, where the cutoff is the intensity's highest frequency.
+        Distances and radii are in units of 1/cutoff, where the cutoff is the highest frequency of the intensity that is
+        summed.
+
+        distance: distance of each sample from the centre, (sample,).
+        radii: radius of each circle, (radius,).
+        kernel: kernel that softens the edges of the circles.
         """
         from scipy.special import j0, j1
 
@@ -73,12 +79,17 @@ class SoftCircles:
         return cls(near, samples, j0(2 * math.pi * np.multiply.outer(at, f)), back, circles, distance.size)
 
     def evaluate(self, values: np.ndarray) -> np.ndarray:
-        """Return the sums (row, radius) of values (row, sample)."""
+        """Return the weighted sums within the circles, (row, radius), over values at the samples, (row, sample)."""
         spectrum = (self.samples.T @ values[:, self.near].T).T @ self.to_spectrum
         return np.asarray((self.radii @ (spectrum @ self.from_spectrum).T).T)
 
     def transposed(self, sums: np.ndarray) -> np.ndarray:
-        """Return Σ_R u_R w(ρ_j, R) at every sample (row, sample), for u (row, radius)."""
+        """Return Σ_R u_R w(ρ_j, R) for every sample j, the transpose of `evaluate`, (row, sample).
+
+        w(ρ_j, R) is the weight of sample j, at the distance ρ_j from the centre, in the sum for the circle of radius R.
+
+        sums: values u_R, one for each circle, (row, radius).
+        """
         spectrum = (self.radii.T @ sums.T).T @ self.from_spectrum.T
         found = np.zeros((len(sums), self.size))
         found[:, self.near] = (self.samples @ (spectrum @ self.to_spectrum.T).T).T
@@ -95,7 +106,7 @@ def soft_sums(circles: SoftCircles, values: Array) -> Array:
     types = precision("float64")
 
     class SoftSums(dr.CustomOp):
-        """Sums within circles as a differentiable operation."""
+        """`SoftCircles.evaluate`, the weighted sums over samples within circles, as a differentiable operation."""
 
         def eval(self, values: Array) -> Array:
             return types.Float(padded_for_packets(circles.evaluate(values.numpy().reshape(-1, circles.size))))
@@ -162,7 +173,10 @@ def _between(places: np.ndarray, step: float) -> tuple[Any, np.ndarray]:
 
 
 def _spectrum(kernel: SoftEdge, f: np.ndarray) -> np.ndarray:
-    """Return the radial spectrum of the kernel, ∫ ring(r) J₀(2πfr) dr."""
+    """Return the radial spectrum of the kernel, ∫ ring(r) J₀(2πfr) dr.
+
+    ring(r) is the kernel times 2πr, its weight on a circle of radius r.
+    """
     from scipy.special import j0
 
     node, weight = gauss_legendre(int(24 + 4 * kernel.cycles + 2 * kernel.beta))

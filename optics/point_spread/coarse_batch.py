@@ -33,9 +33,10 @@ STACK = 300_000  # choice, limited by memory: samples of pupils, or of windows, 
 def coarse_psfs(
     beams: Sequence[Beam], window: Grid, tolerance: float, dtype: str
 ) -> Iterator[tuple[int, np.ndarray, Plan]]:
-    """Yield index of the beam, PSF (y, x) [1/m²] and plan, if the PSF meets the tolerance and takes little time.
+    """Yield index of the beam, PSF (y, x) [1/m²] and plan, for each beam whose PSF meets the tolerance.
 
-    Nothing is yielded for tolerances below TIGHTEST, 3e-4. Beams with derivatives or pixelated reliefs are left out.
+    Nothing is yielded for tolerances below TIGHTEST, 3e-4. Beams with derivatives or pixelated reliefs are left out, as
+    are beams whose PSF is predicted to take 8 ms or more to compute.
     """
     if tolerance < TIGHTEST:
         return

@@ -30,11 +30,14 @@ def coarse_stack(
 ) -> tuple[Array, np.ndarray] | None:
     """Return PSFs (source, wavelength, y, x), and a mask of those that meet the tolerance, (source, wavelength).
 
-    The result is None if other methods are faster, or must be used.
+    The result is None if another method is faster or requested by `method`, if no method meets the tolerance, if the
+    tolerance is below 3e-4, or if the pupil's radius carries a derivative.
 
-    stack: the light, whose numbers may carry derivatives of PyTorch. If they are on another device than the processor,
-        it computes PSFs and errors. Only the inputs of `without`, the places of the check and the errors are copied.
-    without: the same light without derivatives, for NumPy.
+    stack: the light, whose numbers may carry derivatives of PyTorch. If these numbers are on a GPU, the GPU computes
+        the PSFs and their errors.
+    without: copy of the light for NumPy, without derivatives, from which the processor plans the samples. If `stack` is
+        on a GPU, only two more kinds of data are copied to the processor. These are the errors of the PSFs, and the
+        positions in the window at which a finer sum is computed to find the errors.
     tolerance, method: see `optics.psf`.
     """
     # Dr.Jit computes the edge of the aperture, so PyTorch cannot compute derivatives with respect to the radius.
@@ -53,10 +56,12 @@ def coarse_stack(
 
 
 def _sampling(stack: WindowStack, without: WindowStack, tolerance: float, method: str) -> WindowSampling | None:
-    """Return samples that are sufficient for the whole stack.
+    """Return samples that are sufficient for all sources and wavelengths of `stack`.
 
-    The result is None if another method is chosen for the nearest or the farthest source, or no method meets the
-    tolerance there.
+    They are planned at the shortest wavelength, for the nearest and for the farthest source. The result is None if, for
+    one of these two sources, another method is chosen or no method meets the tolerance.
+
+    without: copy of `stack` for NumPy, without derivatives.
     """
     wavelength, found = min(without.wavelengths), list[WindowSampling]()
     distances = [source.distance for source in without.sources]

@@ -36,10 +36,11 @@ def encircled_energy(
     """Return the fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m], (wavelength, radius).
 
     The result for a `WhitePSF` is (receptor type, radius). The fraction is computed as a weighted sum over samples. The
-    weights are the circle, convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at
-    frequencies that alias onto them. The sum therefore equals the integral over the sharp circle. It includes samples
-    beyond the circle, which are computed if the window does not contain them. If samples are means over cells
-    (`PSFResult.holds_cells`), each weight is about the part of the cell inside the circle.
+    weights are the circle's indicator function (1 inside, 0 outside), convolved with a kernel whose spectrum is 1 at
+    all frequencies of the intensity and 0 at frequencies that alias onto them. The sum therefore equals the integral
+    over the sharp circle. It includes samples beyond the circle, which are computed if the window does not contain
+    them. If samples are means over cells (`PSFResult.holds_cells`), each weight is approximately the fraction of the
+    cell that lies inside the circle.
 
     radii: a number or a row of numbers. At 0 the result is 0.
     centre: None for sample n//2 of the PSF.
@@ -107,9 +108,10 @@ def _around(
 
 
 def _kernel(dx: float, cutoff: float, room: float) -> SoftEdge:
-    """Return a kernel in units of 1/cutoff that passes the intensity's frequencies and blocks their aliases.
+    """Return a kernel whose spectrum passes the intensity's frequencies and blocks their aliases.
 
-    A wider kernel has a spectrum that ends at a lower frequency, so that sums need fewer nodes.
+    The kernel smooths the edge of a circle over which samples are summed. Its lengths are in units of 1/cutoff. A wider
+    kernel has a spectrum that ends at a lower frequency, so that integrals over the spectrum need fewer nodes.
 
     room: largest distance [m] over which the kernel may extend.
     """

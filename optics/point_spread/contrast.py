@@ -29,22 +29,23 @@ ROOM = 0.5  # choice: an enlarged window exceeds the necessary width by √2 to 
 
 
 def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.02) -> MTF:
-    """Return the contrast, |F{PSF}| divided by all the light that arrives, with the Fourier transform F.
+    """Return the contrast, |F{PSF}| / (all the light that arrives). F is the Fourier transform.
 
     It is 1 at frequency 0. For a `WhitePSF` there is one MTF per receptor type. Source: Goodman, Introduction to
     Fourier Optics, §6.3.2.
 
-    arriving: fraction of the pupil's power that arrives on the unbounded plane, a number or (wavelength,), in (0, 1].
-        None: all transmitted light except the evanescent part, which the pupil's edge and steep slopes of its relief
-            cause.
-    tolerance: largest error of any contrast. Light outside the window causes errors at any frequency, and samples more
-        than 1/(2 cutoff) apart alias frequencies. If necessary, the PSF is recomputed over a wider or finer window.
+    arriving: fraction of the pupil's power that arrives on the plane of the sensor, inside or outside the window, a
+        number or (wavelength,), in (0, 1]. None: all transmitted light except the evanescent part, which the pupil's
+        edge and steep slopes of its relief cause.
+    tolerance: largest error of any contrast. Light outside the window causes errors at any frequency. If samples are
+        more than 1/(2 cutoff) apart, frequencies are aliased. If necessary, the PSF is recomputed over a wider or finer
+        window.
 
     Raises:
-        ValueError: arriving has the wrong shape, is outside (0, 1], is given for a `WhitePSF`, or the light in the
-            window exceeds it by more than 0.01. The tolerance is not positive, or `result` is not a PSF.
-        AccuracyError: samples or window are insufficient for the tolerance, and others cannot be computed. The message
-            states which are sufficient.
+        ValueError: arriving has the wrong shape, is outside (0, 1], is given for a `WhitePSF`, or is more than 0.01
+            below the fraction in the window. The tolerance is not positive, or `result` is not a PSF.
+        AccuracyError: the samples are too coarse or the window is too small for the tolerance, and the PSF cannot be
+            recomputed on sufficient samples. The message states a remedy.
     """
     positive("tolerance", tolerance, "contrast")
     if not isinstance(result, PSFResult):
@@ -96,15 +97,16 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
 def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: float) -> PSFResult:
     """Return the PSF over a window that is enlarged until it misses at most the fraction `tolerance` of arriving light.
 
-    It is enlarged at most three times. The intensity of diffracted light falls like r⁻³ with the distance r, so the
-    light that a window misses is inversely proportional to its width. Widths and pitches change in steps, so that a
-    small change of the pupil changes neither.
+    The window is enlarged at most three times. The intensity of diffracted light falls like r⁻³ with the distance r, so
+    the light that a window misses is inversely proportional to its width. The width of the window and the pitch of its
+    samples change in steps, so that a small change of the pupil changes neither.
 
-    known, unsure: fraction of the light that arrives, and its uncertainty, (wavelength,).
+    known: fraction of the pupil's light that arrives on the plane, (wavelength,).
+    unsure: uncertainty of this fraction, (wavelength,).
 
     Raises:
-        AccuracyError: no such window can be computed. The message states a tolerance below 1 that smaller windows meet,
-            if there is one.
+        AccuracyError: no such window can be computed. If a larger tolerance below 1 can be met with fewer samples, the
+            message states it.
     """
     seen, coarsest = result, 0.5 / result.highest_cutoff
     for _ in range(GROWTHS):
@@ -127,15 +129,18 @@ def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: f
 
 
 def _looser(error: float) -> str:
-    """Return advice to use this error, rounded up to one digit, as the tolerance; empty if that is 1 or more."""
+    """Return advice, for a message, to set the tolerance to `error`, rounded up to one digit.
+
+    The advice is empty if the rounded error is 1 or more.
+    """
     enough = rounded_up(error)
     return f"; tolerance={enough:.3g} needs fewer samples" if enough < 1 else ""
 
 
 def _transformed(seen: PSFResult, light: Array, causes: ErrorCauses) -> MTF:
-    """Return the MTF of a PSF that already has a sufficient window.
+    """Return the MTF of a PSF whose window is already wide enough.
 
-    light: all light that arrives, (wavelength,), with derivatives.
+    light: fraction of the pupil's light that arrives on the plane of the sensor, (wavelength,), with derivatives.
     """
     import drjit as dr
 
@@ -164,8 +169,8 @@ def image_quality(
 
     result: a PSF, or its MTF if this is known already.
     nyquist: Nyquist frequency of the retina, f_N = 1 / (2 receptor pitch) [1/m].
-    throughput: T in [0, 1], such as a² for a pupil of the relative radius a. It may carry a derivative, and the result
-        is 0 if T is 0.
+    throughput: T in [0, 1], such as a² for a pupil of the relative radius a. T may carry a derivative. If T is 0, the
+        result is 0.
     noise_sigma: σ, in units of the signal, 0 to 1e6.
     tolerance: largest error of any contrast of the MTF. A known MTF has its own tolerance.
     with_error: True to return (value, predicted error), each (wavelength,).

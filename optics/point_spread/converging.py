@@ -1,4 +1,4 @@
-"""Polarised light behind a pupil, and its field over a window, which can be recomputed over other windows."""
+"""Polarised light behind a pupil, and its field over a window. The field can be recomputed over other windows."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ SINGLE = 1e-4  # choice: smallest tolerance for which float32 is sufficient
 class Converging(ReadOnlyArrays):
     """Light behind a pupil.
 
-    beam: light in front of the pupil and through it, to the plane of the image.
+    beam: source and wavelength of the light, the pupil, and the distance to the plane of the image.
     aplanatic: True for a corrected objective, see `vector_focus`.
     jones: Jones vectors of the parts of the light that do not interfere with each other, (part, 2).
-    stokes: Stokes parameters of all light, divided by the first.
+    stokes: Stokes parameters (S0, S1, S2, S3) of all light, divided by S0.
     tolerance: relative L2 error of the intensity over a window.
     """
 
@@ -67,15 +67,15 @@ class Converging(ReadOnlyArrays):
     def cutoff(self) -> float:
         """Highest frequency [1/m] of the intensity.
 
-        It results from interference between light from opposite sides of the rim. Their directions differ most on the
-        axis.
+        It results from interference between light from opposite sides of the pupil's rim. The directions of these two
+        rays differ most on the axis.
         """
         radius, z = self.beam.pupil.radius, number(self.beam.distance)
         sine = radius / z if self.aplanatic else radius / math.hypot(radius, z)
         return 2 * sine * self.beam.index / self.beam.wavelength
 
     def onto(self, window: Grid) -> VectorFocus:
-        """Return the field over a window about the image.
+        """Return the field over a window around the image.
 
         Raises:
             AccuracyError: no method meets the tolerance within the limits on memory and time.
@@ -88,7 +88,7 @@ class Converging(ReadOnlyArrays):
         return VectorFocus(intensity, scalar, window.dx, pure, parts, window.centre, self.stokes, plan, self)
 
     def _aplanatic(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        """Return the field behind an aplanatic lens, which is defined as a sum of plane waves.
+        """Return the field behind an aplanatic lens. This field is defined as a sum of plane waves.
 
         Raises:
             AccuracyError: the window is too wide, or the tolerance too small.
@@ -103,9 +103,9 @@ class Converging(ReadOnlyArrays):
         return rule.components(), Plan(PLANE_WAVES, (nodes, 1), "float64", SUM_ERROR, why)
 
     def _plane_waves(self, window: Grid) -> tuple[np.ndarray, Plan] | None:
-        """Return the field as a sum of plane waves, or None.
+        """Return the field as a sum of plane waves, or None if the sum is unsuitable.
 
-        It is None if its error exceeds the tolerance or is unknown, or the window is too large for the sum.
+        The result is None if the error of the sum exceeds the tolerance or is unknown, or if the window is too large.
         """
         rule = VectorSum(self.beam, window)
         if window.own_half_diagonal > number(self.beam.distance) or (nodes := rule.nodes) > MOST_NODES:
@@ -118,11 +118,12 @@ class Converging(ReadOnlyArrays):
         return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "confirmed by a check against the direct sum")
 
     def _crossed(self, scalar: np.ndarray, window: Grid) -> float:
-        """Return the error of field components to which light of both planes of polarisation contributes.
+        """Return the error of what light polarised along y adds to Ex, and light polarised along x to Ey.
 
-        A check of a single plane of polarisation does not detect this error. It results from the approximation that the
-        path has the same curvature for the whole pupil. Only light whose polarisation rotates with its ray contributes
-        to the other component. The fraction of this light is estimated as half the squared sine of the steepest ray.
+        A check with light of a single plane of polarisation does not detect this error. It results from the
+        approximation that the path has the same curvature for the whole pupil. Only light whose polarisation rotates
+        with its ray contributes in this way. The fraction of this light is estimated as sin²θ / 2, with the angle θ
+        between the axis and the steepest ray.
 
         scalar: scalar field over the window, (y, x).
         """
@@ -139,7 +140,7 @@ class Converging(ReadOnlyArrays):
         If a check shows that other components need more samples, all are computed again with a smaller tolerance.
 
         Raises:
-            AccuracyError: the check also fails for the smaller tolerance, or no method meets it.
+            AccuracyError: the check also fails for the smaller tolerance, or no method meets this tolerance.
         """
         for tolerance in (self.tolerance, self.tolerance / FINER):
             found, plan = self._smythe(window, tolerance)
@@ -149,7 +150,7 @@ class Converging(ReadOnlyArrays):
         raise AccuracyError(f"tolerance = {self.tolerance:g}: a check finds an error of {error} in Ex")
 
     def _smythe(self, window: Grid, tolerance: float) -> tuple[np.ndarray, Plan]:
-        """Return the field from Smythe's integral, with samples that meet a tolerance in the scalar field."""
+        """Return the field from Smythe's integral, with samples for which the scalar field meets the tolerance."""
         made = self._scalar(window, "float32" if tolerance >= SINGLE else "float64", tolerance)
         sampling, root = cast(WithField, made.sampling), math.sqrt(self.beam.pupil.area)
 
@@ -164,7 +165,10 @@ class Converging(ReadOnlyArrays):
         return found, replace(made.plan, predicted_error=error, why=why, seconds=seconds, scalar_error=0.0)
 
     def _scalar(self, window: Grid, dtype: str, tolerance: float) -> PSFPicture:
-        """Return the scalar field, planned and checked; in float64 if float32 is not sufficient."""
+        """Return the scalar field over the window, with its plan and its samples of the pupil.
+
+        The field is checked against the direct sum. It is computed in float64 if float32 is not sufficient.
+        """
         beam = self._behind(SCALAR)
         problem = Problem.from_beam(beam, window, tolerance, dtype)
         try:
@@ -178,11 +182,12 @@ class Converging(ReadOnlyArrays):
         return replace(self.beam, pupil=RayField(self.beam, 0, weights).pupil)
 
     def _errors(self, problem: Problem, fields: dict[Weights, np.ndarray]) -> float | None:
-        """Return the largest relative error of fields (y, x), by comparison with the direct sum.
-
-        fields: each field, with the weights of the mask behind which it propagates, see `RayField`.
+        """Return the largest relative error of several fields, by comparison with the direct sum.
 
         The result is None if the comparison would take too long.
+
+        fields: the fields to be checked, (y, x). The key of a field contains weights that define a mask of the pupil,
+            see `RayField`. The field is compared with the direct sum for light through the pupil with this mask.
         """
         errors = [
             spot_check(self._behind(weights), problem, np.abs(field.ravel()) ** 2, CHECK_SECONDS)
@@ -193,19 +198,21 @@ class Converging(ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False)
 class VectorFocus(ReadOnlyArrays):
-    """The electric field about an image.
+    """The electric field around an image.
 
-    intensity: |Ex|², |Ey|², |Ez|² divided by the pupil's area, (3, y, x) [1/m²]. These are the excitations of molecules
+    intensity: |Ex|², |Ey|², |Ez|² divided by the pupil's area [1/m²], (3, y, x). These are the excitations of molecules
         with a dipole along x, y or z.
-    scalar: the PSF of scalar theory, (y, x) [1/m²].
+    scalar: the PSF of scalar theory [1/m²], (y, x).
     dx: pitch [m] of the samples.
-    field: Ex, Ey, Ez [1/m], (3, y, x), without the carrier e^{ikz}. Their squared moduli are `intensity`. None unless
+    field: Ex, Ey, Ez [1/m] without the carrier e^{ikz}, (3, y, x). Their squared moduli are `intensity`. None unless
         the light is fully polarised.
-    parts: one or two such fields that do not interfere and add up to the light, (part, 3, y, x).
+    parts: one or two fields Ex, Ey, Ez [1/m] that do not interfere with each other, (part, 3, y, x). Their squared
+        moduli add up to `intensity`.
     centre: (x, y) [m] of sample n//2.
-    polarization: Stokes parameters of the light in front of the pupil, divided by the first.
+    polarization: Stokes parameters (S0, S1, S2, S3) of the light in front of the pupil, divided by S0.
     plan: method and predicted error, the relative L2 error of the intensity over the window.
-    towards: the light from which the field can be recomputed. None if `vector_focus` did not compute the field.
+    towards: the light that converges towards the image. From this light, the field can be computed again over other
+        windows. None if `vector_focus` did not compute the field.
     """
 
     intensity: np.ndarray
@@ -227,7 +234,7 @@ class VectorFocus(ReadOnlyArrays):
 
     @cached_property
     def psf(self) -> np.ndarray:
-        """Intensity of all components, (y, x) [1/m²]."""
+        """Sum of the intensities of the three components, (y, x) [1/m²]."""
         return read_only(self.intensity.sum(axis=0))
 
     @property

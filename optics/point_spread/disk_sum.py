@@ -1,4 +1,7 @@
-"""Light on a round receptor: sums over samples that equal integrals over a sharp disk, and the errors of the sums."""
+"""Integrals of light over a round receptor, computed as weighted sums over samples, and their errors.
+
+The weights are chosen so that a sum over samples equals the integral over a disk with a sharp edge.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ MOST_AGAIN = 1025  # choice: most samples along a side of a recomputed window
 class DiskSum:
     """Light on a disk, as a weighted sum over samples.
 
-    light: the field on samples that are fine enough for sums.
+    light: the field on samples that are fine enough for a weighted sum to equal the integral over the disk.
     share: weight of each sample, (y, x).
     radius: radius [m] of the disk.
     """
@@ -100,7 +103,15 @@ def _kernel(dx: float, cutoff: float) -> SoftEdge:
 
 
 def _around(light: VectorFocus, towards: Converging, middle: tuple[float, float], radius: float) -> VectorFocus:
-    """Return light whose samples are fine enough and extend beyond the disk by the reach of the kernel.
+    """Return light on samples that are suitable for a weighted sum that equals the integral over a disk.
+
+    The pitch of these samples is at most FINE/cutoff, where the cutoff is the highest frequency of the intensity. The
+    samples extend beyond the disk by the radius of the kernel that softens the disk's edge, because the weights are
+    nonzero up to there. If the given light has other samples, it is computed again.
+
+    light: the light on its present samples.
+    towards: the light behind the pupil, from which `light` can be computed again.
+    middle: centre (x, y) [m] of the disk.
 
     Raises:
         AccuracyError: too many samples are needed, or they cannot be computed.

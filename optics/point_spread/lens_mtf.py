@@ -1,4 +1,4 @@
-"""Contrast of a lens from another program in light of several wavelengths, through focus."""
+"""Contrast of a lens through focus, in light of several wavelengths, from exit pupils that another program computed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MM = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class LensMTF(ReadOnlyArrays):
-    """Contrasts of a lens in light of all its wavelengths, for each field and position of the image plane.
+    """Contrasts of a lens in light of several wavelengths together, for each field and position of the image plane.
 
     fields: points of the field, as in `ExitPupils`.
     shifts: distances [m] by which the image plane is moved along the light, (shift,).
@@ -35,7 +35,7 @@ class LensMTF(ReadOnlyArrays):
     tangential: contrast of patterns that vary along the direction from the axis to the image, (field, shift,
         frequency). On the axis, this is the direction y.
     sagittal: contrast of patterns that vary perpendicular to this direction.
-    predicted_error: predicted error of any contrast, (field, shift).
+    predicted_error: largest predicted error of a contrast, (field, shift).
     """
 
     fields: tuple[Any, ...]
@@ -76,7 +76,7 @@ class LensMTF(ReadOnlyArrays):
 def lens_mtf(
     lens: ExitPupils, frequencies: Any, shifts: Any = 0.0, weights: Any = None, tolerance: float = 0.02
 ) -> LensMTF:
-    """Return the contrasts of a lens in light of all its wavelengths, with lateral colour, through focus.
+    """Return the contrasts of a lens in light of all wavelengths of `lens`, with lateral colour, through focus.
 
     The optical transfer function is the mean Σ w(λ) OTF(λ) over the wavelengths λ, with `weights` w, and with all PSFs
     relative to one point of the image plane. At frequency 0, the result is the fraction of the light within the windows

@@ -27,7 +27,8 @@ class LightBatch:
     """Light through several pupils, for several distances. All numbers may carry derivatives.
 
     pupils: the pupils.
-    distances: pairs of the sensor's and the source's distance [m]. The sensor's may be None, see `optics.psf`.
+    distances: pairs of the sensor's and the source's distance [m]. The distance of the sensor may be None, see
+        `optics.psf`.
     angle: direction (x, y) [rad] in which the light travels.
     """
 
@@ -63,13 +64,16 @@ class LightBatch:
 
     @property
     def members(self) -> list[tuple[Pupil, Scalar | None, Scalar]]:
-        """Pupil, sensor's and source's distance [m] of all PSFs, by pupil and then by distance."""
+        """The pupil, the sensor's distance [m] and the source's distance [m] of each PSF.
+
+        The list contains all pairs of distances for the first pupil, then all pairs for the next.
+        """
         return [(pupil, sensor, source) for pupil in self.pupils for sensor, source in self.distances]
 
     def images(self, places: Sequence[int], wavelengths: np.ndarray, view: Mapping[str, Any]) -> Array:
-        """Return `optics.psf` of some members as a Dr.Jit tensor (member, wavelength, y, x) with derivatives.
+        """Return some of the PSFs as a Dr.Jit tensor (PSF, wavelength, y, x) with derivatives, see `optics.psf`.
 
-        places: indices of the members.
+        places: indices of these PSFs in `members`.
         view: arguments of `optics.psf` for the window, the tolerance and the method.
         """
         import drjit as dr
@@ -87,9 +91,15 @@ class LightBatch:
         view: Mapping[str, Any],
         convert: Callable[[np.ndarray], Array],
     ) -> dict[int, Array]:
-        """Return {index of a member: its PSFs (wavelength, y, x)} for members that stacks compute accurately enough.
+        """Return those PSFs that meet the tolerance if several sources' PSFs are computed together.
+
+        The result maps the index of a PSF in `members` to the PSF at all wavelengths, (wavelength, y, x). PSFs of
+        several sources that have the same pupil and the same distance of the sensor form a stack. The samples of the
+        pupil are planned once for the whole stack. PSFs that miss the tolerance at any wavelength are left out.
 
         fixed: the same light without derivatives.
+        wavelengths: vacuum wavelengths [m], (wavelength,).
+        view: arguments of `optics.psf` for the window, the tolerance and the method.
         convert: see `stacks`.
         """
         found: dict[int, Array] = {}
@@ -105,7 +115,9 @@ class LightBatch:
     def stacks(
         self, wavelengths: np.ndarray, window: Grid, dtype: str, convert: Callable[[np.ndarray], Array]
     ) -> list[tuple[list[int], WindowStack]]:
-        """Return stacks of members with the same pupil and sensor's distance, each with the indices of its members.
+        """Return stacks of PSFs that have the same pupil and the same distance of the sensor.
+
+        Each stack is paired with the indices of its PSFs in `members`.
 
         convert: function that converts a NumPy array to the library of the computation, NumPy or PyTorch.
         """

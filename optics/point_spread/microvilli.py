@@ -63,11 +63,13 @@ class Microvilli:
 
         radius: radius [m] of the receptor.
         centre: centre (x, y) [m] of the receptor; None for sample n//2.
-        with_error: True to return (value, predicted error). It includes the errors of the sum and of `vector_focus`.
+        with_error: True to return (value, predicted error). The predicted error includes the errors of the sum over
+            samples and of `vector_focus`.
 
         Raises:
             ValueError: an argument is invalid, or the receptor extends beyond the outermost samples.
-            AccuracyError: the receptor is too large for the required samples, or `light` is not from `vector_focus`.
+            AccuracyError: the receptor is so large that too many samples are required, or `light` is not from
+                `vector_focus`.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         flag("with_error", with_error)
@@ -99,7 +101,10 @@ class Microvilli:
         return float(most / least)
 
     def _along(self, light: VectorFocus) -> np.ndarray:
-        """Return E·m of each part of the light, (part, y, x): its field E along the direction m of the microvilli."""
+        """Return the component of the field along the microvilli, (part, y, x).
+
+        The parts of the light do not interfere with each other, see `VectorFocus.parts`.
+        """
         turn = math.radians(self.azimuth_deg)
         found: np.ndarray = math.cos(turn) * light.parts[:, 0] + math.sin(turn) * light.parts[:, 1]
         return found

@@ -15,7 +15,7 @@ __all__ = ["Mixture", "a_mixture", "flat", "mixed"]
 class Mixture(Protocol):
     """Interface of PSFs for light of several wavelengths, such as a WhitePSF.
 
-    Its methods are documented by the functions of the same names.
+    For its methods, see `optics.mtf`, `optics.strehl_ratio` and `optics.encircled_energy`.
     """
 
     def mtf(self, tolerance: float = 0.02) -> Any: ...

@@ -46,11 +46,12 @@ class MTF(ReadOnlyArrays):
         array.
     fx, fy: frequencies of the grid [cycles per metre on the sensor]. Their pitch is 1 / (longest side of the window).
     cutoff: highest frequency [1/m] that a pupil of this size transmits, 2 sin θ / λ, (wavelength,).
-    predicted_error: predicted error of any contrast, at the grid's frequencies and between them, (wavelength,). Only
-        frequencies near 0 have errors of this size, see `errors`.
+    predicted_error: largest predicted error of a contrast, at the grid's frequencies and between them, (wavelength,).
+        Only contrasts at frequencies near 0 have errors of this size, see `errors`.
     shares: fraction of all arriving light in each sample of the PSF, as a Dr.Jit tensor (wavelength, y, x).
     centre: position (x, y) [m] of sample n//2 of the PSF.
-    causes: parts of the predicted error; None if they are unknown.
+    causes: errors due to light outside the window, to the uncertain amount of arriving light, and to the PSF itself,
+        which together cause the predicted error. None if they are unknown.
     """
 
     tensor: Array
@@ -64,7 +65,11 @@ class MTF(ReadOnlyArrays):
 
     @classmethod
     def from_shares(cls, shares: Array, window: Grid, cutoff: np.ndarray, causes: ErrorCauses) -> MTF:
-        """Return the MTF of samples on a window of the sensor."""
+        """Return the MTF of a PSF.
+
+        shares: fraction of all arriving light in each sample of the PSF, as a Dr.Jit tensor (wavelength, y, x).
+        window: the samples of the PSF.
+        """
         import drjit as dr
 
         types, side = precision("float64"), max(window.shape)
@@ -89,7 +94,7 @@ class MTF(ReadOnlyArrays):
     def phase(self) -> np.ndarray:
         """Phase of the optical transfer function ∫ PSF(x, y) exp(-2πi (fx x + fy y)) dx dy [rad], from -π to π.
 
-        It has the shape of `mtf`, without derivatives. An image at the position (x, y) on the sensor has the phase -2π
+        It has the shape of `mtf`, without derivatives. If the PSF is a point at (x, y) on the sensor, the phase is -2π
         (fx x + fy y). A phase of π is a reversal of contrast. Where the contrast is c, an error e of the contrasts
         changes the phase by at most about e/c.
         """
@@ -126,9 +131,9 @@ class MTF(ReadOnlyArrays):
     def errors(self) -> np.ndarray:
         """Predicted error of each contrast, in the shape of `mtf`. Most are far smaller than `predicted_error`.
 
-        Light outside the window changes contrasts at frequencies near 0 by its fraction of all light, and other
-        contrasts much less, see `optics.point_spread.window_loss`. An uncertainty of the total light that arrives
-        changes each contrast in proportion to that contrast.
+        If a fraction p of all light falls outside the window, contrasts at frequencies near 0 have an error of p, and
+        other contrasts a much smaller error, see `optics.point_spread.window_loss`. An uncertainty of the total light
+        that arrives changes each contrast in proportion to that contrast.
         """
         if self.causes is None:
             return read_only(np.broadcast_to(self.predicted_error[:, None, None], self.mtf.shape).copy())
@@ -144,8 +149,8 @@ class MTF(ReadOnlyArrays):
     def _at_nyquist(self) -> np.ndarray:
         """Root mean square of the contrasts at the highest frequencies along each axis, (wavelength,).
 
-        Contrasts beyond these frequencies are aliased, and are assumed to be of this size. They exist because the
-        contrasts of pupils about a wavelength wide do not end sharply at the cutoff.
+        Contrasts beyond these frequencies are aliased, and are assumed to be of this size. If the pupil is only about a
+        wavelength wide, its contrasts do not end sharply at the cutoff, so they can extend beyond these frequencies.
         """
         rim = np.concatenate([self.mtf[:, 0], self.mtf[:, :, 0]], axis=1)
         found: np.ndarray = np.sqrt(np.mean(np.square(rim), axis=1))
@@ -214,8 +219,8 @@ class MTF(ReadOnlyArrays):
     def _radial_errors(self, f: np.ndarray) -> np.ndarray:
         """Return the mean of `errors` over the orientations at radial frequencies f, (wavelength, frequency).
 
-        The mean is interpolated between rings that are one step of the grid wide. Below one step, the mean is at
-        least `predicted_error`, except at frequency 0, where it is 0.
+        Means over rings of frequencies are interpolated. The width of a ring is the step between frequencies of the
+        MTF. Below the first step, the mean is at least `predicted_error`, except at frequency 0, where it is 0.
         """
         step, side = float(self.fx[1] - self.fx[0]), self.fx.size
         ring = np.rint(np.hypot.outer(self.fy, self.fx) / step).astype(np.intp).ravel()
@@ -229,7 +234,7 @@ class MTF(ReadOnlyArrays):
     def _mean(self, f: np.ndarray, n: int, shift: float) -> Array:
         """Return the mean contrast over n orientations within half a turn, (wavelength, frequency).
 
-        shift: angle of the first orientation, in steps between orientations.
+        shift: angle of the first orientation, divided by the angle between neighbouring orientations.
         """
         import drjit as dr
 
@@ -240,7 +245,10 @@ class MTF(ReadOnlyArrays):
         return types.Tensor(dr.select(types.Float(np.tile(f == 0, waves)) > 0, 1, mean), (waves, f.size))
 
     def _sum(self, f: np.ndarray, angle: np.ndarray) -> Array:
-        """Return the sum of contrasts over the directions `angle`, flat (wavelength, frequency)."""
+        """Return the sum of contrasts over the directions `angle` [rad], as a flat array.
+
+        The array contains the sums for all frequencies `f` at the first wavelength, then at the next, and so on.
+        """
         import drjit as dr
 
         types, waves = precision("float64"), self.shares.shape[0]

@@ -1,7 +1,7 @@
 """Computation of requested PSFs.
 
-Each PSF is planned, computed and, unless this would take too long, compared with the direct sum. If the comparison
-fails, the PSF is computed again.
+Each PSF is planned, computed and, unless this would take too long, compared at a few points with the direct sum, the
+most accurate method. If the comparison fails, the PSF is computed again.
 """
 
 from __future__ import annotations
@@ -66,7 +66,10 @@ class _Attempt:
 
     @classmethod
     def at(cls, request: Request, planned: tuple[Plan, Sampling]) -> _Attempt:
-        """Return the PSF by the planned method. If "auto" chose one without derivatives, an exact method replaces it.
+        """Return the PSF, computed by the planned method.
+
+        A method that "auto" chose may not provide required derivatives on the selected device. An exact method is then
+        used instead.
 
         If Dr.Jit computes the PSF, it only records the computation here, and executes it when the PSF is first read.
 
@@ -112,15 +115,20 @@ class _Attempt:
         return isinstance(self.sampling, WindowSampling)
 
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
-        """Return the next attempt, after the spot check has found an error above the tolerance.
+        """Return the next attempt, after the comparison with the direct sum has found an error above the tolerance.
 
-        If the method was an approximation, the next attempt uses an exact method. Otherwise it has a smaller tolerance,
-        because a dark window needs more digits than a bright one. The result is None if the dtype cannot provide them.
-        Samples for the window's light alone do not support very small tolerances. If such a tolerance would be
-        necessary, the next attempt resolves all light instead, at the original tolerance.
+        If the method was an approximation, the next attempt uses an exact method. If the method was exact, the next
+        attempt has a smaller tolerance, because the same error of the field is a larger relative error in a dark
+        window. The result is None if the dtype is not precise enough for this tolerance.
 
-        last: True for the last attempt. Its tolerance is reduced further, because quadrature rules change in steps and
-            a slightly smaller tolerance may give the same nodes.
+        Some methods use samples of the pupil that resolve only the light which arrives in the window. Such samples do
+        not support very small tolerances. If such a tolerance would be necessary, the next attempt resolves all light
+        instead, at the original tolerance.
+
+        error: the error that was found.
+        tolerance: tolerance of the user's request.
+        last: True if the next attempt is the last. Its tolerance is then much smaller than in other attempts, because
+            quadrature rules change in steps and a slightly smaller tolerance may give the same nodes.
         """
         request, problem = self.request, self.request.problem
         if self.approximates:
@@ -155,8 +163,8 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
     alike: True if each request may reuse the method of the preceding request.
 
     Raises:
-        AccuracyError: no method meets a tolerance, a spot check still finds a larger error in the last attempt, or a
-            window is so dark that rounding errors exceed the tolerance.
+        AccuracyError: no method meets a tolerance, the error still exceeds the tolerance in the last of several
+            attempts, or a window is so dark that rounding errors exceed the tolerance.
     """
     import drjit as dr
 
@@ -176,7 +184,10 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
 
 
 def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
-    """Return the PSF, or a more accurate one, and its plan with the error from the spot check, or a predicted error.
+    """Return the PSF and its plan, after a comparison with the direct sum has determined its error.
+
+    If the error exceeds the tolerance, the PSF is computed again, more accurately. The plan contains the error of the
+    returned PSF. If the comparison would take too long, the plan contains a predicted error instead.
 
     asked: the user's request. If it names an approximate method, the result is accepted regardless of its error.
     tries: number of remaining attempts, including this one.
@@ -213,17 +224,18 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
 
 
 def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) -> float:
-    """Return the error that follows from the PSF itself, for a PSF without a spot check.
+    """Return the error of a PSF that is not compared with the direct sum, estimated from its brightness.
 
     Sampling causes an error of up to half the tolerance. Rounding adds an error δU to the field U, which is as large in
-    a dark window as in a bright one. Assume that the transform spreads this error evenly over a square of width W. In
-    the units of a PSF, the pupil's light would have the mean intensity 1/W² there, so the mean square of δU is ε²/W²,
-    with ε the relative rounding error. The error of the intensity is 2|U| |δU| + |δU|². Relative to the PSF, it is
+    a dark window as in a bright one. Assume that the method spreads this error evenly over a square of width W
+    (`Sampling.plane`). If all light of the pupil were spread evenly over this square, the PSF would be 1/W². In units
+    in which |U|² is the PSF, the mean square of δU is therefore ε²/W², with ε the relative rounding error. The error of
+    the intensity is 2|U| |δU| + |δU|². Relative to the PSF, it is
 
         rounding = (2 ε √(mean PSF / W²) + ε² / W²) / √(mean PSF²).
 
-    If an approximation predicts no light in the window, its error counts as at least 1, because it may miss all light
-    there.
+    The error of an approximate method is added. If an approximation predicts no light in the window, its error counts
+    as at least 1, because it may miss all light there.
 
     Raises:
         AccuracyError: the window is so dark that rounding errors exceed the tolerance.

@@ -1,31 +1,31 @@
 """Choice of a PSF's method and samples: the fastest combination whose predicted error is within the tolerance.
 
 All exact methods evaluate the first Rayleigh-Sommerfeld integral of the field behind the pupil, or its equivalent, the
-angular spectrum. They differ in where they place samples:
+angular spectrum. The methods differ in the samples of the pupil or of its spectrum:
 
 - "hankel": two one-dimensional transforms along the radius. It requires a rotationally symmetric pupil and light along
     its axis.
-- "low_rank": one matrix product. The kernel is a Fourier kernel times a factor that varies slowly over the window and
-    therefore has a low rank. The method is best near the focus of lenses and for small pupils: samples must resolve
-    only the combined phase of lens and path, which varies far less than either alone.
-- "far_field": Fourier transforms onto direction cosines. Each of a few nodes of the window has its own transform, and
-    the kernel's slow factor is interpolated between the nodes. The method is best for small pupils and wide windows. It
-    computes the intensity but not the complex field.
+- "low_rank": one matrix product. The kernel is a Fourier kernel times a second factor, which varies slowly over the
+    window and therefore has a low rank. The method is best near the focus of lenses and for small pupils: the phases of
+    lens and path are added, and samples must resolve only the sum, which varies far less than either phase.
+- "far_field": Fourier transforms onto direction cosines. One transform is computed for each of a few points (nodes) of
+    the window. Between the nodes, the factor of the kernel that varies slowly over the window is interpolated. The
+    method is best for small pupils and wide windows. It computes the intensity but not the complex field.
 - "angular_spectrum": two transforms, from the pupil to its spectrum and from there to the sensor's plane, on grids with
     the same period. It is best at short distances, and the only method for eyes with steep reliefs.
 - "split_angular_spectrum": the same with a transfer function exp(ikz cos θ) that is split into two factors. The Fourier
-    transform of the paraxial factor is known, and the other factor moves light only a short way to the side. Period and
-    number of samples then do not grow with the distance.
+    transform of the paraxial factor is known. Multiplication by the other factor shifts light only a short way to the
+    side. Period and number of samples then do not grow with the distance.
 - "rayleigh_sommerfeld": the direct sum over quadrature nodes that are fitted to the pupil's edge. Its time is
-    proportional to the number of nodes times that of output samples. It is the reference for all other methods.
+    proportional to the number of nodes times the number of output samples. It is the reference for all other methods.
 
 Approximate methods are faster, and their error is predicted. "auto" uses one of them only if its error is within the
 tolerance. If the user requests one by name, it runs regardless of its error, and the plan states the error:
 
 - "fresnel": the paraxial integral.
 - "fraunhofer": the paraxial far field.
-- "geometric": the density of rays, without diffraction, for shadows and coarse windows.
-- "pinhole": all light in one cell.
+- "geometric": the density of rays, without diffraction. It suits shadows and windows with coarse samples.
+- "pinhole": all light in one sample of the window.
 """
 
 from __future__ import annotations
@@ -94,7 +94,9 @@ class Weighing:
 
     least: shortest possible time of a PSF [s].
     per_sample: time per sample of the window [s].
-    asking: time [s] that planning the method's samples takes (choice).
+    asking: assumed time [s] to plan the method's samples. Some methods usually turn out to be unsuitable once their
+        samples are planned. For these methods, the assumed time exceeds the actual time, so that they are tried less
+        often.
     """
 
     least: float
@@ -127,9 +129,10 @@ OTHERS, OTHERS_IF_DIVIDED = 4e-3, 15e-3  # choices: time [s] of planning other m
 def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SECONDS) -> tuple[Plan, Sampling]:
     """Return the plan and the fastest sampling that meets the problem's tolerance. Plans are cached.
 
-    method: "auto" compares all methods that may save time (for derivatives, only exact ones), "exact" only exact
-        methods, and "field" only exact methods with a complex field. A method's name selects that method. Its sampling
-        must then meet the tolerance, but the error of an approximation may exceed it.
+    method: "auto" compares all methods that may save time (only exact methods if the PSF carries derivatives), "exact"
+        only exact methods, and "field" only exact methods with a complex field. A method's name selects that method
+        alone. If it is an approximation, only the error due to its samples must be within the tolerance. The error of
+        the approximation itself may be larger.
 
     Raises:
         ValueError: the method is unknown.
@@ -177,7 +180,7 @@ def _check_dtype(problem: Problem) -> None:
 
 
 def _model_tolerance(problem: Problem) -> float:
-    """Return the part of the tolerance that sampling and rounding leave for the error of an approximation."""
+    """Return the largest permitted error of an approximation: the tolerance minus errors of sampling and rounding."""
     return problem.tolerance - _sampling_error(problem)
 
 
@@ -186,7 +189,7 @@ def _sampling_error(problem: Problem) -> float:
 
 
 def _seconds(option: Sampling, problem: Problem) -> float:
-    """Return the time of the whole PSF: the plan, the sum for the method, the window and the spot check."""
+    """Return the time [s] of a whole PSF: to plan it, compute it by a method, copy it and check some of its points."""
     call = PSF_CALL["window" if isinstance(option, WindowSampling) else "other"]
     return call + option.seconds + window_seconds(problem) + check_seconds(problem, option)
 
@@ -228,7 +231,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
 
 
 def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
-    """Return the part of a plan's reason that concerns derivatives; empty if none are requested."""
+    """Return how derivatives affected the choice of the method, in words; empty if none are requested."""
     if not problem.differentiated:
         return ""
     if best.model_error:

@@ -38,16 +38,18 @@ def psf(
     """Return the PSF |U|² / (pupil area) of a pupil. U is the field on the sensor for incident light of amplitude 1.
 
     wavelengths: one or several wavelengths [m] in vacuum. With eight or more, each wavelength uses the method of the
-        preceding one, unless this method is an approximation, too inaccurate or much slower.
+        preceding wavelength, to save the comparison of methods. Methods are compared again if that method is an
+        approximation, does not meet the tolerance, or would take much longer than at the preceding wavelength.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         images the source, or 240 µm without such a lens.
     source_distance, source_angle: distance [m] of the source, and direction (x, y) [rad] of its light, see PointSource.
     dx, shape, centre: pitch [m], number of samples (y, x) and position (x, y) [m] of sample n//2 of the window.
     tolerance: relative L2 error of the intensity over the window, 1e-12 to 0.5.
     method: "auto", "exact" (no approximations), or one of planner.METHODS. If an approximation is requested by name, it
-        runs regardless of its error. The tolerance then applies only to its sampling, and the plan states the error.
-        The samples of "geometric", which "auto" may choose, and of "pinhole" are means over squares of side dx
-        (`PSFResult.holds_cells`). The samples of all other methods are values at points.
+        runs regardless of its error. The tolerance then applies only to the error due to finite samples, and
+        `PSFResult.plan` states the whole error. The samples of "geometric", which "auto" may choose, and of "pinhole"
+        are means over squares of side dx (`PSFResult.holds_cells`). The samples of all other methods are values at
+        points.
     dtype: "float32" or "float64".
     field: True to return the complex amplitude U/√(pupil area) as well (`PSFResult.field`). This takes no additional
         time, but only methods that compute the amplitude are compared.

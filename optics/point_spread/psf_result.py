@@ -1,9 +1,9 @@
-"""A PSF over a window. It can be recomputed over other windows if a measure needs finer or wider samples.
+"""A PSF over a window. It can be recomputed over other windows if a result needs finer or wider samples.
 
 A pupil of radius R illuminates a point of the sensor, at the distance z, with rays whose sines differ by at most
 2R/√(R² + z²). The highest frequency of the intensity is therefore f_c = 2R/(λ√(R² + z²)), with the wavelength λ behind
-the pupil; the relief does not change it. The spectrum of samples at the pitch dx repeats every 1/dx. Sums over samples
-are therefore correct if dx < 1/f_c (about λz/2R), and all contrasts are correct if dx <= 1/(2 f_c).
+the pupil. A relief in the pupil does not change f_c. The spectrum of samples at the pitch dx repeats every 1/dx. Sums
+over samples are therefore correct if dx < 1/f_c (about λz/2R), and all contrasts are correct if dx <= 1/(2 f_c).
 """
 
 from __future__ import annotations
@@ -49,13 +49,14 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
         that arrives there; evanescent light, for example, does not. The PSF is never renormalised.
     plans: one plan per wavelength; `plan` is the least accurate one.
-    requests: one per wavelength, or per component of a mean. Measures recompute the PSF from them. Empty: unknown.
-    shares: weight of each request in a mean over wavelengths (see `mean`), (request,). None: it is not a mean.
+    requests: parameters with which functions such as `optics.strehl_ratio` recompute the PSF on other samples, one
+        entry per wavelength. A mean over wavelengths (see `mean`) keeps those of all wavelengths. Empty if unknown.
+    shares: weight of each request in a mean over wavelengths, (request,). None if the PSF is no such mean.
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
         derivatives; None for means, and unless `psf` was called with field=True. The amplitude [1/m] has the carrier
         exp(ikz), and its squared modulus is the PSF. `field` is the same as one complex NumPy array.
-    for_window: True if the samples of the pupil suffice only for the light in the window. Errors of sums over dark
-        parts may then exceed their bound, so measures recompute the PSF from finer samples if possible.
+    for_window: True if the samples of the pupil suffice only for the light in the window. Sums over dark parts of the
+        PSF may then be less accurate than predicted, so functions that sum it use finer samples if possible.
     """
 
     tensor: Array
@@ -97,14 +98,12 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def power(self) -> np.ndarray | Array:
-        """Fraction of the pupil's power inside the window, (wavelength,).
+        """Fraction of the pupil's power inside the window, up to dx/2 beyond the outermost samples, (wavelength,).
 
-        The window extends half a cell beyond the outermost samples. If the samples are too coarse for a sum, finer
-        samples are computed.
+        It is a sum over the samples. If they are too far apart for this sum, the PSF is recomputed on finer ones.
 
         Raises:
-            AccuracyError: the samples are too coarse, and finer ones cannot be computed. The message states which
-                samples are sufficient.
+            AccuracyError: samples are too coarse and cannot be recomputed. The message states sufficient samples.
         """
         return self._resolved.window_sums
 
@@ -112,8 +111,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     def power_error(self) -> np.ndarray:
         """Predicted error of `power`, (wavelength,). It raises the same exceptions as `power`.
 
-        It includes the error of the PSF and half of the power of the outermost samples, because samples at points
-        define the position of the window's rim only to within a cell. Means over cells need only the first part.
+        It includes the error of the PSF. If samples are values at points, it also includes half of the power of the
+        outermost samples, because the sum of such samples does not define exactly where the window ends.
         """
         seen = self._resolved
         image = seen.psf.astype(np.float64)
@@ -131,12 +130,12 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def holds_cells(self) -> bool:
-        """True if samples are means over cells, whose sums are exact; False if they are values at points."""
+        """True if each sample is the mean over a square (cell) of side dx; False if it is the value at a point."""
         return all(plan.method in OF_CELLS for plan in self.plans)
 
     @property
     def window_sums(self) -> np.ndarray | Array:
-        """Sum over the samples times their area, (wavelength,). The pitch is not checked."""
+        """Sum of the PSF's samples times dx², (wavelength,). Unlike in `power`, dx may be too coarse for sums."""
         import drjit as dr
 
         waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)
@@ -148,7 +147,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def sum_error(self) -> np.ndarray:
-        """Error of sums over the PSF due to the error of the PSF, relative to the pupil's power, (wavelength,)."""
+        """Error of `window_sums` (fraction of the pupil's power) due to the PSF's predicted error, (wavelength,)."""
         errors = [plan.predicted_error for plan in self.plans]
         own = np.array(errors if len(errors) == len(self.psf) else [max(errors)] * len(self.psf))
         factor = CELL_SUM_ERROR if self.holds_cells else SUM_ERROR
@@ -159,7 +158,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def can_recompute(self) -> bool:
-        """True if the requests of the PSF are known; False for a PSF that `psf` did not compute."""
+        """True if the PSF can be recomputed on other samples; False if `optics.psf` did not compute it."""
         asked = [request.beam.wavelength for request in self.requests]
         if self.shares is None:
             return asked == list(self.wavelengths)
@@ -167,16 +166,16 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def highest_cutoff(self) -> float:
-        """Highest frequency [1/m] of the intensity of all PSFs, including the known components of a mean."""
+        """Highest frequency [1/m] of the intensity. In a mean over wavelengths, that of the shortest, if known."""
         if self.shares is None or not self.can_recompute:
             return float(self.cutoff.max())
         shortest = min(request.beam.wavelength for request in self.requests)
         return float(self.cutoff.max() * self.wavelengths.max() / shortest)
 
     def mean(self, shares: np.ndarray) -> PSFResult:
-        """Return the PSF of light of all wavelengths at once, (1, y, x), with derivatives; its wavelength is the mean.
+        """Return the PSF of all wavelengths together, (1, y, x), with derivatives, at their weighted mean wavelength.
 
-        shares: fraction of each wavelength in the light, (wavelength,). They sum to 1. A mean is returned unchanged.
+        shares: fraction of each wavelength, with the sum 1, (wavelength,). A PSF that is already a mean is unchanged.
 
         Raises:
             ValueError: shares are not real numbers, or have the wrong shape or sum.
@@ -199,7 +198,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         )
 
     def of_wavelength(self, index: int) -> PSFResult:
-        """Return the PSF of one of the wavelengths, (1, y, x), with derivatives. A mean has one wavelength.
+        """Return the PSF of one wavelength, (1, y, x), with derivatives. A PSF from `mean` has only one wavelength.
 
         Raises:
             ValueError: there is no such wavelength.
@@ -218,12 +217,12 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         )
 
     def recompute_on(self, window: Grid, what: str) -> PSFResult:
-        """Return the PSF of the same light over another window, to the same tolerance and without the amplitude.
+        """Return the PSF of the same light over another window, with the same tolerance, but no `field`.
 
-        what: name of the measure, for the error message.
+        what: name of the quantity that needs the other window, such as "power", for the error message.
 
         Raises:
-            AccuracyError: the requests of the PSF are not known, or this window cannot be computed within the limits.
+            AccuracyError: `can_recompute` is False, or this window cannot be computed within the limits.
         """
         height, width = window.shape
         here = f"{self.tensor.shape[1]} x {self.tensor.shape[2]} samples {self.dx:.3g} m apart"
@@ -238,7 +237,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def of_all_light(self) -> PSFResult:
-        """The PSF over the same window, recomputed if possible and if `for_window` is True.
+        """This PSF, if possible from samples of the pupil that resolve all light, and not only the light in the window.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -246,9 +245,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return self.recompute_on(self.window, "a sum") if self.for_window and self.can_recompute else self
 
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
-        """Return a PSF whose samples can be summed: they are at most `coarsest` [m] apart, or are means over cells.
+        """Return a PSF whose samples are at most `coarsest` [m] apart, or are means over squares of side dx.
 
-        It is `of_all_light` if this holds already. Otherwise, the cells are divided, and the PSF is recomputed.
+        Suitable samples stay in place; `of_all_light` may recompute their values. Otherwise the square around each
+        sample is divided into smaller ones, and the PSF is recomputed at their centres.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -264,7 +264,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @cached_property
     def _resolved(self) -> PSFResult:
-        """Return the PSF over samples that are fine enough for sums."""
+        """Return the PSF on samples that are fine enough for their sum to be the power in the window."""
         return self.with_pitch(0.5 / self.highest_cutoff, "power")
 
 
@@ -280,7 +280,7 @@ def _through(request: Request, window: Grid) -> Request:
 def spread(requests: Sequence[Request]) -> PSFResult:
     """Return PSFs of one pupil at several wavelengths over one window.
 
-    For at least MANY wavelengths, each may use the method of the preceding one, see `Request.after`.
+    With MANY or more wavelengths, the method of one wavelength may be reused for the next, see `Request.after`.
 
     Raises:
         AccuracyError: no method meets the tolerance, or rounding errors exceed the tolerance in a dark window.

@@ -44,10 +44,10 @@ class Request:
     like: Plan | None = None
 
     def after(self, other: Request, plan: Plan) -> Request:
-        """Return this request with another request's plan as `like`, if the two differ only in wavelength and window.
+        """Return this request with another request's plan as `like`, the plan whose method is tried first.
 
-        The request is returned unchanged if they differ otherwise, if `method` is not "auto", or if the plan's method
-        is an approximation.
+        The request is returned unchanged if the two requests differ in more than wavelength and window, if `method` is
+        not "auto", or if the plan's method is an approximation.
 
         A method that is suitable for one wavelength is usually suitable for the next. Trying it first saves the
         comparison of methods, which takes as long as a small PSF.
@@ -62,7 +62,7 @@ class Request:
 
         Raises:
             AccuracyError: no method meets the tolerance within the limits on memory and time. The time limit is shorter
-                for a height map that jumps.
+                than usual if the pupil's height map has jumps between neighbouring samples.
         """
         pupil = self.beam.pupil
         jump = 0.0 if pupil.height is None else pupil.height.jump
@@ -96,7 +96,11 @@ class Request:
 
 
 def _wrapped(pupil: Pupil) -> str:
-    """Return advice on a height map that jumps. For fields of rays, which need slopes, it does not suggest pixels."""
+    """Return advice on a height map that jumps from sample to sample.
+
+    The advice is to use a PixelRelief, which represents steps. If the mask is a RayField, which requires one ray at
+    each point, the advice is to use a smooth height map, because a step has no ray.
+    """
     rows, columns = pupil.height.samples.shape
     remedy = "optics.PixelRelief(height) represents the steps"
     if isinstance(pupil.mask, RayField):

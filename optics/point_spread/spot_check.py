@@ -33,16 +33,16 @@ DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this,
 
 @dataclass(frozen=True)
 class Effort:
-    """Limits on the effort of a spot check. All values are choices.
+    """Limits (choices) on the effort of a spot check, which compares a PSF with the direct sum at a few points.
 
     points: largest number of points at which a PSF is checked.
-    points_along_radius: the same for a rotationally symmetric PSF in a window around the axis.
+    points_along_radius: the largest number of points for a rotationally symmetric PSF in a window around the axis.
     fewest: number of points below which the estimate is useless.
-    spare_digits: digits by which the direct sum is more accurate than requested. The first affordable number is used,
-        or the last one.
+    spare_digits: numbers of digits by which the direct sum is more accurate than the tolerance, tried in this order.
+        The first number with which all points can be checked in time is used, or else the last number.
     share: time limit of the check, relative to the time of the PSF.
-    share_of_few: the same for windows with fewer than `few` samples. In windows of so few samples, a direct sum at
-        `fewest` points takes longer than `share` permits. Without a check, the error may be as large as its bound.
+    share_of_few: the same for windows with fewer than `few` samples, since `share` leaves no time for `fewest` points.
+        Without a check, the error of the PSF may be as large as its predicted upper bound.
     seconds: time [s] that a check may take even if the shares permit less.
     """
 
@@ -61,7 +61,7 @@ EFFORT = Effort()
 
 @dataclass(frozen=True)
 class _DirectSum:
-    """The reference: the direct sum at a number of points.
+    """The direct sum with which a PSF is compared, at `points` points of the window.
 
     Its quadrature resolves `cycles` cycles per pupil radius and is accurate to `digits` digits.
     """
@@ -74,12 +74,12 @@ class _DirectSum:
 def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) -> float | None:
     """Return the relative L2 error of the intensity over the window, estimated from the direct sum.
 
-    The points are selected according to the probabilities from `_chances`. The result is None if the problem has a
-    `reach`, if the window is dark, or if the check would take too long.
+    The points are selected according to the probabilities from `_chances`. The result is None if the PSF may be wrong
+    beyond some distance from the axis (`Problem.reach`), if the window is dark, or if the check would take too long.
 
     With n points of probability p_k, the sum of squared errors Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
 
-    image: the PSF |U|² / (pupil area), flat.
+    image: the PSF |U|² / (pupil area), a flat array.
     seconds: time of its computation.
     """
     if problem.reach is not None:
@@ -105,20 +105,19 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
 
 
 def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> float:
-    """Return the relative error of the intensity that the direct sum itself has.
+    """Return the relative error of an intensity computed by the direct sum.
 
-    It has two causes. The first is the quadrature, whose error is 10^-digits times the amplitude that all light would
-    have in phase; the relative error of the intensity is twice that of the amplitude. The second is the rounding of
-    paths.
+    It has two causes: the rounding of paths, and the quadrature. The quadrature changes the amplitude by 10^-digits
+    times the amplitude of light that all arrives in phase. The intensity has twice the relative error of the amplitude.
     """
     return 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
 
 
 def path_rounding(problem: Problem, darkness: float) -> float:
-    """Return the relative error of the intensity that the rounding of paths in float64 causes.
+    """Return the relative error of the intensity due to the rounding of optical paths in float64.
 
-    A phase error of δ [rad] changes the amplitude by δ times the amplitude of all light in phase. A comparison with the
-    direct sum does not show this error, because the direct sum has similar paths.
+    A phase error of δ [rad] changes the amplitude by δ times the amplitude of light that all arrives in phase. A spot
+    check does not show this error, because the direct sum uses similar paths.
     """
     return WAVE_ROUNDING * problem.waves * 10.0**darkness
 
@@ -137,7 +136,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
-    """Return the direct sum with the largest numbers of points and digits in EFFORT that the time limit allows."""
+    """Return the most accurate direct sum with time for all points, else the least accurate one, for fewer points."""
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
     share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
@@ -155,10 +154,10 @@ def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -
 
 
 def _finer_detail(beam: Beam, problem: Problem) -> float:
-    """Return the cycles per radius that the check needs in addition to those of the PSF.
+    """Return how many more cycles per pupil radius the direct sum of a spot check resolves than the PSF does.
 
-    A PSF neglects detail of reliefs, wavefronts and masks below a tenth of its tolerance. The check resolves finer
-    detail, because it would otherwise not show the resulting error.
+    A PSF neglects detail of reliefs, wavefronts and masks that changes phases [rad] by less than a tenth of the PSF's
+    tolerance. The direct sum resolves finer detail. Otherwise the comparison would not show the resulting error.
     """
     fine = beam.pupil.bandwidth(beam.wavelength, FINER_DETAIL * problem.tolerance / 10)
     return problem.radius * max(fine - problem.detail, 0.0)
@@ -167,7 +166,7 @@ def _finer_detail(beam: Beam, problem: Problem) -> float:
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the flat indices of the points to compare, and the probability with which each was drawn.
 
-    The points are drawn at even steps of the cumulative probability, so that no likely point is omitted.
+    The points are drawn at equal steps of the cumulative probability, so that no likely point is omitted.
     """
     # If there are few points, each is compared once.
     even = np.full(points, 1 / points)
@@ -181,10 +180,10 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
 def exact_psf(
     beam: Beam, problem: Problem, x: np.ndarray, y: np.ndarray, bright: float, seconds: float
 ) -> tuple[np.ndarray, float] | None:
-    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error at the value `bright` [1/m²].
+    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error where it is `bright` [1/m²].
 
-    The result is None if the problem has a `reach`, or if the sum needs more time than `spot_check` may spend on a PSF
-    whose computation takes `seconds`.
+    The result is None if PSFs of this problem may be wrong beyond some distance from the axis (`Problem.reach`), or if
+    the sum takes too long. Its time limit is that of `spot_check` for a PSF that takes `seconds`.
     """
     darkness = _darkness(beam, problem, bright)
     reference = _affordable(beam, problem, darkness, seconds)
@@ -218,13 +217,13 @@ KINDS = 6  # kinds of points in `_chances`
 
 
 def _chances(bright: np.ndarray, window: Grid) -> np.ndarray:
-    """Return the probability with which each point is drawn, as a flat array.
+    """Return the probability with which each sample of a window is drawn for the spot check, as a flat array.
 
     It is the mean of six distributions. The first is uniform. The others are proportional to the following quantities:
 
     - Intensity: if the amplitude has the same error everywhere, the squared error of the intensity is proportional to
         the intensity. Next to a bright focus, only this distribution detects such an error.
-    - Squared intensity, spread over neighbouring samples: the errors of a focus of one sample lie next to it.
+    - Squared intensity, spread over neighbouring samples: if a focus lights one sample, errors lie in its neighbours.
     - Nearness to a side, and nearness to a corner: phases change fastest there, so quadratures fail first at the few
         outermost samples. In a window off the axis, phases change fastest at the sides that are farthest from the axis.
     - Intensity times the sum of both kinds of nearness: the light of a slit reaches the sides only in few places, and
@@ -252,9 +251,10 @@ def _in_order(window: Grid) -> np.ndarray:
 
 
 def _by_radius(window: Grid) -> np.ndarray:
-    """Return flat indices in order of the distance from the axis.
+    """Return the flat indices of a window's samples in order of their distance from the axis.
 
-    Points at even steps of the cumulative probability in this order lie in all bright rings.
+    `_drawn` adds up the samples' probabilities in this order, and draws a sample at equal steps of the growing sum. The
+    drawn samples are therefore spread over all bright rings.
     """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
     # Squared radii are rounded, so that rounding errors do not change the order of equal radii.
@@ -271,10 +271,11 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sum of both kinds of nearness in `_chances`, and the sum of the distributions without the PSF.
+    """Return two flat arrays, with one number per sample of a window, from which `_chances` adds up probabilities.
 
-    Both are flat arrays. The second one is the sum of three distributions: the uniform one, and those of nearness to a
-    side and to a corner.
+    The arrays do not depend on the PSF. The first is the sum of two probability distributions. One of them prefers
+    samples near a side of the window, the other samples near a corner. The second array is the first plus the uniform
+    distribution.
 
     centre: position (x, y) of the window's centre, in samples.
     """

@@ -36,10 +36,11 @@ DIGITS = 10.0  # choice: digits of the maximum without aberration
 
 
 def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
-    """Return the maximum of the PSF relative to that of the same aperture and mask without aberration, (wavelength,).
+    """Return the Strehl ratio of a PSF, (wavelength,).
 
+    It is the maximum of the PSF, divided by the maximum of the PSF of the same aperture and mask without aberration.
     The result for a `WhitePSF` has one value per receptor type, (type,). The wave without aberration is spherical and
-    converges on the point where the axis hits the sensor. Its field at this point is, with L = √(z² + r²),
+    converges on the point where the axis hits the sensor. With L = √(z² + r²), its field at this point is
 
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
@@ -55,7 +56,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
 
     Raises:
         ValueError: `result` is not a PSF, or with_error is not a bool.
-        AccuracyError: the maximum lies outside the window, or the PSF is brighter at a point outside the window that
+        AccuracyError: the maximum lies outside the window, or the PSF exceeds it at a point outside the window that
             rays reach. The same error results if the samples are too coarse and finer ones cannot be computed (the
             message states which samples are sufficient), or if no peak is found.
     """
@@ -114,7 +115,9 @@ class Peak(NamedTuple):
 
 
 def _peak(result: PSFResult) -> Peak:
-    """Return the maximum of a PSF of one wavelength, or of a mean, near its brightest samples.
+    """Return the maximum of a PSF near its brightest samples.
+
+    The PSF has one wavelength, or is a mean over wavelengths (`PSFResult.mean`).
 
     Raises:
         AccuracyError: the maximum lies outside the window or is not found, or the necessary samples cannot be computed.
@@ -140,10 +143,11 @@ def _peak(result: PSFResult) -> Peak:
 def _brightest(result: PSFResult) -> tuple[float, float]:
     """Return the point (x, y) at which the spline through the samples is brightest.
 
-    The brightest sample need not belong to the highest lobe. A non-negative function with the maximum p and no
-    frequency beyond the cutoff f is at least p cos²(πfd) at a distance d < 1/(2f) from the maximum (M. Riesz 1914). The
-    sample nearest the maximum therefore has at least this value, with d the largest possible distance of that sample.
-    The surroundings of all samples above this value are searched, or of the MOST_SPLINED brightest ones.
+    The brightest sample need not belong to the highest lobe. Let p be the maximum of a non-negative function without
+    frequencies beyond the cutoff f. At a distance d < 1/(2f) from the maximum, the function is at least p cos²(πfd) (M.
+    Riesz 1914). The sample nearest the maximum is at most half the diagonal between samples away from it. With this
+    distance as d, the sample has at least the value p cos²(πfd). The surroundings of all samples above this value are
+    searched. If there are more than MOST_SPLINED such samples, only the brightest MOST_SPLINED ones are used.
     """
     from scipy.ndimage import map_coordinates, spline_filter
 
@@ -237,10 +241,15 @@ def _vertex(result: PSFResult, middle: tuple[int, int] | None = None) -> Peak:
 
 
 def _measured_error(result: PSFResult, peak: Peak) -> float:
-    """Return the relative error of a peak: the difference from the direct sum if this is affordable, at most its bound.
+    """Return the relative error of a peak, found by comparison with the direct sum, but at most the bound `peak.error`.
 
-    The direct sum is evaluated on 3 x 3 points around the peak. Their pitch is CLOSER times finer than AT_A_PEAK, so
-    the error of a paraboloid through them is PARABOLOID_ERROR / CLOSER^4.
+    The result is this bound if the PSF cannot be recomputed, if its samples are means over cells, or if the direct sum
+    would take too long.
+
+    The direct sum is evaluated on 3 x 3 points around the peak, and a paraboloid through them gives the maximum. The
+    error of this maximum is proportional to the fourth power of the points' pitch, and it is PARABOLOID_ERROR at the
+    pitch AT_A_PEAK / cutoff. The pitch used here is smaller by the factor CLOSER, so the error is PARABOLOID_ERROR /
+    CLOSER^4.
     """
     if result.holds_cells or not result.can_recompute:
         return peak.error

@@ -53,7 +53,7 @@ class ThroughFocus(ReadOnlyArrays):
         It is the vertex of the parabola through the highest ratio and its neighbours.
 
         Raises:
-            ValueError: there are fewer than three distances, or the highest ratio is at the first or the last one.
+            ValueError: there are fewer than three distances, or the ratio is highest at the first or the last distance.
             AccuracyError: see `optics.strehl_ratio`.
         """
         if len(self.distances) < 3:

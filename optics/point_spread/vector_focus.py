@@ -46,24 +46,26 @@ def vector_focus(
     Fresnel number.
 
     wavelength: wavelength [m] in vacuum.
-    sensor_distance: distance [m] behind the pupil. None: the focus of the ideal lens, or 240 µm without one.
+    sensor_distance: distance [m] behind the pupil. None: the focus of the ideal lens, or 240 µm if the pupil has no
+        ideal lens.
     polarization: polarisation of the light in front of the pupil: a Jones vector (x, y) or Stokes parameters (S0, S1,
         S2, S3). Here S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey) and S3 = 2 Im(Ex* Ey). None: unpolarised. For oblique light,
         the x and y of these definitions are rotated with the light's direction.
     source_angle: direction (x, y) [rad] of the light, as in `optics.psf`. The window lies around the image.
     apodization: "flat" for uniform light over a flat pupil, or "aplanatic" for light along the axis of a corrected
-        objective. With the latter, the ray from the point ξ of the pupil arrives at the focus, at the distance z, with
-        the sine ξ/z, and the light is a sum of plane waves (Richards and Wolf 1959).
+        objective. A ray of an aplanatic lens that leaves the pupil at the distance ξ from the axis goes to the focus.
+        The sine of its angle to the axis is ξ/z, where z is the distance of the focus behind the pupil. The light is a
+        sum of plane waves, one for each such ray (Richards and Wolf 1959).
     dx, shape: pitch [m] and number of samples (y, x) of the window.
     tolerance: relative L2 error of the intensity over the window.
 
     Raises:
-        ValueError: an argument is invalid, the relief is pixelated, a parameter carries derivatives, or an aplanatic
-            lens has a relief, wavefront or mask, is not lit along its axis, has no focal length, or has a radius that
-            is not below the distance.
-        AccuracyError: no method meets the tolerance within the limits on memory and time, a ray behind a pupil with
-            "flat" apodization has a sine above 0.98, or an aplanatic lens has a Fresnel number below 20. The rays of
-            such a lens do not meet in a point.
+        ValueError: an argument is invalid, the relief is pixelated, or a parameter carries derivatives. With
+            "aplanatic" apodization, the pupil must have a focal length and no relief, wavefront or mask, its light must
+            travel along the axis, and its radius must be smaller than the sensor distance.
+        AccuracyError: no method meets the tolerance within the limits on memory and time. With "flat" apodization, the
+            sine of a ray's angle to the axis must not exceed 0.98 behind the pupil. With "aplanatic" apodization, the
+            Fresnel number must be at least 20, because otherwise the rays do not meet in a point.
         BackendError: see `optics.psf`.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
@@ -92,7 +94,10 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
 
 
 def _check_rays(beam: Beam) -> None:
-    """Raise an AccuracyError if a ray behind the pupil is evanescent or its sine exceeds STEEPEST."""
+    """Raise an AccuracyError if the sine of a ray's angle to the axis exceeds STEEPEST behind the pupil.
+
+    Evanescent light, for which the sine is above 1, is refused as well.
+    """
     steepest = beam.pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.index
     if steepest > STEEPEST:
         raise AccuracyError(
@@ -115,7 +120,9 @@ def _check_aplanatic(beam: Beam) -> None:
 
 
 def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Return Jones vectors (part, 2) of parts that do not interfere, and the Stokes parameters divided by S0.
+    """Return the Jones vectors of the light's polarised parts, (part, 2), and the Stokes parameters divided by S0.
+
+    Polarised light has one part. Other light is the sum of two polarised parts that do not interfere.
 
     Raises:
         ValueError: `polarization` is neither a Jones vector nor Stokes parameters.

@@ -1,4 +1,7 @@
-"""PSFs in white light, and their measures. Each type of receptor weights the spectrum of the lamp."""
+"""PSFs in white light, and measures of these PSFs such as the Strehl ratio.
+
+Each type of receptor weights the spectrum of the lamp.
+"""
 
 from __future__ import annotations
 
@@ -44,9 +47,9 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
     weights: w, (type, wavelength). Cubic splines interpolate PSFs between wavelengths, so a weight may be slightly
         negative.
     coarse: weights, (type, wavelength), of a sum over every second wavelength; the weights of the others are 0.
-    spectral_error: predicted relative L2 error that is due to the number of wavelengths, (type,). It is a quarter of
-        the difference from the result with every second wavelength. It falls with the fourth power of the number of
-        wavelengths.
+    spectral_error: predicted relative L2 error that is due to the number of wavelengths, (type,). The prediction is a
+        quarter of the difference between the PSFs with `weights` and with `coarse`. The error falls with the fourth
+        power of the number of wavelengths.
     """
 
     waves: PSFResult
@@ -85,11 +88,12 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         return found
 
     def mtf(self, tolerance: float = 0.02) -> MTF:
-        """Return the contrast |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx). Shifts between colours add to the blur.
+        """Return the contrast |Σ_λ w(λ) OTF_λ| that each type of receptor sees, (type, fy, fx).
 
-        w are the `weights` of the optical transfer functions of all wavelengths λ. See `optics.mtf`.
+        The sum is over the optical transfer functions of all wavelengths λ, with w from `weights`. Shifts between the
+        images of different colours therefore add to the blur. See `optics.mtf`.
 
-        tolerance: largest error of any contrast.
+        tolerance: largest error of the contrasts over all types and frequencies.
 
         Raises:
             ValueError: see `optics.mtf`.
@@ -103,7 +107,10 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         return replace(kept, predicted_error=kept.predicted_error + spectral, causes=causes)
 
     def strehl_ratio(self, with_error: bool = False) -> np.ndarray | Array:
-        """Return the maximum of the white PSF, divided by the maximum in the same light without aberration, (type,).
+        """Return the Strehl ratio in white light for each type of receptor, (type,).
+
+        It is the maximum of the white PSF, divided by the maximum of the PSF of the same pupil in the same light
+        without aberration.
 
         See `optics.strehl_ratio`.
 
@@ -133,7 +140,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
     ) -> np.ndarray | Array:
         """Return the fraction of the white light within circles, (type, radius). See `optics.encircled_energy`.
 
-        It is the sum of the encircled energies of all wavelengths, each times its weight in `weights`.
+        The fraction is the sum of the encircled energies of all wavelengths, each times its weight in `weights`.
 
         radii, centre: radii [m] of the circles, and their centre (x, y) [m]; None for sample n//2.
         with_error: True to return (value, predicted error).
@@ -170,7 +177,8 @@ def white_psf(
     receptors: receptor types, see `optics.receptors_of`. Results are in the order of the types.
     waves: number of wavelengths over the receptors' range: odd, 5 to 513, or "auto" for the first of 9, 17, 33, ...,
         513 that meets the tolerance. Cubic splines interpolate PSFs between the wavelengths.
-    tolerance: relative L2 error over the window, for PSFs and spectrum together.
+    tolerance: largest relative L2 error of the white PSFs over the window. Half of it is for the errors of the
+        monochromatic PSFs, and half for the number of wavelengths.
     asked: further arguments of `optics.psf`, apart from wavelengths.
 
     Raises:
@@ -204,9 +212,12 @@ def white_psf(
 
 
 def _remedy(count: int, worst: float, allowed: float, tolerance: float) -> str:
-    """Return advice if `count` wavelengths are too few: more wavelengths or, if these exceed MOST_WAVES, a tolerance.
+    """Return advice if `count` wavelengths are too few: a sufficient number of wavelengths.
 
-    worst, allowed: error of the sum over wavelengths, and the largest error that is allowed
+    If that number would exceed MOST_WAVES, the advice is a larger tolerance, for which `count` wavelengths suffice. If
+    that tolerance would exceed 0.5, the advice is a light or receptors with a smoother spectrum.
+
+    worst, allowed: error of the sum over wavelengths, and the largest error that is allowed.
     """
     more = 2 * math.ceil(count * (1.2 * worst / allowed) ** 0.25 / 2) + 1
     if more <= MOST_WAVES:
@@ -226,7 +237,7 @@ def _weighed(result: PSFResult, catches: np.ndarray, ends: tuple[float, float]) 
 
 
 def _quantum_catch(light: Any, kinds: Any) -> np.ndarray:
-    """Return the normalised quantum catch of each type at steps of 1 nm, (type, nm).
+    """Return the quantum catch of each type of receptor (`kinds`) at steps of 1 nm, with the sum 1, (type, nm).
 
     Raises:
         ValueError: the light is invalid, or a type does not absorb it.
@@ -261,7 +272,7 @@ def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
 
 
 def _with_middles(result: PSFResult, between: PSFResult) -> PSFResult:
-    """Return both results as one, by ascending wavelength; those of `between` lie between those of `result`."""
+    """Return both results as one, by ascending wavelength. Wavelengths of `between` lie between those of `result`."""
     import drjit as dr
 
     def braided(first: Any, second: Any) -> list[Any]:

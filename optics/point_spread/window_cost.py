@@ -25,17 +25,18 @@ __all__ = ["check_seconds", "check_window", "window_bytes", "window_seconds"]
 
 
 def window_seconds(problem: Problem) -> float:
-    """Return the time [s] to evaluate the PSF, copy it to NumPy, and select the points of the spot check."""
+    """Return the time [s] to evaluate the PSF, copy it to NumPy, and select the few points at which it is checked."""
     check = CHECK_SYMMETRIC_SAMPLE if problem.symmetric else CHECK_SAMPLE
     each = OUTPUT_SAMPLE[problem.dtype] + (0.0 if problem.reach is not None else check)
     return math.prod(problem.window.shape) * each
 
 
 def check_seconds(problem: Problem, sampling: Sampling) -> float:
-    """Return the time [s] of the spot check of a PSF that is itself a direct sum; 0 for other PSFs or without a check.
+    """Return the time [s] of the spot check if the PSF is computed by the direct sum; otherwise 0.
 
-    The check has about twice as many nodes as the PSF. For other methods, the check's time is neglected, because it is
-    a small part of the PSF's time.
+    A spot check compares the PSF at a few points with a second direct sum, which has about twice as many nodes as the
+    PSF's own sum. For methods other than the direct sum, the time of the check is neglected, because it is a small part
+    of the PSF's time. The result is also 0 if there is no check.
     """
     if problem.reach is not None or sampling.method != "rayleigh_sommerfeld":
         return 0.0
@@ -50,8 +51,9 @@ def check_seconds(problem: Problem, sampling: Sampling) -> float:
 def window_bytes(problem: Problem, sampling: Sampling) -> float:
     """Return the peak memory [bytes] of all arrays that are as large as the window.
 
-    A spot check needs a part of this memory, because it sorts all samples of the window. A PSF with a `WindowSampling`
-    has another check, of a few rows, and one with a `reach` has none.
+    The result includes the memory of a spot check, which sorts all samples of the window to select a few of them. A PSF
+    with a `WindowSampling` is checked in a few rows and columns instead. A PSF whose problem has a `reach`, a distance
+    beyond which light is neglected, is not checked.
     """
     sorts = problem.reach is None and not isinstance(sampling, WindowSampling)
     each = OUTPUT_ARRAYS * ITEM_BYTES[problem.dtype] + (CHECK_BYTES if sorts else 0.0)
@@ -59,7 +61,7 @@ def window_bytes(problem: Problem, sampling: Sampling) -> float:
 
 
 def check_window(window: Grid, dtype: str, count: int = 1, arrays: int = 1) -> None:
-    """Refuse a window that exceeds the limits on memory or time with any method.
+    """Raise an AccuracyError if a window exceeds the limits on memory or time, whichever method computes the PSF.
 
     count: number of PSFs over the window that exist at the same time.
     arrays: number of arrays of real numbers that are stored for each PSF.

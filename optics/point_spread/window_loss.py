@@ -27,10 +27,10 @@ NEAR_ZERO = 2.0
 
 @dataclass(frozen=True, eq=False)
 class ErrorCauses(ReadOnlyArrays):
-    """Parts of the error of contrasts, relative to all light that arrives, (wavelength,).
+    """Parts of the error of a PSF's contrasts, as fractions of all light that arrives, (wavelength,).
 
-    lost: upper bound on the light outside the window.
-    light: uncertainty of the light that arrives, which `lost` includes.
+    lost: upper bound on the light outside the window. It includes the uncertainty `light`.
+    light: uncertainty of the amount of light that arrives.
     rest: error of the PSF inside the window.
     """
 
@@ -40,17 +40,19 @@ class ErrorCauses(ReadOnlyArrays):
 
     @property
     def total(self) -> np.ndarray:
-        """Largest error of any contrast, (wavelength,)."""
+        """Largest error of the contrasts over all spatial frequencies, (wavelength,)."""
         found: np.ndarray = self.lost + self.rest
         return found
 
     def first(self, count: int) -> ErrorCauses:
-        """Return the parts of the first `count` wavelengths."""
+        """Return the parts of the error for the first `count` wavelengths."""
         return ErrorCauses(self.lost[:count], self.light[:count], self.rest[:count])
 
 
 def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return the error of each contrast due to light outside the window, (fy, fx), at the frequencies of `MTF.fx`.
+    """Return the error of the contrast at each frequency, (fy, fx), if light outside the window is missing.
+
+    The frequencies are those of `MTF.fx`, along both axes.
 
     Spectra have zeros, so each result is the largest estimate of nine neighbouring frequencies.
 
@@ -68,9 +70,9 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
 
 
 def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
-    """Return an estimate of the lost light's part of each contrast, (fy, fx).
+    """Return an estimate of what light outside the window contributes to the contrast at each frequency, (fy, fx).
 
-    The estimate assumes that this light is distributed like the light in the outer parts of the window.
+    The estimate assumes that this light has the same contrasts as the light in the outer parts of the window.
     """
     squares, parts = np.zeros((max(image.shape),) * 2), 0
     for part in INNER:
@@ -93,6 +95,9 @@ def _spectrum(image: np.ndarray) -> np.ndarray:
 
 
 def _fade(n: int, start: float) -> np.ndarray:
-    """Return a fade from 1 to 0 between the position `start`, in half widths of a row of samples, and its ends."""
+    """Return weights of a row of n samples that are 1 in its middle and fall to 0 towards its ends.
+
+    start: distance from the middle at which the weights begin to fall, in half widths of the row.
+    """
     away = np.abs(np.arange(n) - n // 2) / max(n / 2, 1.0)
     return np.asarray(np.square(np.cos(np.pi / 2 * np.clip((away - start) / (1 - start), 0, 1))))

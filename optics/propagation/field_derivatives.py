@@ -1,8 +1,9 @@
-"""Derivatives of fields through steps from plane to plane, which are linear maps computed in NumPy.
+"""Derivatives of fields through steps from plane to plane. The steps are linear maps computed in NumPy.
 
 A step maps the field u to A u. Its adjoint Aᴴ carries the gradient of a loss backward: the transforms have the opposite
 sign, and factors are conjugate. The rate ∂A/∂z of a step multiplies each wave of the spectrum by ik (cos θ - 1). The
-rate ik of the carrier exp(ikz) is left out: it does not change the intensity, to which it would add rounding errors.
+rate ik of the carrier exp(ikz) is left out. It is the same for all waves, so it has no effect on the intensity except
+rounding errors.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ class LinearMap:
 
 
 def mapped(field: Field, values: Complexes, grid: Grid, linear: LinearMap, z: Scalar = 0.0) -> Field:
-    """Return A u on a grid as a field that carries the derivatives of u and of z.
+    """Return A u, a linear map A of a field u, as a field on a grid.
+
+    The result carries the derivatives that u carries, and those that A's parameter z carries if A has a rate ∂A/∂z.
 
     field: u.
     values: A u (y, x), which has been computed before.
@@ -48,7 +51,7 @@ def mapped(field: Field, values: Complexes, grid: Grid, linear: LinearMap, z: Sc
         rate = linear.rate(field.numpy())
 
     class LinearStep(dr.CustomOp):
-        """The map as a differentiable operation."""
+        """The linear map A as an operation of Dr.Jit that carries derivatives forward and backward."""
 
         def eval(self, re: Array, im: Array, z: Array) -> tuple[Array, Array]:
             return _parts(values, types)

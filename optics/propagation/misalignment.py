@@ -1,11 +1,12 @@
 """Pupils of a system that are decentred and tilted.
 
-Each plane has its own lateral coordinates about the centre of its pupil, so a decentred pupil only moves the window of
-the propagation to its plane. The plane of a tilted pupil has the depth ζ(x) = x·tan α. The field that arrives at a
-point of this plane is the field at the depth ζ of the point, and light leaves from this depth. If the light's angles to
-the axis are at most θ, the field is the product of a carrier exp(ikcζ) with c = (1 + cos θ)/2 and a function that
-varies slowly with the depth. This function is interpolated between a few planes at Chebyshev nodes z_j, with Lagrange
-polynomials L_j. The light that arrives at the tilted plane is
+Each plane has its own lateral coordinates about the centre of its pupil. The field that arrives at a decentred pupil is
+therefore computed on samples around a shifted centre, and nothing else changes. The plane of a tilted pupil has the
+depth ζ(x) = x·tan α. The field that arrives at a point of this plane is the field at the depth ζ of the point. Light
+that leaves the point starts at the same depth. If the light's angles to the axis are at most θ, the field is the
+product of a carrier exp(ikcζ) with c = (1 + cos θ)/2 and a function that varies slowly with the depth. This function is
+interpolated between a few planes at Chebyshev nodes z_j, with Lagrange polynomials L_j. The light that arrives at the
+tilted plane is
 
     U(x, ζ) = exp(ikcζ) Σ_j L_j(ζ) exp(-ikcz_j) U(x, z_j).
 
@@ -57,7 +58,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Misaligned:
-    """A pupil of a system that is decentred, and tilted about its centre.
+    """A decentred pupil in a system, tilted about the pupil's own centre.
 
     decentre: position (x, y) [m] of the pupil's centre relative to the axis.
     tilt: angles (x, y) [rad], -0.2 to 0.2. A positive angle moves the pupil's +x (or +y) side in the direction of the
@@ -96,13 +97,13 @@ class Alignment:
         return math.hypot(*self.slope)
 
     def beside(self, other: Alignment) -> Point:
-        """Return the centre (x, y) [m] relative to that of another plane."""
+        """Return the centre (x, y) [m] of this plane relative to the centre of another plane."""
         return self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]
 
     def nodes(self, radius: float, sine: float, wavelength: float, allowed: float) -> tuple[np.ndarray, float]:
         """Return the depths [m] between which fields are interpolated, and the error of the intensity.
 
-        If one depth is sufficient, it is 0.
+        If one depth is sufficient, that depth is 0.
 
         Along a ray at the angle θ to the axis, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2,
         with the largest depth ζ and the wave number k. Interpolation between n Chebyshev nodes has an error of at most
@@ -128,11 +129,12 @@ class Alignment:
         )
 
     def weights(self, nodes: np.ndarray, grid: Grid, turns: float, types: Precision) -> list[np.ndarray]:
-        """Return L_j(ζ) exp(2πi ζ turns) for each node j at the samples of a grid about the centre, (y, x) each.
+        """Return L_j(ζ) exp(2πi ζ turns) at the samples of a grid, as one array (y, x) per node j.
 
-        L_j are the Lagrange polynomials of the nodes, and ζ is the depth of the tilted plane.
+        L_j are the Lagrange polynomials of the nodes, and ζ is the depth of the tilted plane. The grid is centred on
+        the plane's centre.
 
-        turns: waves per depth [1/m].
+        turns: number of waves per metre of depth [1/m].
         """
         depth, found = self.depth(grid).astype(types.dtype), []
         sides = (sample_positions(n, grid.dx) * slope for n, slope in zip(grid.shape, self.slope[::-1], strict=True))
@@ -150,7 +152,10 @@ class Alignment:
         return found
 
     def error(self, sine: float) -> float:
-        """Return the relative error of the intensity due to approximations of the tilt; `sine`: largest sin θ."""
+        """Return the relative error of the intensity because the effect of the plane's tilt is only approximated.
+
+        sine: largest sin θ of the light, where θ is its angle to the axis.
+        """
         return self.steepness * sine**2 * (self.steepness + sine)
 
     def on_element(self, x: Array, y: Array, types: Precision) -> tuple[Array, Array]:
@@ -167,7 +172,15 @@ ALIGNED = Alignment()
 
 @dataclass(frozen=True)
 class DepthFactors:
-    """Pairs of weights (y, x) and factors of the spectrum (fy, fx), one pair for each depth of a tilted plane."""
+    """Arrays that multiply fields and their spectra in a step between tilted planes.
+
+    The field at a point of a tilted plane is interpolated between the fields at a few fixed depths along the axis.
+
+    leaving: for the field that leaves a plane, one pair of arrays for each fixed depth: interpolation weights (y, x),
+        and factors (fy, fx) that propagate the spectrum from the fixed depth.
+    arriving: the same pairs for the field that arrives at the next plane. The factors propagate the spectrum to the
+        fixed depth.
+    """
 
     leaving: list[tuple[Any, Any]]
     arriving: list[tuple[Any, Any]]
@@ -175,10 +188,16 @@ class DepthFactors:
 
 @dataclass(frozen=True)
 class Depths:
-    """Depths between which a step interpolates the fields that leave a plane and that arrive at the next one.
+    """A few fixed depths along the axis, for the propagation of a field from one tilted plane to another.
 
-    leaving, arriving: depths [m], (node,), and one array of weights (y, x) per node, see `Alignment.weights`.
-    turns: waves per depth [1/m], (1 - c)/λ, by which the carrier exp(ikcζ) is slower than exp(ikζ).
+    The field is propagated only from and to these depths. At any point of a tilted plane, it is interpolated between
+    the fields at these depths.
+
+    leaving: for the plane that the light leaves, depths [m], (depth,), and one array of interpolation weights (y, x)
+        per depth, see `Alignment.weights`.
+    arriving: the same for the plane at which the light arrives.
+    turns: (1 - c)/λ [1/m], where c = (1 + cos θ)/2 and θ is the largest angle of the light to the axis. By this number
+        of waves per metre of depth ζ, the carrier exp(ikcζ) of the field falls behind exp(ikζ).
     slope: tangents of the tilt along x and y of the plane that the light leaves.
     """
 
@@ -188,9 +207,13 @@ class Depths:
     slope: Point
 
     def factors(self, sines: np.ndarray, wavelength: float, types: Precision) -> DepthFactors:
-        """Return the weights, and factors exp(±2πi ζ [turns - sags/λ]) for propagation to and from depths ζ.
+        """Return the interpolation weights, and the factors that propagate each frequency to or from each depth.
 
-        The factors of leaving light include 1 - tan α sin θ, an approximation of the obliquity factor.
+        At the depth ζ, the factor is exp(±2πi ζ [turns - (1 - cos θ)/λ]), where θ is the angle of the frequency's wave
+        to the axis. The sign is + for light that arrives and - for light that leaves. `turns` is the number of waves
+        per metre by which the carrier, the part of the field that varies fast with the depth, falls behind a wave along
+        the axis. The factor of light that leaves a plane tilted by α also includes 1 - tan α sin θ, an approximation of
+        the obliquity factor.
 
         sines: sin θ of each frequency along an axis of the spectrum.
         wavelength: wavelength [m] in the medium.
@@ -215,7 +238,13 @@ def sags(sines: np.ndarray) -> np.ndarray:
 
 
 def slowness(sine: float) -> float:
-    """Return 1 - c = (1 - cos θ)/2 from sin θ, where exp(ikcζ) is the carrier of light at the depth ζ."""
+    """Return (1 - cos θ)/2 for light whose angles to the axis are at most θ.
+
+    The field of this light is a carrier exp(ikcζ) times a function that varies slowly with the depth ζ along the axis.
+    The result is 1 - c, with c = (1 + cos θ)/2.
+
+    sine: sin θ.
+    """
     return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 
@@ -236,9 +265,9 @@ def path_to_tilted_plane(source: PointSource, alignment: Alignment, grid: Grid) 
 
 
 def seen_from(source: PointSource, centre: Point) -> tuple[PointSource, float]:
-    """Return a source relative to another centre (x, y) [m], and the path [m] of its light from the old to the new one.
+    """Return a source relative to another centre (x, y) [m], and the difference [m] between two paths of its light.
 
-    The path is measured in vacuum.
+    The difference is the path to the new centre minus the path to the old one. Paths are measured in vacuum.
     """
     distance, tangents = number(source.distance), [math.tan(angle) for angle in source.angle]
     along = (centre[0] * tangents[0] + centre[1] * tangents[1]) / math.hypot(*tangents, 1)

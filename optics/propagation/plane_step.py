@@ -1,8 +1,8 @@
 """A step of a system: the propagation of a field from one plane to the next.
 
-The samples of the next plane are as dense as its pupil requires. Their pitch is reduced a little, so that the period of
-the propagation is a whole number of samples of both planes. Fast Fourier transforms can then compute both the spectrum
-and the field that follows from it.
+The samples of the next plane are as dense as its pupil requires. The Fourier transforms of the propagation repeat the
+field periodically. The pitch is reduced a little, so that the period is a whole number of samples of both planes. Fast
+Fourier transforms can then compute both the spectrum and the field that follows from it.
 
 Fields on tilted planes are interpolated between several depths (optics.propagation.misalignment). All depths of a step
 share one period, so each needs one transform.
@@ -51,9 +51,10 @@ class PlaneField:
 
     band: highest frequency [1/m] in the field.
     rays: highest frequency [1/m] of geometrical rays in the field.
-    kept: frequency [1/m] at which a fade begins that will remove all light at `band`. None: the field needs no fade.
-    alignment: position of the plane. Samples are counted from its centre.
-    tracked: the field u with its derivatives; None if it carries none.
+    kept: frequency [1/m] above which the next step will fade out the light. The fade ends at `band`, where no light is
+        left. None: the field needs no fade.
+    alignment: centre of the plane relative to the axis, and the plane's tilt. Sample n//2 is at this centre.
+    tracked: the field u with its derivatives; None if u carries no derivatives.
     """
 
     u: np.ndarray
@@ -94,7 +95,10 @@ class Stop:
 
     @classmethod
     def at(cls, element: Pupil | Misaligned, along: Scalar) -> Stop:
-        """Return the stop of a pupil at a distance [m], which may carry a derivative, from the previous stop."""
+        """Return the stop of a pupil.
+
+        along: distance [m] from the previous stop. It may carry a derivative.
+        """
         if isinstance(element, Misaligned):
             pupil, alignment = element.pupil, Alignment.from_element(element)
         else:
@@ -108,7 +112,7 @@ class Stop:
         return light or carries_derivative(self.along)
 
     def apart(self, other: Alignment) -> float:
-        """Return the distance [m] of the stop's centre from another plane's along x or along y, whichever is larger."""
+        """Return the distance [m] from the stop's centre to another plane's centre, along x or y, whichever is more."""
         return max(map(abs, self.alignment.beside(other)))
 
 
@@ -119,8 +123,8 @@ class StepSettings:
     tolerance: tolerance of each step.
     wavelength: wavelength in vacuum [m].
     margin: amount [cycles per radius of a pupil] by which frequencies of diffracted light may exceed those of
-        geometrical rays. Light of higher frequencies is removed. Infinite: all light is propagated that can reach the
-        next plane.
+        geometrical rays. Light of higher frequencies is removed. Infinite: all light that can reach the next plane is
+        propagated.
     """
 
     wavelength: float
@@ -145,10 +149,12 @@ class StepSettings:
         return 8 * self.edge_ripple + 4 * FLOAT_NOISE[self.dtype]
 
     def reaching(self, half_widths: float, distance: float) -> float:
-        """Return the highest frequency [1/m] of light that `propagate` carries to the next plane: the end of its fade.
+        """Return the highest frequency [1/m] in the light that `propagate` carries to the next plane.
 
-        The result is infinite if both planes coincide. If they are close, it includes evanescent waves that have not
-        yet decayed.
+        Light of high frequencies is so oblique that it misses the next plane, so `propagate` fades it out. The result
+        is the frequency at which this fade ends. If the planes are so close that there is no such fade, evanescent
+        waves reach the next plane before they decay. The result is then the highest frequency of these waves. It is
+        infinite if both planes coincide.
 
         half_widths: sum of the half widths of the two planes [m].
         """
@@ -164,10 +170,12 @@ class StepSettings:
         return math.hypot(1 / wavelength, math.log(1 / self.ripple) / (2 * math.pi * z))
 
     def matched(self, field: PlaneField, stop: Stop, grid: Grid) -> Grid:
-        """Return a grid of at least the same size and density, whose pitch divides the period of the step.
+        """Return a grid at least as large and as dense as `grid`, with a pitch that divides the period of the step.
 
-        The grid is not changed if no light is faded, if its pitch already divides the period, or if too many samples
-        would be necessary.
+        The period is the distance after which the step's Fourier transform repeats the field.
+
+        The grid is not changed if the step fades out no light, if the grid's pitch already divides the period, or if
+        too many samples would be necessary.
         """
         source, coarsest, half_width = Grid(field.u.shape, field.dx), grid.dx, grid.half_width
         for _ in range(PITCHES):
@@ -186,7 +194,7 @@ class StepSettings:
     def carried(self, field: PlaneField, stop: Stop, grid: Grid) -> tuple[PropagationResult, Field | None]:
         """Return the field after propagation through free space, on the samples of the next stop.
 
-        The second result is the same field with its derivatives; None if it carries none.
+        The second result is the same field with its derivatives; None if neither `field` nor the distance carries any.
         """
         window, depths, error = grid.moved(stop.alignment.beside(field.alignment)), None, 0.0
         passage = self.passage(field, stop, window)
@@ -205,7 +213,10 @@ class StepSettings:
         return out, mapped(before, out.u, grid, step_map(out, field.u.shape, depths), stop.along)
 
     def _depths(self, field: PlaneField, stop: Stop, grid: Grid) -> tuple[Depths, float]:
-        """Return the depths of a step between tilted planes, and the error of the interpolation between them."""
+        """Return the depths at which a step between tilted planes computes fields, and the error of the interpolation.
+
+        The fields on the tilted planes are interpolated between the fields at these depths.
+        """
         source, sine, types = Grid(field.u.shape, field.dx), self.steep(field), precision(self.dtype)
         wavelength, allowed = self.wavelength / self.medium_n, self.tolerance / 4
         turns = slowness(sine) / wavelength
@@ -220,9 +231,10 @@ class StepSettings:
         return depths, error_out + error_in
 
     def passage(self, field: PlaneField, stop: Stop, window: Grid) -> Passage:
-        """Return the passage to the next stop.
+        """Return the parameters of the propagation to the next stop.
 
-        Between tilted planes, the smallest distance defines the band, and the largest one the displacement of light.
+        Between tilted planes, the distance varies. The smallest distance then determines which frequencies are
+        propagated, unless `field.kept` prescribes them. The largest distance determines how far light moves sideways.
 
         window: samples of the next stop, relative to the centre of the field's plane.
         """
@@ -240,9 +252,11 @@ class StepSettings:
         return replace(passage, limit=replace(band, walk=farther * band.walk))
 
     def steep(self, field: PlaneField) -> float:
-        """Return the largest sin θ, with θ measured from the axis, of light for which tilts must be accurate.
+        """Return the largest sin θ of the light that must be propagated accurately between tilted planes.
 
-        If diffracted light is removed, the remaining light beyond geometrical rays is too weak to matter here.
+        θ is the angle to the axis. If `field.kept` is None, the result is the largest sin θ of all light. Otherwise it
+        is that of the geometrical rays: the step fades out part of the diffracted light, and the rest at larger angles
+        than the rays is too weak to matter.
         """
         frequency = field.band if field.kept is None else field.rays
         return min(frequency * self.wavelength / self.medium_n, 1.0)

@@ -1,4 +1,4 @@
-"""A plane of a system, sampled for the light that it transmits.
+"""Sampling of a plane of a system, and the light that the plane transmits.
 
 The edge of a pupil's aperture is softened (optics.apertures.aperture), but all frequencies that can reach the next
 plane remain exact. The samples of the pupil are dense enough to keep aliases off these frequencies. Sums over samples
@@ -38,11 +38,13 @@ SPLINE_PART = 3.0
 
 @dataclass(frozen=True)
 class PupilSampling:
-    """Samples of a pupil, its soft aperture, and the frequencies [1/m] that they transmit (see PlaneField).
+    """Samples of a pupil, its soft aperture, and limits of the frequencies in the field behind it.
 
-    soft: soft aperture; for a relief of pixels, the opening and the pixels together.
-    source: source relative to the pupil's centre, which illuminates the pupil if no field arrives.
-    path: path [m] of the source's light to the pupil's centre, minus that to the axis.
+    soft: aperture with a softened edge. For a relief of pixels, the jumps between pixels are softened as well.
+    source: source that illuminates the pupil if no field arrives from a previous plane, relative to the pupil's centre.
+    band, rays, kept: frequencies [1/m] in the field behind the pupil, see `PlaneField`.
+    path: difference [m] between two paths of the source's light: the path to the centre of a decentred pupil, minus the
+        path to the point of the system's axis at the same distance along the axis.
     """
 
     pupil: Pupil
@@ -61,16 +63,18 @@ class PupilSampling:
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
-        The band extends to the highest frequency that can reach the next plane and is not removed. Light behind the
-        pupil also has higher frequencies, up to the sum of those of the arriving light, of the pupil's phase and of the
-        pupil's edge. They may be aliased, but not into the band.
+        The result's `band` is the highest frequency that must be sampled without aliases: the highest one that can
+        reach the next plane, or a lower one if the settings remove diffracted light (`StepSettings.margin`). Light
+        behind the pupil also has higher frequencies. The highest one is the sum of three: the highest frequencies of
+        the arriving light, of the pupil's phase and of the pupil's edge. Light above `band` may have aliases, but these
+        must lie above `band` as well.
 
-        field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. Its
-            frequencies are then part of the pupil's phase.
+        field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. The phase of
+            the source's wave at the pupil is then treated as part of the pupil's phase.
 
         Raises:
-            ValueError: the pupil has a relief of pixels, and its radius carries a derivative or the output lies in its
-                plane.
+            ValueError: the pupil's relief consists of pixels, and either the pupil's radius carries a derivative or the
+                next stop lies in the pupil's plane.
             AccuracyError: more samples are necessary than the limit allows.
         """
         pupil = stop.pupil
@@ -117,7 +121,9 @@ class PupilSampling:
         return settings.edge_error + (self.soft.error(settings.dtype) if isinstance(self.soft, SoftPixels) else 0.0)
 
     def transmitted(self, arrived: PlaneField | None, settings: StepSettings) -> PlaneField:
-        """Return the field on the grid times the pupil's transmittance, or its conjugate in backward propagation.
+        """Return the field behind the pupil: the field on the grid times the pupil's transmittance.
+
+        In backward propagation, the conjugate of the transmittance is used.
 
         arrived: field on the grid in front of the pupil; None for light from the source.
         """
@@ -148,10 +154,12 @@ class PupilSampling:
 
 
 def _derivative_band(pupil: Pupil, settings: StepSettings) -> float:
-    """Return the frequency [1/m] up to which derivatives with respect to samples of maps must be resolved.
+    """Return the frequency [1/m] up to which derivatives with respect to samples of the maps must be resolved.
+
+    A map is a relief, wavefront or mask of the pupil that is given by samples.
 
     The derivative with respect to one sample is a cubic spline (optics.elements.derivative_knots). Its spectrum falls
-    like (πν)⁻⁴, with ν in cycles per cell.
+    like (πν)⁻⁴, with ν in cycles per distance between samples of the map.
     """
     knots = derivative_knots(pupil, settings.wavelength)
     if knots is None:

@@ -7,7 +7,8 @@ the transfer function of free space and transformed onto the output samples:
 
 A finite transform repeats the field periodically, so light that lands one period away would wrap around into the
 window. The period is long enough for light that lands near the window, and a smooth fade in the spectrum removes light
-that lands farther away. Neither is possible close to grazing incidence; the predicted error includes such light.
+that lands farther away. Light close to grazing incidence can be kept away in neither of these ways. The predicted error
+includes it.
 """
 
 from __future__ import annotations
@@ -107,11 +108,11 @@ def propagate(
     distance: distance [m] behind the plane of u; negative for planes in front of it.
     out_dx, out_shape, out_centre: pitch [m], shape (y, x) and centre (x, y) [m] of the output. By default, pitch and
         shape equal those of u, and the centre is on the axis.
-    tolerance: relative L2 error of the intensity over the output, for exact samples u. Light of u at its Nyquist
-        frequency, a sign of samples that are too coarse, causes an additional error, which the plan states if it
-        exceeds the tolerance. The smallest tolerance is 1e-5 for float32 and 3e-12 for float64.
-    method: "auto" and "angular_spectrum" are exact. "auto" replaces the transforms by matrix products if these are
-        faster, in distant or shifted windows. "fresnel" is the paraxial approximation.
+    tolerance: relative L2 error of the intensity over the output, for exact samples u. The smallest tolerance is 1e-5
+        for float32 and 3e-12 for float64. If u contains light at the Nyquist frequency, its samples are too coarse.
+        This light causes an additional error. The result's `plan` states this error if it exceeds the tolerance.
+    method: "angular_spectrum" is exact and uses Fourier transforms. "auto" is exact as well. If the output is far away
+        or far from the axis, "auto" uses matrix products if they are faster. "fresnel" is the paraxial approximation.
     medium_n: refractive index of the space, 1 to 10.
     dtype: "float32" or "float64", the precision of the result.
 
@@ -172,9 +173,11 @@ def propagated_between_depths(
 
 
 def step_map(result: PropagationResult, shape: tuple[int, int], depths: Depths | None) -> LinearMap:
-    """Return the propagation that gave `result`, which used transforms, as a linear map of fields (y, x) of `shape`.
+    """Return the propagation that gave `result` as a linear map of fields (y, x) of the shape `shape`.
 
-    depths: depths of a step between tilted planes.
+    The propagation must have used Fourier transforms, not matrix products.
+
+    depths: if a plane is tilted, the depths at which fields are computed, and between which they are interpolated.
     """
     how = result._sampling
     assert isinstance(how, TransformSampling)
@@ -191,9 +194,9 @@ def _field(u: np.ndarray) -> np.ndarray:
 
 
 def lit_part(field: np.ndarray) -> np.ndarray:
-    """Return the smallest part of a field around the centre sample that contains all light.
+    """Return the smallest part of a field (…, y, x) that has the same centre sample and contains all lit samples.
 
-    Dark samples outside it would only increase the cost.
+    Dark samples outside this part would only increase the cost.
     """
     for axis in (-2, -1):
         n = field.shape[axis]
@@ -207,7 +210,10 @@ def lit_part(field: np.ndarray) -> np.ndarray:
 def _propagated(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling | SeparableSampling, list[PropagatedPlane]]:
-    """Return the planes, propagated by transforms, or by matrix products if possible and predicted to be faster."""
+    """Return the sampling of the propagation, and the propagated field of each source (y, x) in `sources`.
+
+    Matrix products are used if they are possible and predicted to be faster, and Fourier transforms otherwise.
+    """
     direct = separable(passage, *grids, SEPARABLE_SHARE * tolerance)
     if direct is None:
         return _with_padding(sources, passage, grids, tolerance, types)
@@ -224,10 +230,13 @@ def _propagated(
 def _with_padding(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling, list[PropagatedPlane]]:
-    """Return the planes, propagated with enough padding for the blur due to light at the Nyquist frequency.
+    """Return the sampling and the propagated fields, with enough padding to keep a blur away from the window.
 
-    If even the largest useful padding is insufficient, the initial one is kept, because the samples themselves are then
-    too coarse.
+    The spectrum is truncated at the Nyquist frequency. Light at this frequency therefore causes a blur, which falls
+    with the padding of the Fourier transform.
+
+    If even the largest useful padding (`most_spare`) is insufficient, the samples themselves are too coarse. An initial
+    padding of about √(λz) is then kept.
     """
     most = most_spare(passage, grids[0])
     spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)

@@ -9,9 +9,9 @@ function of ρx, a function of ρy, and a coupling e, which vanishes if ρx = cx
 
     D(ρ) = D(ρx, cy) + D(cx, ρy) - D(c) + e(ρ).
 
-In a distant window, A exp(ike) varies so slowly that a few terms a_k(ρx) b_k(ρy) approximate it. They follow from the
-singular value decomposition of its values at Chebyshev nodes. Each term is then one matrix product along x and one
-along y. Fresnel's kernel exp(ikρ²/2z) needs a single term, without an approximation.
+In a distant window, A exp(ike) varies so slowly that a few terms a_k(ρx) b_k(ρy) approximate it. The functions a_k and
+b_k follow from the singular value decomposition of the values of A exp(ike) at Chebyshev nodes. Each term is then one
+matrix product along x and one along y. Fresnel's kernel exp(ikρ²/2z) needs a single term, without an approximation.
 
 A sum over samples contains the light of all replicas of the spectrum. If light at the Nyquist frequency misses the
 window, none of the replicas' light reaches it.
@@ -47,12 +47,14 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Slow part A exp(ike) of a kernel as a sum of products of polynomials of the offsets ρx and ρy between points.
+    """The part A exp(ike) of a kernel that varies slowly, as a sum of products of a polynomial in ρx and one in ρy.
+
+    ρx and ρy are the offsets between a point of the source and a point of the window.
 
     A is the amplitude of the kernel, k the wave number, and e the part of the distance that couples ρx and ρy.
 
-    along_x, along_y: Chebyshev coefficients (degree, term) over the ranges of ρx and ρy [m].
-    error: largest error relative to the slow part.
+    along_x, along_y: Chebyshev coefficients (degree, term) of the polynomials over the ranges of ρx and ρy [m].
+    error: largest error of the sum, relative to A exp(ike).
     """
 
     along_x: np.ndarray
@@ -88,7 +90,7 @@ class SeparableSampling:
         return max(self.source.shape)
 
     def seconds(self, real: str, planes: int = 1) -> float:
-        """Return the predicted time [s] of the propagation of planes, including the matrices.
+        """Return the predicted time [s] to compute the matrices and to propagate the fields of a number of planes.
 
         real: type of real and imaginary parts, "float32" or "float64".
         """
@@ -104,7 +106,7 @@ class SeparableSampling:
         return f"distant window: the kernel is a sum of {self.terms.count} products of functions of x and y{paraxial}"
 
     def propagated(self, plane: np.ndarray, types: Precision) -> PropagatedPlane:
-        """Return a plane (y, x) after propagation."""
+        """Return the field in the window, propagated from the field `plane` (y, x) on the samples of the source."""
         scaled = ScaledPlane.from_plane(plane, types)
         along_x, along_y = _matrices(self, types)
         (ny, nx), (my, mx) = self.source.shape, self.window.shape
@@ -122,11 +124,13 @@ class SeparableSampling:
 
 @lru_cache(maxsize=64)
 def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> SeparableSampling | None:
-    """Return a sampling of the separable kernel whose predicted error of the intensity is at most `allowed`.
+    """Return a sampling of the separable kernel with which the intensity has a predicted error of at most `allowed`.
 
-    The result is None if transforms are requested, z is 0, a plane has more than MOST_SAMPLES samples along a side, or
-    more than MOST_TERMS terms are necessary. It is also None if the samples of the source represent too few of the
-    frequencies that reach the window, or if light is to be removed that could reach the window.
+    The kernel is the field of a point source, written as a sum of products of functions of x and y. The result is None
+    if the passage requires Fourier transforms (`by_transforms`), its distance z is 0, a plane has more than
+    MOST_SAMPLES samples along a side, or more than MOST_TERMS products are necessary. It is also None if light at the
+    Nyquist frequency of the source reaches the window, or if the passage has a `limit`, a band of frequencies beyond
+    which light must be removed.
     """
     largest = max(*source.shape, *window.shape)
     if passage.z == 0 or passage.by_transforms or passage.limit is not None or largest > MOST_SAMPLES:
@@ -145,7 +149,11 @@ def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> S
 
 
 def _terms(passage: Passage, range_x: Range, range_y: Range, allowed: float) -> Terms | None:
-    """Return the fewest terms whose error is at most `allowed`; None if there are more than MOST_TERMS."""
+    """Return the slowly varying part of the kernel as a sum of as few products as possible.
+
+    The largest relative error of the sum is at most `allowed`. The result is None if this needs more than MOST_TERMS
+    products.
+    """
     x, y = (np.linspace(*span, CHECKED) for span in (range_x, range_y))
     exact = _slow_part(passage, x[None, :], y[:, None])
     for nodes in NODES:
@@ -173,7 +181,13 @@ def _series(coefficients: np.ndarray, span: Range, at: np.ndarray) -> np.ndarray
 
 @lru_cache(maxsize=2)
 def _matrices(how: SeparableSampling, types: Precision) -> tuple[np.ndarray, np.ndarray]:
-    """Return the factors of the kernel along x and along y: (term, x, ξ) and (y, term, η), with dx² and the carrier."""
+    """Return the factors of the kernel along x, (term, x, ξ), and along y, (y, term, η).
+
+    The kernel is a sum of terms, and each term is a factor along x times a factor along y.
+
+    (x, y) are positions in the window, and (ξ, η) are positions in the source. The factors along x include the area dx²
+    of a sample of the source and the carrier exp(ikz).
+    """
     passage, (cx, cy), terms = how.passage, how.passage.centre, how.terms
     x, y = np.subtract.outer(how.window.x, how.source.x), np.subtract.outer(how.window.y, how.source.y)
     carrier = _phasor(passage, math.fmod(abs(passage.z), passage.wavelength) + _sag(passage, cx, cy))
@@ -201,7 +215,12 @@ def _sag(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.n
 
 
 def _longer(passage: Passage, along: np.ndarray, middle: float, other: float) -> np.ndarray:
-    """Return the difference of distances D(along, other) - D(middle, other), see `_sag`."""
+    """Return D(along, other) - D(middle, other), without a difference of nearly equal numbers.
+
+    D is the distance [m] between a point of the source and a point of the window. Its arguments are the offsets [m]
+    between the points along the two lateral axes: `along` or `middle` along one axis, and `other` along the other one.
+    In the paraxial case, D is replaced by Fresnel's approximation.
+    """
     more, z = np.square(along) - middle**2, abs(passage.z)
     if passage.paraxial:
         return more / (2 * z)
@@ -231,7 +250,11 @@ def _amplitude(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -
 
 
 def _slow_part(passage: Passage, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the slow part of the kernel, A(x, y) exp(ik e(x, y)), with the amplitude A and the coupling e."""
+    """Return the part of the kernel that varies slowly, A(x, y) exp(ik e(x, y)), for points that are (x, y) apart [m].
+
+    A is the amplitude of the kernel. e is the part of the distance between the points that is not a sum of a function
+    of x and a function of y.
+    """
     cx, cy = passage.centre
     # e = [D(x, y) - D(x, cy)] - [D(cx, y) - D(c)]; both differences have the numerator y² - cy².
     far = _distance(passage, x, y) + _distance(passage, x, cy)

@@ -1,17 +1,18 @@
 """The transmittance of a pupil of pixels after a low-pass filter, for samples on a grid.
 
-The phase of a relief of pixels jumps at their borders, so its spectrum has no band limit. As at the edge of an
-aperture, the jumps are softened by a kernel that leaves all frequencies unchanged that the next plane requires. The
-kernel is the product of a kernel along x and one along y, so that two matrix products evaluate the convolution. One
-convolution softens the jumps and the edge of the aperture together. Softening them one after the other would be wrong,
-because the product of two soft functions is not the soft product.
+The phase of a relief of pixels jumps at their borders, so its spectrum has no band limit. Convolution with a kernel
+softens the jumps, as it softens the edge of an aperture. The kernel does not change the frequencies of light that can
+reach the next plane. It is the product of a kernel along x and one along y, so that two matrix products evaluate the
+convolution. One convolution softens the jumps and the edge of the aperture together. Softening them one after the other
+would be wrong, because the product of two softened functions differs from their softened product.
 
 The convolution is a sum over quadrature nodes within the pixels (`optics.apertures.pixelated`). The nodes resolve every
 frequency of the kernel within each pixel. Large pixels are divided into several smaller ones for this purpose.
 
-On a tilted pupil, samples that are evenly spaced across the axis have the coordinates x' = a x + b y and y' = b x + d y
-along the pupil. If b is not 0, one coordinate after the other is evaluated (two shears), and the matrix of either
-coordinate is shifted by an amount that depends on the other one. The shifts are phase factors of a spectrum.
+On a tilted pupil, samples that are evenly spaced in a plane perpendicular to the axis have the coordinates x' = a x + b
+y and y' = b x + d y along the pupil. If b is not 0, the convolution is evaluated along x first and then along y. In
+either case, the samples along the one coordinate are shifted by an amount proportional to the other coordinate (a
+shear). The shifts are phase factors of a spectrum.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class SoftPixels:
     aperture: opening, divided into the pixels or into parts of them.
     across: number of nodes along a pixel.
     ripple: ripple of the kernel's spectrum.
-    alignment: position of the pupil. If it is tilted, samples are farther apart along the pupil than across the axis.
+    alignment: position of the pupil. If the pupil is tilted, samples are farther apart along the pupil than in a plane
+        perpendicular to the axis.
     """
 
     edge: SoftEdge
@@ -63,7 +65,7 @@ class SoftPixels:
     ) -> SoftPixels:
         """Return the filter that leaves frequencies up to `passband` unchanged along x and y, to within `ripple`.
 
-        widest_reach: largest distance beyond the aperture at which a sample may be lit.
+        widest_reach: largest distance beyond the aperture's edge at which the softened transmittance may differ from 0.
 
         Raises:
             ValueError: the radius of the pupil carries a derivative.
@@ -91,22 +93,30 @@ class SoftPixels:
 
     @property
     def stopband(self) -> float:
-        """Highest frequency of the result across the axis."""
+        """Highest frequency of the softened transmittance in a plane perpendicular to the axis, in cycles per R.
+
+        R is the radius of the pupil.
+        """
         return _stretch(self.alignment) * self.edge.stopband
 
     @property
     def reach(self) -> float:
-        """Largest distance from the aperture at which the result is not 0."""
+        """Largest distance from the aperture at which the softened transmittance is not 0, in radii of the pupil."""
         return _stretch(self.alignment) * self.edge.reach
 
     def error(self, dtype: str) -> float:
-        """Return the relative error of the intensity, from the kernel, the nodes, cut pixels and rounding."""
+        """Return the relative error of the intensity behind the softened pupil.
+
+        The pupil's transmittance is softened by convolution with a kernel. The error has four causes: the kernel
+        slightly changes the frequencies that it should pass unchanged, the convolution is a sum over nodes instead of
+        an integral, the aperture's edge cuts pixels, and numbers are rounded.
+        """
         periods = max(1.0, 2 * self.edge.stopband * self.aperture.widest)
         cut = 2 * periods * self.aperture.cut_share * 10.0**-MOMENT_DIGITS
         return RIPPLES * self.ripple + cut + 2 * FLOAT_NOISE[dtype]
 
     def behind(self, beam: Beam, grid: Grid, types: Precision) -> Field:
-        """Return the field just behind the pupil at the samples of a grid about its centre."""
+        """Return the field just behind the pupil at the samples of a grid about the pupil's centre."""
         pupil, at = beam.pupil, self.aperture.rows(self.across)
         x, y = (types.Float64(padded_for_packets(axis)) for axis in np.meshgrid(at, at))
         turns = like(x, pupil.index_step(beam.wavelength)) * like(x, 1 / beam.wavelength)
@@ -149,7 +159,10 @@ class _Filter:
     def between(
         cls, edge: SoftEdge, samples: np.ndarray, nodes: np.ndarray, shifts: np.ndarray, types: Precision
     ) -> _Filter:
-        """Return the filter from nodes to samples, which are shifted by one of `shifts` for each other position."""
+        """Return the filter along one axis that computes values at the positions `samples` from values at `nodes`.
+
+        shifts: for each position along the other axis, the distance by which all samples are shifted.
+        """
         if not shifts.any():
             return cls(edge.line(np.subtract.outer(samples, nodes)).astype(types.dtype))
         farthest = np.abs(samples).max() + np.abs(shifts).max() + np.abs(nodes).max()
@@ -162,7 +175,12 @@ class _Filter:
         return cls(None, (from_nodes.astype(dtype), (response[:, None] * back).astype(dtype), onto.T.astype(dtype)))
 
     def forward(self, values: np.ndarray) -> np.ndarray:
-        """Return the result (sample, other) from values (node, other)."""
+        """Return the filtered values at the samples, given values at the nodes.
+
+        The filter acts along x or along y. Samples and nodes lie along this axis, and positions along the axis
+        perpendicular to it. The filter is applied for each position along the perpendicular axis. The result is an
+        array (sample, position), and `values` is an array (node, position).
+        """
         if self.matrix is not None:
             return _product(self.matrix, values)
         assert self.factors is not None
@@ -171,7 +189,12 @@ class _Filter:
         return found
 
     def adjoint(self, values: np.ndarray) -> np.ndarray:
-        """Return the adjoint of `forward` (node, other) from values (sample, other)."""
+        """Return the adjoint of the linear map `forward`, applied to values at the samples.
+
+        The filter acts along x or along y. Samples and nodes lie along this axis, and positions along the axis
+        perpendicular to it. The adjoint is applied for each position along the perpendicular axis. `values` is an array
+        (sample, position), and the result is an array (node, position).
+        """
         if self.matrix is not None:
             return _product(self.matrix.T, values)
         assert self.factors is not None
@@ -202,8 +225,10 @@ def _product(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _stretch(alignment: Alignment) -> float:
-    """Return a bound of the factor between distances along and across the axis, including the shears of the kernel.
+    """Return an upper bound of distances along a tilted pupil, relative to those in a plane perpendicular to the axis.
 
-    Distances grow by at most 1 + s²/2, with the tangent s of the tilt, and shears are at most s²/4.
+    Let s be the tangent of the tilt. Distances grow by a factor of at most 1 + s²/2. The bound also allows for two
+    shears, in which samples along one coordinate are shifted in proportion to the other coordinate. Each shift is at
+    most s²/4 times the other coordinate.
     """
     return 1 + alignment.steepness**2

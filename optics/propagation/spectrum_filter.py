@@ -74,7 +74,7 @@ class ScaledPlane:
 def filtered(
     given: np.ndarray, how: TransformSampling, types: Precision, depths: Depths | None = None
 ) -> PropagatedPlane:
-    """Return a plane (y, x) after propagation, between tilted planes if depths are given."""
+    """Return a plane (y, x) after propagation. If `depths` is given, the two planes may be tilted."""
     scaled = ScaledPlane.from_plane(given, types)
     plane, total = scaled.u, scaled.power
     if total == 0:
@@ -111,9 +111,10 @@ def filtered(
 def linear_map(
     how: TransformSampling, shape: tuple[int, int], types: Precision, depths: Depths | None = None
 ) -> LinearMap:
-    """Return `filtered` as a linear map of fields (y, x) of this shape.
+    """Return a linear map that propagates fields (y, x) of this shape as `filtered` does.
 
-    Its parameter z is the distance, and its rate omits the carrier exp(ikz).
+    The map depends on the distance z between the planes. Its derivative with respect to z (`LinearMap.rate`) does not
+    include the derivative of the carrier exp(ikz).
     """
     how, crop = replace(how, step=0), _middle(shape, how.source.shape)
     transfer = _free_space(how, types.dtype).transfer
@@ -146,20 +147,24 @@ def linear_map(
 
 
 def _middle(shape: tuple[int, int], part: tuple[int, int]) -> tuple[slice, ...]:
-    """Return the index of a part around the centre sample, which is sample n//2 of the whole and of the part."""
+    """Return the index of a part that has the same centre as the whole. The centre of n samples is sample n//2."""
     starts = [n // 2 - m // 2 for n, m in zip(shape, part, strict=True)]
     return tuple(slice(start, start + m) for start, m in zip(starts, part, strict=True))
 
 
 def _spectrum(plane: np.ndarray, how: TransformSampling) -> np.ndarray:
-    """Return the spectrum of a plane (y, x): (fx, fy) in FFT order unless `how.step` is 0, else (fy, fx) centred."""
+    """Return the spectrum of a plane (y, x).
+
+    If `how.step` is 0, its axes are (fy, fx), with frequency 0 in the centre. Otherwise they are (fx, fy), in the order
+    of a fast Fourier transform.
+    """
     if how.step:
         return periodic_spectrum(plane, how.period, how.across)
     return fourier_sum(plane, how.period, (how.across, how.across), -1)
 
 
 def _result(spectrum: np.ndarray, how: TransformSampling) -> np.ndarray:
-    """Return the field (y, x) of a spectrum over the window."""
+    """Return the field (y, x) at the samples of the window, given its spectrum."""
     if how.step:
         return periodic_sum(spectrum, how.period, how.step, how.window.shape)
     return fourier_sum(spectrum, how.back_period, how.window.shape, +1)

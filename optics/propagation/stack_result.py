@@ -21,8 +21,8 @@ class SystemStep:
     distance: distance [m] of the step, negative for backward propagation.
     plan: plan of the step. Its predicted error is relative to the light within the next plane's window.
     power_in, power_out: power [intensity m²] at the start, and power that arrives within the window.
-    evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult). It is a lower bound,
-        because the samples do not represent all waves that cannot reach the next plane.
+    evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult). This fraction is a
+        lower bound, because the samples omit some of the waves that cannot reach the next plane.
     """
 
     distance: float

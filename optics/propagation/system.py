@@ -63,7 +63,7 @@ def propagate_through(
         ValueError: an argument is invalid (named with its value and valid range), u, the source or a misalignment
             carries derivatives, two pupils touch, the radius of a pupil of pixels carries a derivative, the output lies
             in the plane of such a pupil, or the medium is dispersive or differs between elements.
-        AccuracyError: no sampling meets the tolerance, or a tilt is too large for it.
+        AccuracyError: no sampling meets the tolerance, or a pupil is tilted too much to meet it.
         BackendError: see `optics.psf`.
     """
     light = _Light(u, wavelength, dx, source, out_dx, out_shape, tolerance, dtype, backward)
@@ -82,8 +82,9 @@ def propagate_through_batch(
 ) -> list[StackResult]:
     """Return the fields behind similar systems, for example behind one lens with random errors of its elements.
 
-    Each result meets the tolerance, as in `propagate_through`. At tolerances of 5e-3 and above, the band of directions
-    that was necessary for one system is tried first for the next one, which saves time.
+    Each result meets the tolerance, as in `propagate_through`. At tolerances of 5e-3 and above, diffracted light is
+    included only as far from the geometrical rays as the tolerance requires. The range of directions that was necessary
+    for one system is tried first for the next one, which saves time.
 
     systems: lists of elements, each as in `propagate_through`. The first element of each is a pupil.
 
@@ -107,7 +108,7 @@ def propagate_through_batch(
 
 @dataclass(frozen=True)
 class _Light:
-    """Light in front of a system, and the samples behind it, see `propagate_through`."""
+    """Arguments of `propagate_through` except the elements: light in front of a system, and the requested output."""
 
     u: np.ndarray | None
     wavelength: float
@@ -120,9 +121,13 @@ class _Light:
     backward: bool
 
     def through(self, elements: Sequence[Element], margin: float = MARGINS[0]) -> tuple[StackResult, float]:
-        """Return the field behind a system, and the margin with which a similar system should begin.
+        """Return the field behind a system, and the margin of frequencies to try first for a similar system.
 
-        margin: smallest `StepSettings.margin` to try.
+        The margin [cycles per pupil radius] is the amount by which frequencies of diffracted light may exceed those of
+        geometrical rays. Light of higher frequencies is removed. If a margin is not sufficient for the tolerance, a
+        larger one is tried.
+
+        margin: smallest margin to try for this system.
 
         Raises:
             ValueError: see `propagate_through`.
@@ -174,9 +179,10 @@ def _with_carrier(tracked: Field, stops: list[Stop], settings: StepSettings) -> 
 class _Passed:
     """The field behind a system.
 
-    error: predicted error of the intensity, without that of removed light until `_converged` adds it.
-    complete: True if all light is included that can reach the next plane.
-    first_margin: smallest `StepSettings.margin` with which a similar system should begin.
+    error: predicted error of the intensity. `_passed` does not include the error due to diffracted light that was
+        removed. `_converged` adds this error.
+    complete: True if no light was removed that can reach the next plane.
+    first_margin: smallest `StepSettings.margin` that is worth trying for a similar system.
     """
 
     field: PlaneField
@@ -191,9 +197,11 @@ def _converged(
 ) -> _Passed:
     """Return the field with as much diffracted light as the tolerance requires.
 
-    Most light follows geometrical rays. The margin of frequencies around them is doubled until the error that is
-    estimated from the change of the intensity meets the tolerance. If it does not, if the tolerance is below
-    LEAST_TOLERANCE, or if derivatives are requested, all light is included that can reach the next plane.
+    Most light follows geometrical rays. Diffracted light is included if its spatial frequency is above the frequencies
+    of the rays by at most `StepSettings.margin`. The margin is doubled until the predicted error meets the tolerance.
+    This error is estimated from the change of the intensity due to the last doubling. All light that can reach the next
+    plane is included if no margin is sufficient, if the tolerance is below LEAST_TOLERANCE, or if derivatives are
+    requested.
     """
     before, differentiated = None, any(stop.carries_derivatives(settings.wavelength) for stop in stops)
     for margin in MARGINS if tolerance >= LEAST_TOLERANCE and not differentiated else ():

@@ -46,10 +46,10 @@ Element = Pupil | Misaligned | FreeSpace
 def light_in_front(
     u: np.ndarray | None, dx: float | None, out_dx: float | None, out_shape: tuple[int, int] | None
 ) -> tuple[PlaneField | None, Grid, float]:
-    """Return the field in front of the first stop, the output window, and the modulus of the field's brightest sample.
+    """Return a tuple: the field in front of the first stop, the output window, and the largest modulus of the field.
 
-    The field is None if a source illuminates the first pupil. Otherwise it is divided by this modulus, because float32
-    cannot represent the power of every field. A ValueError names an invalid argument.
+    The field is None if a source illuminates the first pupil. Otherwise it is divided by its largest modulus, because
+    float32 cannot represent the power of every field. A ValueError names an invalid argument.
     """
     if u is None:
         if out_dx is None or out_shape is None:

@@ -12,9 +12,10 @@ Light at an angle θ to the axis moves z tan θ to the side. If this exceeds the
 to the far edge of the other, the light cannot reach the window. It is faded out, because it would otherwise wrap
 around.
 
-A fade of the spectrum blurs the field, and its width is a compromise. A narrow fade blurs over a large distance, so the
-unfaded band must include light that lands this far outside the window. A wide fade includes light that moves far to the
-side.
+A fade of the spectrum blurs the field over a distance that is inversely proportional to the fade's width in frequency.
+Faded light must not be blurred into the window. It must therefore land outside the window by at least the blur
+distance, which is large for a narrow fade. A wide fade, however, ends at a high frequency, whose light moves far to the
+side. The width is a compromise between the two.
 """
 
 from __future__ import annotations
@@ -60,11 +61,12 @@ FADE_SINES = np.geomspace(0.003, 0.6, 33)
 class Band:
     """A band of frequencies: light is unchanged up to `kept` [1/m] and faded out between `kept` and `kept` + `fade`.
 
-    kept: infinite if no light may be faded.
-    square: False for a fade of the radial frequency √(fx² + fy²). True for the product of two fades, one along x and
-        one along y. In the paraxial case, they depend on fx and on fy. Otherwise the fade along x depends on fx / √(1 -
-        λ²fy²), and that along y correspondingly.
-    walk: distance [m] that the outermost light of the fade moves to the side, including the blur.
+    kept: infinite if no light is faded out. The band then contains all frequencies.
+    square: False for one fade of the radial frequency √(fx² + fy²). True for the product of two fades, one along x and
+        one along y. In the paraxial case, these are functions of fx and of fy. Otherwise the fade along x is a function
+        of fx / √(1 - λ²fy²), and the fade along y is a function of fy / √(1 - λ²fx²).
+    walk: largest sideways displacement [m] of the band's light at the next plane. It is the displacement of light at
+        the frequency `kept` + `fade`, plus the distance over which this light is blurred by the fade.
     """
 
     kept: float
@@ -79,7 +81,8 @@ class Band:
     def diagonal(self, wavelength: float) -> float:
         """Return the highest radial frequency [1/m] of a square band.
 
-        It lies on the diagonal fx = fy, where fx / √(1 - λ²fy²) equals the end of the fade.
+        At this frequency, fx = fy, and fx / √(1 - λ²fy²) equals `kept` + `fade`, at which the fade along x reaches 0. λ
+        is the wavelength [m] in the medium.
         """
         return math.sqrt(2) * self.end / math.hypot(1, self.end * wavelength)
 
@@ -96,32 +99,40 @@ def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) 
 def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
     """Return the band of the light whose sideways displacement over the distance z is at most `corner` [m].
 
-    It is chosen for the shortest period of the transform. The result is `EVERYTHING` if no light may be faded.
+    Light of higher frequencies is faded out. The width of the fade is chosen so that the Fourier transforms of the
+    propagation can have the shortest period. The result is `EVERYTHING`, without a fade, if z is 0 or if every fade
+    would end too near grazing incidence.
 
-    ripple: fraction of the light that remains beyond the fade.
+    ripple: fraction of the amplitude of faded light that may land at displacements of at most `corner`. Some of it
+        lands there, because the fade blurs the field.
     """
     return _shortest(corner, wavelength, z, ripple, paraxial, square=False)
 
 
 def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
-    """Return the square band for light that moves up to `half` [m] along each axis over the distance z.
+    """Return the band of the light whose displacements along x and along y over the distance z are at most `half` [m].
 
-    It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. Unless
-    paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression.
-    The blur is then larger than that of a fade in fx alone, by the factor of the expression's gradient. The result is
-    `EVERYTHING` if no light may be faded.
+    Light that moves farther along x or y is faded out. In a square window, displacements as far as a corner occur only
+    along the diagonals. The round band of `kept_band` includes displacements of this length in every direction, so the
+    square band can be smaller. Unless paraxial=True, the displacement along x depends on fx / √(1 - λ²fy²) instead of
+    fx alone, so the fade along x is a function of this expression. It blurs the field over a larger distance than a
+    fade in fx. The ratio of the two distances is the largest gradient of the expression. The result is `EVERYTHING`,
+    without a fade, if z is 0 or if every fade would end at too large an angle.
 
-    ripple: fraction of the light that remains beyond the fade.
+    ripple: fraction of the amplitude of faded light that may land at displacements of at most `half` because of the
+        blur.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
 
 def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: float) -> Band:
-    """Return the band with the given limits, even if more or less light could reach the window.
+    """Return the band of light that is unchanged up to `kept` [1/m] and faded out up to `kept` + `fade`.
 
-    The result is `EVERYTHING` if its outermost light is too near grazing incidence.
+    These limits do not depend on which light can reach the next plane. The result is `EVERYTHING` if light at the
+    frequency kept + fade is too near grazing incidence.
 
-    ripple: fraction of the light that remains beyond the fade.
+    ripple: fraction of the amplitude of faded light that the blur may move beyond the distance for which `Band.walk`
+        allows. The smaller the fraction, the larger is this distance.
     """
     if (kept + fade) * wavelength >= PERIOD_MAX_SINE:
         return EVERYTHING
@@ -154,7 +165,13 @@ def _walk(band: Band) -> float:
 
 
 def _gradient(sine: float) -> float:
-    """Return the largest |∇(fx / √(1 - λ²fy²))| for values below `sine` along both axes."""
+    """Return the largest gradient |∇F| of F(fx, fy) = fx / √(1 - λ²fy²).
+
+    Over a distance z, light moves zλF / √(1 - λ²F²) along x. A square band (`Band`) is faded out along x by a function
+    of F.
+
+    sine: largest value of λ|F| and of λ|fy|, where λ is the wavelength, and fx and fy are spatial frequencies.
+    """
     cosine2 = 1 - sine * sine
     return math.sqrt((1 + sine**4 / cosine2) / cosine2)
 
@@ -173,10 +190,10 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _fade_table(ripple: float) -> Interpolant:
-    """Return a fade from 1 at 0 to 0 at 1: the complement of the integral of a Kaiser window.
+    """Return a function that decreases from f(0) = 1 to f(1) = 0: the complement of the integral of a Kaiser window.
 
     A fade of this shape over a band of width Δf blurs a field over the distance β/(π Δf), where β is the window's
-    parameter. The amplitude beyond this distance is the fraction `ripple`.
+    parameter. The fraction `ripple` of the faded light's amplitude is blurred farther than this.
     """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)
@@ -198,7 +215,7 @@ class TransferFunction:
 
     transfer: the transfer function, with all factors that do not depend on the field, complex (fy, fx).
     grazing: 1 for frequencies whose light is too near grazing incidence, else 0, (fy, 2 fx). Each value occurs twice in
-        succession, for the real and the imaginary part of the spectrum. None if all values are 0.
+        succession, for the real and the imaginary part of the spectrum. `grazing` is None if all values would be 0.
     """
 
     transfer: np.ndarray
@@ -207,16 +224,17 @@ class TransferFunction:
 
 @dataclass(frozen=True)
 class Passage:
-    """Parameters of a transfer function: the passage of light from one plane to another.
+    """The passage of light from one plane to a window in another plane: parameters of its transfer function.
 
     wavelength: wavelength [m] in the medium.
     z: distance [m] between the planes, negative for backward propagation.
     paraxial: True for Fresnel's approximation.
     band: band of the light that can reach the window.
     centre: position (x, y) [m] of the window.
-    ripple: fraction of the light that remains beyond a fade.
+    ripple: fraction of the amplitude of faded light that may still reach the window. Light outside the band is faded
+        out. The fade blurs the field, so some of this light reaches the window although it would otherwise miss it.
     limit: band beyond which light is removed although it could reach the window; None if there is no limit.
-    by_transforms: True if matrix products must not replace transforms.
+    by_transforms: True if Fourier transforms must not be replaced by matrix products.
 
     Evanescent waves decay in forward propagation and are omitted in backward propagation (z < 0).
     """
@@ -240,9 +258,10 @@ class Passage:
         return TransferFunction(self._transfer(fx, fy, types), weight)
 
     def _transfer(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> np.ndarray:
-        """Return H times the fade, including the displacement to the window's centre.
+        """Return the transfer function H of free space, multiplied by the factors that fade out light outside `band`.
 
-        Whole waves are subtracted in float64.
+        The result also contains the phase that displaces the field to the window's centre. It is an array (fy, fx).
+        Whole waves are subtracted from the phases in float64.
         """
         import drjit as dr
 

@@ -11,9 +11,9 @@ the field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N. The con
 where walk(f) = z tan θ is the sideways displacement of light of frequency f, and 2πd is the derivative of the phase.
 This is the first term of an integral's expansion about its end (Bleistein & Handelsman, Asymptotic Expansions of
 Integrals, §3.2). It decreases slowly with d, so the blur of the next period reaches the window. Consider a source of
-width L that emits light of this frequency evenly and incoherently. Let g be the gap between the displaced light of the
-source in the next period and a window of width W. The power that comes back into the window, divided by the power |S|²
-at the end of the spectrum, is
+width L that emits light of the frequency f_N evenly and incoherently, and the copy of this source in the next period.
+Let g be the gap between the place where light of the copy lands and a window of width W. The power that comes back into
+the window, divided by the power |S|² at the end of the spectrum, is
 
     ∫_0^L ds/L ∫_0^W dx / (2π (g + s + x))² = ln(1 + L W / (g (g + L + W))) / (4π² L).                             (2)
 """
@@ -56,9 +56,9 @@ class TransformSampling:
 
     period: period in samples of the source.
     across: number of frequencies along each axis.
-    step: pitch of the window in samples of the source if this is a whole number, else 0.
-    reach: lateral distance [m] from the far edge of one plane to the far edge of the other, along x or along y,
-        whichever is larger.
+    step: pitch of the window in samples of the source if the pitch is a whole number of samples, else 0.
+    reach: sideways distance [m] from an edge of the source to the opposite edge of the window, along x or along y,
+        whichever distance is larger.
     """
 
     passage: Passage
@@ -79,12 +79,15 @@ class TransformSampling:
 
     @property
     def back_period(self) -> float:
-        """Period in samples of the window. It is exactly whole if it is whole but for rounding errors."""
+        """Period of the transform, in samples of the window.
+
+        A period that differs from a whole number only by rounding errors is rounded to this number.
+        """
         period = self.period * self.source.dx / self.window.dx
         return float(round(period)) if abs(period - round(period)) <= SAME_PITCH else period
 
     def seconds(self, real: str, planes: int = 1) -> float:
-        """Return the predicted time [s] of the propagation of planes, including the transfer function.
+        """Return the predicted time [s] for propagating this number of planes and computing the transfer function.
 
         real: type of real and imaginary parts, "float32" or "float64".
         """
@@ -99,7 +102,7 @@ class TransformSampling:
 
     @property
     def why(self) -> str:
-        """Reason for the sampling, for plans."""
+        """Reason for the sampling, in words, which the plan of a result of `propagate` contains."""
         band = self.passage.band
         kept = f"band {band.kept * self.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
         paraxial = "; paraxial, as requested" if self.passage.paraxial else ""
@@ -110,9 +113,9 @@ class TransformSampling:
 class KeptLight:
     """The light that can reach a window.
 
-    band: its band of frequencies.
-    reach: lateral distance [m] from the far edge of one plane to the far edge of the other, along x or along y,
-        whichever is larger.
+    band: band of frequencies of this light.
+    reach: sideways distance [m] from an edge of the source to the opposite edge of the window, along x or along y,
+        whichever distance is larger.
     """
 
     band: Band
@@ -120,10 +123,11 @@ class KeptLight:
 
 
 def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
-    """Return the band of the light that can reach the window, or the passage's limit if there is one.
+    """Return the light that can reach the window: its band of frequencies and the distance `KeptLight.reach`.
 
-    The band contains all frequencies if no light can be faded, because light at the Nyquist frequency of the source
-    lands in the window or near it.
+    If `passage.limit` is a band, this band is used instead. If the band extends beyond the spectrum, which ends at the
+    Nyquist frequency of the source's samples, the spectrum contains no light outside the band that could be faded out.
+    The band is then replaced by one that contains all frequencies.
     """
     wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
     # The source is extended by one sample, because the band-limited function extends beyond the outermost samples.
@@ -145,9 +149,13 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
-    """Return the sampling with the shortest period for a passage, restricted to the band that can reach the window.
+    """Return the sampling of transforms that propagate a field from a source to a window with the shortest period.
 
-    spare: padding [m] for the blur of a truncated spectrum.
+    The result's `passage` is the argument `passage`, with its band replaced by that from `kept_light`.
+
+    spare: length [m] by which the period is extended if no light can be faded out, because light of every frequency in
+        the spectrum lands in or near the window. The spectrum is then truncated at the Nyquist frequency, which blurs
+        the field, and the longer period keeps the blur away from the window.
 
     Raises:
         AccuracyError: the period needs more samples than the limit.
@@ -175,10 +183,12 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 
 
 def most_spare(passage: Passage, source: Grid) -> float:
-    """Return the largest useful padding [m] for the blur of a truncated spectrum.
+    """Return the largest useful value of `spare` [m], the length by which `sampling` extends a transform's period.
 
-    This is an upper bound. It assumes that the light with the largest displacement, at the spectrum's corner (√2 times
-    the Nyquist frequency), moves along an axis instead of along the diagonal.
+    A Fourier transform repeats the field every period, and the truncation of the spectrum blurs it. A longer period
+    keeps the blurred light of the next repetition away from the window, but an extension beyond the returned length has
+    no further effect. The result is an upper bound. It assumes that the light with the largest displacement, at the
+    spectrum's corner (√2 times the Nyquist frequency), moves along x or y instead of along the diagonal.
     """
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
@@ -187,11 +197,12 @@ def most_spare(passage: Passage, source: Grid) -> float:
 
 
 def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> float:
-    """Return the largest displacement [m] along an axis, for light up to the frequency f_N = `nyquist` along each axis.
+    """Return the largest displacement [m] along x or y of light with |fx| and |fy| up to f_N = `nyquist`.
 
-    Light moves in the direction of (fx, fy), so the displacement along x is z tan θ fx/|f|. It is largest for fx = f_N
-    and the largest tan θ. The latter belongs to the corner |f| = √2 f_N, or to PERIOD_MAX_SINE if this is smaller. In
-    the paraxial case it is zλ fx for every fy.
+    Light at the angle θ to the optical axis, with sin θ = λ|f|, moves z tan θ in the direction of (fx, fy), so its
+    displacement along x is z tan θ fx/|f|. This is largest for fx = f_N and the largest tan θ, which occurs at the
+    corner |f| = √2 f_N, or at sin θ = PERIOD_MAX_SINE if this sine is smaller. In the paraxial case, it is zλ fx for
+    every fy.
     """
     if paraxial:
         return walk(nyquist, wavelength, z, paraxial)
@@ -200,12 +211,14 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
 
 
 def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
-    """Return the power [units of Σ|u|²] that comes back into the window due to truncation at the Nyquist frequency.
+    """Return the power [units of Σ|u|²] of the light that a truncated spectrum blurs into the window.
 
-    The source is assumed to emit light of this frequency evenly.
+    A Fourier transform repeats the field every period. The field is blurred, because its spectrum is truncated at the
+    Nyquist frequency, so light of the next repetition reaches the window. It is assumed that light of this frequency
+    comes evenly from the whole width of the source.
 
-    spectrum: spectrum of the field at the source: (fx, fy) in FFT order if the window's pitch is a whole number of
-        samples, else (fy, fx) centred.
+    spectrum: spectrum of the field at the source. If the window's pitch is a whole multiple of the source's pitch, the
+        axes are (fx, fy) in FFT order. Otherwise they are (fy, fx), with frequency 0 in the centre.
     """
     nyquist = 0.5 / how.source.dx
     if how.passage.band.fade or not (how.passage.paraxial or nyquist * how.passage.wavelength < PERIOD_MAX_SINE):
@@ -223,10 +236,10 @@ def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
 
 
 def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
-    """Return the amplitude of the blur in the sampling `roomier`, which has more padding, relative to that in `how`.
+    """Return the amplitude of the blur in the sampling `roomier`, which has a longer period, divided by that in `how`.
 
-    It is assumed that the power at the Nyquist frequency along one axis does not depend on the frequency along the
-    other axis.
+    The blur is light that a truncated spectrum moves into the window (see `blurred_back`). It is assumed that the power
+    at the Nyquist frequency along one axis does not depend on the frequency along the other axis.
     """
     power, left = (sum(float(_blur_weights(sampling, axis).sum()) for axis in (0, 1)) for sampling in (how, roomier))
     return math.sqrt(left / power) if power else 1.0
@@ -234,12 +247,18 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 
 @lru_cache(maxsize=8)
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
-    """Return the fraction of the power |U|² at the Nyquist frequency along one axis that comes back into the window.
+    """Return the power that is blurred into the window, divided by the power |U|² at the Nyquist frequency f_N.
 
-    There is one weight per frequency along the other axis, (frequency,). It follows from the fraction of eq. (2) of the
-    module. The sum over samples U = Σ u e^{-2πi...} equals S/dx, so this fraction times dx² |U|² is the power ∫|b|² dx.
-    Division by dx gives the sum over samples along the axis. By Parseval's theorem, the factor 1/period gives the sum
-    along the other axis. The two ends ±f_N of the spectrum contribute a factor of 2.
+    The spectrum is truncated at f_N along an axis, which blurs the field. A Fourier transform repeats the field every
+    period, so the blur b of the next repetition reaches the window. U = Σ u e^{-2πi...} is the sum over samples of the
+    source, and the power of the blur is a sum of |b|² over samples at the pitch dx. The result is a product. Its first
+    factor is ∫|b|² dx / |S|², from equation (2) in the module's docstring, where S = U dx is the spectrum as an
+    integral. The factor dx² converts |S|² to |U|², and 1/dx converts the integral to a sum along the axis. By
+    Parseval's theorem, 1/period converts a sum over frequencies along the other axis to one over samples. A factor of 2
+    stands for the two ends ±f_N of the spectrum. The last factor is the fraction of the light that lands within the
+    window's range along the other axis.
+
+    axis: axis of the blur, 0 for y, 1 for x. The result has one value per frequency along the other axis, (frequency,).
     """
     source, window = how.source, how.window
     others = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
@@ -255,8 +274,8 @@ def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
 def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of a source's light that lands within the window's range along an axis (0 for y, 1 for x).
 
-    The fraction is the overlap of two intervals, relative to the first one. Their widths are `lit` and `seen`, and
-    their centres are `missed` apart.
+    When the source's light lands, it covers an interval as wide as the source, displaced by `walks`. The fraction is
+    the width of the overlap of this interval and the window, divided by the width of the source.
 
     walks: displacements [m] of the light along this axis.
     """
@@ -269,7 +288,8 @@ def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> n
 def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:
     """Return the displacements [m] along x and y of light with the frequencies (fx, fy).
 
-    The displacement along x is z tan θ fx/|f| = z λ fx / cos θ, and that along y correspondingly.
+    They are z λ fx / cos θ and z λ |fy| / cos θ, with the distance z between the planes and the angle θ to the optical
+    axis.
 
     Both are infinite for light that is too near grazing incidence.
     """

@@ -40,11 +40,11 @@ class SpectralBands(ReadOnlyArrays):
 
     @classmethod
     def uniform(cls, bands: int, receptors: Any = "rgb") -> SpectralBands:
-        """Return equal bands over the receptors' range.
+        """Return equal bands over the receptors' range, with their weights for each receptor channel.
 
-        For every reflectance that is linear between the bands' centres and constant beyond them, the weights give the
-        exact integral of sensitivity x daylight x reflectance (by quadrature to 1 nm). For other smooth reflectances,
-        the error is O(bands⁻²).
+        The weights give the exact integral of sensitivity x daylight x reflectance (by quadrature to 1 nm) if the
+        reflectance is linear between the bands' centres and constant beyond them. For other smooth reflectances, the
+        error is O(bands⁻²).
 
         receptors: `Receptors`, or any argument of `receptors_of`.
 
@@ -65,16 +65,18 @@ class SpectralBands(ReadOnlyArrays):
     ) -> np.ndarray:
         """Convert a spectral radiance to values for these bands (band,), in units of daylight at 560 nm.
 
-        The spectrum may have any shape, including the lines of a fluorescent lamp, which samples at the bands' centres
-        could miss. The values are first computed as means over the bands, weighted by the receptors' sensitivity and
-        relative to daylight. They are then adjusted by the smallest change that makes Σ_b weights[c, b] values[b] equal
-        to the quantum catch of receptor type c, relative to that from a white surface in daylight (by quadrature to 1
-        nm). If there are fewer bands than types, this is possible only in the least-squares sense. If a spectrum with
-        lines is divided into few bands, a value may be negative.
+        The spectrum may have any shape. It may, for example, contain the narrow lines of a fluorescent lamp, although
+        samples at the bands' centres would miss such lines. The values are first computed as means over the bands,
+        weighted by the receptors' sensitivity and relative to daylight. They are then adjusted by the smallest change
+        that makes Σ_b weights[c, b] values[b] equal to the quantum catch of receptor type c. The quantum catch is an
+        integral over wavelengths in steps of 1 nm, divided by the catch from a white surface in daylight. If there are
+        fewer bands than types, this equality is possible only in the least-squares sense. If a spectrum with lines is
+        divided into few bands, a value may be negative.
 
         radiance: a Spectrum, or a function of wavelengths [m]. For a surface, it is reflectance times illuminant.
         receptors: the receptors for which these bands were made.
-        nonnegative: True for values of at least 0. Catches are then as close to the exact ones as this permits.
+        nonnegative: True if values must be at least 0. Catches are then as close to the exact ones as such values
+            permit.
 
         Raises:
             ValueError: radiance is neither a Spectrum nor a function, is not finite at a wavelength, or gives neither
@@ -104,7 +106,10 @@ class SpectralBands(ReadOnlyArrays):
 
 
 def _nonnegative(weights: np.ndarray, catches: np.ndarray, means: np.ndarray) -> np.ndarray:
-    """Return x >= 0 with weights @ x closest to the catches; among several such x, the one closest to the means."""
+    """Return band values x >= 0 for which weights @ x is closest to the quantum catches of the receptor channels.
+
+    Among several such x, return the one closest to the means of the spectrum over the bands.
+    """
     from scipy.optimize import lsq_linear
 
     equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
@@ -126,7 +131,11 @@ def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
-    """Return wavelengths [nm] over the receptors' range, and each type's catch of daylight times quadrature weights."""
+    """Return wavelengths [nm] over the receptors' range, and each type's quantum catch of daylight at each wavelength.
+
+    The catches are multiplied by the weights of the trapezoid rule, so their sum is an integral over wavelengths, up to
+    a common factor. The arrays are (wavelength,) and (type, wavelength).
+    """
     low, high = kinds.limits_nm
     nm = np.arange(low, high + 0.5)
     catch = kinds.catch(nm)

@@ -22,8 +22,8 @@ def optical_sensitivity(
 ) -> float:
     """Return Land's optical sensitivity S = (π/4)² D² (d/f)² P [m² sr].
 
-    The photons that a receptor absorbs are S times the radiance of a scene that fills its field. P is the fraction of
-    the light in the receptor that it absorbs over its length l:
+    The photons that a receptor absorbs are S times the radiance of a scene that fills its visual field. Of the light
+    that enters the receptor, the fraction P is absorbed over the receptor's length l:
 
         P = k l / (2.3 + k l)   for white light (Warrant & Nilsson, Vision Research 38, 195, 1998, eq. 4),
         P = 1 - exp(-k l)       for light at the pigment's peak (Land, Handbook of Sensory Physiology VII/6B, 1981).
@@ -33,7 +33,8 @@ def optical_sensitivity(
     receptor.
 
     diameter: diameter D [m] of the pupil or facet.
-    focal_length: focal length f [m] in front of the lens (the posterior nodal distance).
+    focal_length: focal length f [m] of the lens on the side of the object. It equals the posterior nodal distance, from
+        the nodal point to the image of a distant object.
     receptor: diameter d [m] of the round receptor or rhabdom.
     length: length l [m] of the receptor. None: P = 1, and S is the etendue.
     absorption: absorption coefficient k [1/m] at the pigment's peak.

@@ -1,4 +1,4 @@
-"""Photons that a receptor absorbs for a signal of 1, from the light level."""
+"""Number of photons that a receptor absorbs from a white surface (signal 1), computed from the light level."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The responses of photoreceptors over time: integration, latency, adaptation and events."""
+"""Temporal properties of photoreceptors: integration, latency, adaptation, events at changes of light, and motion."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ class ReceptorDynamics:
     time_constant_ms: time constant τ of the low-pass filter [ms]
     order: order n of the filter, 1 or 2: h(t) = tⁿ⁻¹ exp(-t/τ) / τⁿ
     latency_ms: additional delay [ms], rounded to whole frames
-    adaptation: gain control by b, the exponentially weighted mean of the signal over `adaptation_ms`. "none";
-        "naka_rushton": s / (s + b), about 1/2 in constant bright light (Naka & Rushton 1966, J. Physiol. 185:536);
-        "logarithmic": ln(s / b), which is 0 in constant light. `dark_light` is added to s and b in the logarithm, and
-        to b in the quotient
-    adaptation_ms: time constant of b [ms]
+    adaptation: gain control by m, the exponentially weighted mean of the signal s over the time `adaptation_ms`, with d
+        = `dark_light`. "none": no gain control; "naka_rushton": s / (s + m + d), about 1/2 in constant bright light
+        (Naka & Rushton 1966, J. Physiol. 185:536); "logarithmic": ln((s + d) / (m + d)), which is 0 in constant light
+    adaptation_ms: time constant of the mean m [ms]
     dark_light: signal that is equivalent to the receptor's spontaneous activity, relative to the signal of white in
         daylight
-    event_threshold: θ, at least 1e-3. The output is the number of events since the last observation, with a sign. An
-        event occurs whenever ln(s + dark_light) has changed by θ since the last event (Lichtsteiner et al. 2008, IEEE
-        J. Solid-State Circuits 43:566). None: no events
+    event_threshold: θ, at least 1e-3. A receptor then signals the number of positive events minus that of negative
+        events since the last observation. A positive (negative) event occurs whenever ln(s + dark_light) has increased
+        (decreased) by θ since the last event (Lichtsteiner et al. 2008, IEEE J. Solid-State Circuits 43:566). None: no
+        events
     motion: elementary motion detectors between neighbours in a row. Their outputs are channels that follow those of the
-        receptors. Their inputs are the signals a of the left and b of the right receptor, and D is a low-pass filter.
-        "hassenstein_reichardt" (1956): D(a) b - a D(b). "barlow_levick" (1965): max(a - D(b), 0) - max(b - D(a), 0).
-        Here an object that moves in the null direction reaches the inhibiting neighbour first. "none": no detectors.
-        Motion to the right gives positive output
+        receptors. The inputs are a, the signal of the left receptor, and b, the signal of the right one. D is a
+        low-pass filter, which delays a signal. "hassenstein_reichardt" (1956): D(a) b - a D(b). "barlow_levick" (1965):
+        max(a - D(b), 0) - max(b - D(a), 0). In each term, the delayed signal of one neighbour inhibits the other. An
+        object moving opposite to the direction that the term detects reaches the inhibiting neighbour first. "none": no
+        detectors. Motion to the right gives positive output
     motion_ms: time constant of D [ms]
     frames: number of frames per action that environments render, a divisor of the number of physics steps per action.
-        None: the smallest number whose error is acceptable
+        None: the smallest number for which the error of the signals is acceptable, see the tolerance of `sim.Fidelity`
 
     Raises:
         ValueError: an argument is outside its range, or events are combined with adaptation.

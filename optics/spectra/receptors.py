@@ -32,8 +32,8 @@ class Receptors:
         receptors of all types, like the pixels of a camera, and signals are (type, h, w). Rows: every receptor has one
         type, as in a real retina, and signals are (1, h, w). The rows are repeated over the retina from its top left
         corner.
-    range_nm: range of wavelengths (low, high) [nm] that is divided into bands: whole numbers within 300-780. None: a
-        range chosen by the catch from a white surface in daylight. Each type has at most 1e-3 of its catch below the
+    range_nm: range of wavelengths (low, high) [nm] that is divided into bands: whole numbers within 300-780. None: the
+        range is chosen so that each type absorbs at most 1e-3 of its photons from a white surface in daylight below the
         range, and at most 1e-3 above it.
 
     Raises:
@@ -149,7 +149,11 @@ def _range(range_nm: Any) -> tuple[float, float]:
 
 
 def _range_of(receptors: Receptors) -> tuple[float, float]:
-    """Return the range (low, high) [nm] for which every type has at most NEGLIGIBLE of its catch beyond either end."""
+    """Return the range (low, high) [nm] outside which every receptor type absorbs a negligible part of daylight.
+
+    The photons that a type absorbs below the range, and those above it, are each at most the fraction NEGLIGIBLE of all
+    the photons that it absorbs from a white surface in daylight.
+    """
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1)
     so_far = np.cumsum(receptors.catch(nm), axis=1)
     so_far /= so_far[:, -1:]

@@ -1,7 +1,7 @@
 """Spectra as tables: illuminants, reflectances, cone fundamentals, and user data.
 
-The tables are copied from the package colour-science, and tests compare them with the package. Only the tables of water
-and phytoplankton are copied from publications. The original sources are named with each table.
+The tables of water and phytoplankton are copied from publications. All others are copied from the package
+colour-science, and tests compare them with the package. The original sources are named with each table.
 """
 
 from __future__ import annotations
@@ -192,11 +192,11 @@ def reflectance(name: str) -> Spectrum:
 
 
 def srgb_basis() -> tuple[Spectrum, Spectrum, Spectrum]:
-    """Return the reflectances of red, green and blue surfaces, whose weighted sums have all sRGB colours in daylight.
+    """Return the reflectances of a red, a green and a blue surface, from which every sRGB colour can be mixed.
 
-    A surface with the linear sRGB values (r, g, b) has the reflectance r red + g green + b blue. The three reflectances
-    add up to 1. Infinitely many other spectra have the same colours. The tables cover 380-780 nm, and values are
-    constant below.
+    A surface with the reflectance r red + g green + b blue has the linear sRGB values (r, g, b) in daylight. The three
+    reflectances add up to 1. Infinitely many other spectra have the same colours. The tables cover 380-780 nm, and
+    values are constant below 380 nm.
 
     Source: Mallett & Yuksel (2019), Spectral primary decomposition for rendering with sRGB reflectance, EGSR.
     """

@@ -23,7 +23,7 @@ class Advanced:
     """The outcome of an action, and frames that are still being rendered.
 
     step: outcome of the action
-    pending: frames after the action, for each agent in `Animals.seeing`
+    pending: frames after the action, for each agent whose eyes are used, learners first
     """
 
     step: Step
@@ -36,8 +36,8 @@ class Animals:
     simulation: the worlds
     renderers: for each agent, the renderers of its eyes, or None if its eyes are not used
     memory: number of frames in the observations of learning agents
-    learners: attribute, senses of the learning agents
-    seeing: attribute, senses of all agents whose eyes are used, learners first
+    learners: attribute, one `Senses` (an agent's observations) for each learning agent
+    seeing: attribute, one `Senses` for each agent whose eyes are used, learners first
     """
 
     def __init__(self, simulation: Simulation, renderers: Sequence[AgentRenderers | None], memory: int) -> None:
@@ -91,7 +91,7 @@ class Animals:
         return Advanced(step, pending)
 
     def seen(self, advanced: Advanced) -> list[Arrays]:
-        """Wait for the frames after an action, and return them for each agent in `seeing`.
+        """Wait for the frames after an action, and return them for each agent whose eyes are used, learners first.
 
         Worlds in which the task moved bodies after the action (`Step.changed`) are rendered again first.
         """
@@ -101,7 +101,9 @@ class Animals:
         return frames
 
     def start_episodes(self, worlds: np.ndarray) -> Pending:
-        """Start new episodes; return their first frames, which are still being rendered, for each agent in `seeing`.
+        """Start new episodes in these worlds, and return their first frames, which are still being rendered.
+
+        There are frames for each agent whose eyes are used, in the order of the attribute `seeing`.
 
         worlds: indices of the worlds
 
@@ -121,7 +123,7 @@ class Animals:
     def remember(self, seen: Sequence[Arrays], fresh: np.ndarray) -> list[Arrays]:
         """Add frames to the memories, and return the learners' observations.
 
-        seen: the frames, for each agent in `seeing`
+        seen: the frames, for each agent whose eyes are used, learners first
         fresh: indices of the worlds whose episode has just begun
         """
         known = [senses.observation(frames, fresh) for senses, frames in zip(self.seeing, seen, strict=True)]
@@ -131,7 +133,7 @@ class Animals:
     def replace(seen: Sequence[Arrays], worlds: np.ndarray, pending: Pending) -> None:
         """Replace the last frames of these worlds by the first frames of their new episodes.
 
-        seen: frames of each agent in `seeing`, changed in place
+        seen: frames of each agent whose eyes are used, changed in place
         worlds: indices of the worlds that have started a new episode
         pending: their first frames, from `start_episodes`
         """
@@ -154,7 +156,7 @@ class Animals:
             senses.set_state(now)
 
     def launch(self, worlds: np.ndarray | None = None) -> Pending:
-        """Launch the rendering of these worlds (None: all) for all agents in `seeing`, without waiting for results."""
+        """Launch the rendering of these worlds (None: all) for all agents whose eyes are used, without waiting."""
         poses = self.simulation.poses()
         return [senses.launch(poses, worlds) for senses in self.seeing]
 

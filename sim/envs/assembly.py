@@ -85,12 +85,12 @@ def make_vec_env(
     seed: seed of episodes and noise, a whole number of at least 0; None: a random seed
     memory: number of frames in an observation, 1 to 1,000,000
     mode: "training", "evaluation" or "test". In evaluation of a built-in task, objects that the agent reached reappear
-        elsewhere, and reward terms have the weights of the fitness. "test" is an evaluation for final results. It
-        equals "evaluation", unless a user task uses other worlds in this mode.
-    rays_per_receptor: number of rays traced for each receptor; reflected light is then ignored. "auto": the cheapest
-        fidelity whose error is small compared with the receptors' noise. This fidelity includes light that was
-        reflected twice if this light changes signals noticeably. `sim.choose_fidelity(world, eyes, bands="own")`
-        returns the same fidelity.
+        elsewhere, and the terms of the reward have the weights that define the fitness. "test" is an evaluation for
+        final results. It equals "evaluation", unless a user task uses other worlds in this mode.
+    rays_per_receptor: number of rays traced for each receptor; reflected light is then ignored. "auto": the rendering
+        settings (`sim.Fidelity`) that cost least among those whose error is small compared with the receptors' noise.
+        They include light that was reflected twice if this light changes signals noticeably.
+        `sim.choose_fidelity(world, eyes, bands="own")` returns the same settings.
     fidelity: a complete `sim.Fidelity` instead of rays_per_receptor, or "auto", which has the same meaning as
         rays_per_receptor="auto". A `sim.Fidelity` may also be passed as rays_per_receptor.
     world_seed, mazes, course, layouts, wall_height: the layout that all worlds share, see `sim.build_world`
@@ -104,8 +104,8 @@ def make_vec_env(
     auxiliary: any of "depth", "ids" and "flow": quantities that an observation contains for each receptor in addition
         to its signal, see docs/tasks.md
     render_mode: content of the images that the environment renders for human viewers. "rgb_array": the agent from
-        behind, or the model of a user task, with the fields of view of the eyes; "eyes": the signals of all eyes, side
-        by side, with a row for each kind of eyes; None: no images
+        behind, or the model of a user task, in both cases with the fields of view of the eyes drawn into the image;
+        "eyes": the signals of all eyes, side by side, with a row for each kind of eyes; None: no images
 
     Physics uses the same number of threads as Dr.Jit, but at most one for each world. drjit.set_thread_count limits
     both. A FidelityWarning states that the fidelity is less accurate than allowed. A MirrorWarning lists features of
@@ -153,8 +153,8 @@ def make_parallel_env(
     seed: seed of episodes and noise until `reset` receives another seed, a whole number of at least 0; None: a random
         seed
     memory: number of frames in an observation, 1 to 1,000,000
-    render_mode: "rgb_array": the model with all animals' eyes; "eyes": the signals of their eyes, one image for each
-        animal; None: no images
+    render_mode: "rgb_array": an image of the model, with the fields of view of all animals' eyes drawn into it; "eyes":
+        the signals of their eyes, one image for each animal; None: no images
 
     Raises:
         ValueError: an argument is invalid, or two animals drive the same actuator.
@@ -206,7 +206,14 @@ def _require_eyes(eyes: Any) -> None:
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
-    """Refuse arguments that a user task defines itself, and a mode that is neither the default nor the given one."""
+    """Raise a ValueError if `make_vec_env` received an argument whose value a user task defines itself.
+
+    Also raise it if the task has a wrong `mode`: neither the default mode nor the mode that was passed to
+    `make_vec_env`. If the task is an encounter of several animals, each animal has its own task, and all of these are
+    checked.
+
+    given: all arguments of `make_vec_env`
+    """
     parameters = inspect.signature(make_vec_env).parameters
     for name, why in OF_TASKS.items():
         if given[name] != parameters[name].default:

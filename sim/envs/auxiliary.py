@@ -20,7 +20,9 @@ DEPTH, IDS, FLOW = AUXILIARY
 
 
 class Auxiliary:
-    """Auxiliary observations of one kind of eyes in all worlds, at the centre of each receptor.
+    """Depth, geom id and optic flow for each receptor of all eyes of one kind, in all worlds.
+
+    Each value belongs to the point that is visible at the centre of the receptor.
 
     renderer: renderer of depth and ids for these eyes.
     names: the requested quantities, of "depth", "ids" and "flow".
@@ -67,7 +69,7 @@ class Auxiliary:
     def _flow(self, now: Poses, depth: np.ndarray, ids: np.ndarray) -> np.ndarray:
         """Return the optic flow of the points that are visible now, (world, eye, 2, height, width).
 
-        It is 0 without a hit, and for points that were not in front of the eye.
+        The flow is 0 if nothing is visible, and for points that were not in front of the eye at the previous poses.
 
         Points are followed from their present positions back to the previous poses. The flow is the negative of this
         motion.

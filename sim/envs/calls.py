@@ -20,8 +20,8 @@ NOT_BEGUN = "the worlds have not begun: call reset first"
 class CallOrder:
     """The calls that an environment accepts next.
 
-    The worlds have begun if the last reset was completed. After `expect_wait`, an action is pending until `take`. After
-    `close`, only another `close` is accepted.
+    Actions and images are possible only if the last reset was completed. After `expect_wait`, an action is pending
+    until `take`. After `close`, only another `close` is accepted.
     """
 
     def __init__(self) -> None:
@@ -58,7 +58,7 @@ class CallOrder:
         self._begun = False
 
     def finish_reset(self) -> None:
-        """Record that the reset is complete, so that all worlds have begun."""
+        """Record that the reset is complete, so that actions are accepted."""
         self._begun = True
 
     def expect_wait(self) -> None:

@@ -100,7 +100,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         """Return an image (y, x, 3) uint8 as set by `render_mode`; None without a mode.
 
         Raises:
-            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
+            RuntimeError: with a render mode, if there has been no reset yet or if `close` has been called.
         """
         return None if self.render_mode is None else self._batch.get_images()[0]
 

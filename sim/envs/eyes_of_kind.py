@@ -1,4 +1,4 @@
-"""Signals of one kind of an agent's eyes in all worlds, including noise and the dynamics of receptors."""
+"""Signals of those eyes of an agent that are of one kind, in all worlds, with noise and receptor dynamics."""
 
 from __future__ import annotations
 
@@ -76,10 +76,12 @@ class EyesOfKind:
     def _launch_in_time(
         self, receptors: ReceptorsInTime, poses: Poses, worlds: np.ndarray | None, fresh: bool
     ) -> PendingFrame:
-        """Launch the last frame of an action, after the receptors have seen its earlier frames.
+        """Launch the rendering of the frame at the end of an action. The result is the receptors' response to it.
 
-        There are no earlier frames if these worlds begin an episode. If only some worlds are rendered, and they do not
-        begin an episode, the new frame replaces the frame that was last rendered in these worlds.
+        Before that, this method renders the frames at earlier moments of the action, and the receptors respond to each
+        of them in turn. There are no earlier frames if these worlds begin an episode (`fresh`). If only some worlds are
+        rendered, and they do not begin an episode, the new frame replaces the frame that was last rendered in these
+        worlds.
         """
         light = self._simulation.light(self._wavelengths)
         first, chosen = fresh or worlds is not None, self._everyone if worlds is None else worlds
@@ -141,9 +143,10 @@ class EyesOfKind:
         return spaces.Box(low, high, frames, np.float32)
 
     def _brightest(self) -> float:
-        """Return the largest signal of a white surface that faces all directional lights at once, or of veiling light.
+        """Return the larger of the signals of veiling light and of a white surface that faces all directional lights.
 
-        If light varies, this is the largest signal at the ends of its ranges (`Variation.extremes`).
+        If light varies from episode to episode, return the largest such signal at the limits of the ranges of the light
+        (`Variation.extremes`).
         """
         variation = self._simulation.variation
         if variation is None or not variation.of_light:

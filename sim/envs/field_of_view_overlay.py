@@ -34,7 +34,7 @@ Nearness = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class _Level:
-    """The points of the horizontal plane at eye height that an image shows, one per pixel, in the agent's frame.
+    """Points of the horizontal plane at eye height, in the agent's frame: one for each pixel that sees this plane.
 
     pixels: indices of these pixels, counted row by row, (n,)
     depth: depth of each point along the camera's axis [m], (n,)
@@ -52,12 +52,14 @@ class _Level:
 class _Field:
     """Pixels that show one eye's field of view if nothing hides it.
 
-    A fan of rays across the field measures the distance to obstacles.
+    Each pixel shows a point of the horizontal plane at eye height. The distance to obstacles is measured along a fan of
+    64 rays, which start at the eye and are evenly spaced over its field of view.
 
-    pixels, depth: as in _Level, (n,)
+    pixels: indices of the pixels, counted row by row, (n,)
+    depth: depth of each pixel's point along the camera's axis [m], (n,)
     opacity: opacity of the overlay, (n,)
-    distance: distance of the pixel's point from the eye [m], (n,)
-    ray: index of the fan's first ray to the right of the pixel's point, (n,)
+    distance: distance of each pixel's point from the eye [m], (n,)
+    ray: index of the nearest ray to the right of each pixel's point, as seen from the eye, (n,)
     share: angular position of the point between this ray (0) and the next ray to the left (1), (n,)
     """
 
@@ -71,7 +73,8 @@ class _Field:
     def visible(self, reach: np.ndarray) -> np.ndarray:
         """Return the mask of the pixels whose points no obstacle hides from the eye, (n,) bool.
 
-        reach: distance to the first obstacle along each of the fan's rays [m]; interpolated between rays
+        reach: distance from the eye to the first obstacle along each of 64 rays, which are evenly spaced over its field
+            of view from right to left [m], (ray,); distances between rays are interpolated
         """
         end = np.diff(reach).take(self.ray)
         end *= self.share
@@ -81,7 +84,7 @@ class _Field:
 
 @dataclass(frozen=True)
 class _Dot:
-    """Pixels of the disc that marks one eye, if nothing hides it.
+    """Pixels of the disc that marks one eye, including pixels in which obstacles may hide the disc.
 
     pixels: indices of the pixels, (n,)
     iris, pupil: opacities of the coloured disc and of the black disc in it, (n,)
@@ -168,7 +171,7 @@ def _pixel(view: Viewpoint, size: tuple[int, int]) -> float:
 
 
 def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field:
-    """Return the field of view of the eye at the position `eye` (2,) [m], whose axis has this azimuth [rad]."""
+    """Return the field of view of an eye at the position `eye` (2,) [m], with the eye's axis at this azimuth [rad]."""
     half = np.radians(eyes.fov_deg) / 2
     offset = level.points - eye
     distance = np.linalg.norm(offset, axis=1)
@@ -188,7 +191,7 @@ def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field
 
 
 def _fan(eyes: Eyes) -> np.ndarray:
-    """Return the azimuths [rad] of the fan's rays, relative to the eye's axis, (64,)."""
+    """Return the azimuths [rad] of 64 rays evenly spaced over an eye's field of view, relative to its axis, (64,)."""
     half = np.radians(eyes.fov_deg) / 2
     return np.linspace(-half, half, FAN)
 

@@ -37,14 +37,16 @@ def dynamics_of(eye: Any) -> Any:
 def with_frames(
     task: BatchTask, fidelities: Sequence[Fidelities | None], scenes: Mapping[str, WorldScene] | None
 ) -> list[Fidelities | None]:
-    """Return the fidelities with the number of frames per action (`frames`) that receptors with dynamics need.
+    """Return the fidelities, with `frames` set to the number of frames per action that receptors with dynamics need.
 
-    The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify the number.
-    Otherwise it is the smallest number for which each kind of eyes has an acceptable root mean square error of its
-    signals. If no eyes have receptors with dynamics, or the fidelities of all such eyes specify the number, the
-    fidelities are returned unchanged.
+    A fidelity is the accuracy with which the world is rendered for one kind of eyes. The number of frames is the same
+    for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify the number. Otherwise it is the
+    smallest number for which each kind of eyes has an acceptable root mean square error of its signals. If no eyes have
+    receptors with dynamics, or the fidelities of all such eyes specify the number, the fidelities are returned
+    unchanged.
 
-    fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
+    fidelities: for each agent, a dictionary with the fidelity of each kind of its eyes; None instead of the dictionary
+        if the agent's eyes are not used
     scenes: see `renderers_for`
 
     Raises:
@@ -70,11 +72,11 @@ ASKED = "as requested"
 
 
 def require_frames(simulation: Simulation, frames: int) -> None:
-    """Set the number of frames per action of the simulation's physics.
+    """Set the number of moments during each action at which the physics provides poses, so that eyes can be rendered.
 
     Raises:
-        ValueError: the number is not a divisor of the number of physics steps per action, differs from that of other
-            eyes, or exceeds 1 for a physics that has no poses within an action.
+        ValueError: the number is not a divisor of the number of physics steps per action, differs from the number that
+            was set for other eyes, or exceeds 1 although the physics provides poses only at the end of an action.
     """
     physics = simulation.physics
     if not hasattr(physics, "passed"):
@@ -130,9 +132,9 @@ def _chosen(
 
 
 def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.ndarray]:
-    """Return noise-free signals during random actions (of a fixed seed), for each renderer.
+    """Return for each renderer the noise-free signals during random actions, as an array (action, frame, world, ...).
 
-    They are (action, frame, world, ...). The actions stop when an episode ends.
+    The random numbers have a fixed seed. The actions stop when an episode ends.
     """
     random = np.random.default_rng(0)
     worlds.reset()

@@ -23,8 +23,8 @@ def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
     Each map is Hammer's equal-area projection of the sphere: ahead is in the middle, left is on the left, and up is at
     the top. A map shows the part of the sphere that has ommatidia. A pixel has the colour of the ommatidium with the
     nearest direction, which gives hexagons on a hexagonal lattice. Pixels at the edges of hexagons and around the eye's
-    field are grey. Colours show receptor types as for other eyes (`retina_images.side_by_side`), and white in full
-    daylight is white.
+    field are grey. Each receptor type is shown in the same colour as in `retina_images.side_by_side`. A white surface
+    in full daylight is shown as white.
 
     frame: signals of the ommatidia of all mounts, one mount after the other, (ommatidium, channel)
     """
@@ -47,7 +47,11 @@ def _palette(eye: CompoundEye) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _numbers(eye: CompoundEye) -> np.ndarray:
-    """Return the index of each pixel's ommatidium, (y, x); len(eye) between and around the hexagons."""
+    """Return the index of the ommatidium to which each pixel of a map of the eye's visual field belongs, (y, x).
+
+    On the map, ommatidia are hexagons. Pixels between and around the hexagons belong to no ommatidium. Their value is
+    len(eye), the number of ommatidia.
+    """
     tree = KDTree(eye.directions)
     two = min(2, len(eye))
     apart = tree.query(eye.directions, k=[two])[0][:, 0] if two == 2 else np.array([ALONE * np.sqrt(3)])

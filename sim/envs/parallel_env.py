@@ -119,7 +119,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         `render_mode` selects one of the two. Without a mode, the result is None.
 
         Raises:
-            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
+            RuntimeError: `render_mode` is not None, and either there has been no reset yet or `close` has been called.
         """
         if self.render_mode is None:
             return None
@@ -139,7 +139,12 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         return self._named([{name: array[0] for name, array in known.items()} for known in observations])
 
     def _commanded(self, actions: Mapping[str, np.ndarray]) -> list[np.ndarray]:
-        """Return the action of each animal, (1, n_actions), after checking that all animals have one, and no others."""
+        """Return the action of each animal, (1, n_actions).
+
+        Raises:
+            ValueError: an animal has no action, an action has a wrong shape or value, or a name is not that of an
+                animal in the episode.
+        """
         for name in actions:
             if name not in self.agents:
                 known = did_you_mean(name, self.agents) or f": there are {', '.join(self.agents)}"

@@ -1,4 +1,8 @@
-"""A task prepared for several environments: its scenes are built, and its fidelities are chosen, only once."""
+"""A task prepared for several environments, so that expensive steps are done only once.
+
+The scenes are built, and a fidelity is chosen for each kind of eyes. A fidelity is the accuracy with which the world is
+rendered for them. For example, it contains the number of rays per receptor.
+"""
 
 from __future__ import annotations
 
@@ -27,11 +31,12 @@ Fidelities = Mapping[str, Fidelity]  # fidelity of each kind of an agent's eyes,
 
 
 class PreparedTask:
-    """A task, its scenes, and the fidelity of all eyes.
+    """A task, its scenes, and the fidelity of all eyes: the accuracy with which the world is rendered for them.
 
     task: the task
     fidelity: fidelity of the learners' eyes; None: the fidelities that the task defines, or an automatic choice
-    fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
+    fidelities: for each agent, a dictionary with the fidelity of each kind of its eyes; None instead of the dictionary
+        if the agent's eyes are not used
 
     Raises:
         ValueError: the task's settings, model or eyes are invalid.
@@ -61,7 +66,7 @@ class PreparedTask:
 
     @property
     def fidelity(self) -> Fidelity:
-        """Fidelity of the first learner's first kind of eyes."""
+        """Accuracy with which the world is rendered for the first learner's first kind of eyes."""
         first = self.fidelities[0]
         assert first is not None
         return next(iter(first.values()))
@@ -84,7 +89,7 @@ class PreparedTask:
         return found
 
     def elsewhere(self, task: BatchTask) -> PreparedTask:
-        """Prepare `task`, which has the same eyes in another layout, with the same fidelities."""
+        """Prepare `task`, which has the same eyes but another layout of the world; rendering is equally accurate."""
         found = copy.copy(self)
         found.task = task
         found._scenes = None if self._scenes is None or not isinstance(task, AgentTask) else scenes_for(task)

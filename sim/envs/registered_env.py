@@ -1,8 +1,9 @@
 """Environments that Gymnasium creates from an id. Gymnasium's `max_episode_steps` sets the length of their episodes.
 
 `gymnasium.make` passes this length only to its wrapper `TimeLimit`. The wrapper can end an episode earlier than the
-wrapped environment does, but not later. The wrapped environment therefore does not limit the number of actions in an
-episode, unless a course or a family of layouts does.
+wrapped environment does, but not later. The wrapped environment therefore sets no limit to the number of actions in an
+episode. The only exception is a limit `episode_steps` that belongs to the world: a course (`sim.Course`, a drawing of
+walls and starting positions) or a family of random layouts (`sim.LayoutFamily`) can have such a limit.
 """
 
 from __future__ import annotations
@@ -24,10 +25,9 @@ ENDLESS = -1  # Gymnasium's value for episodes without truncation
 class RegisteredEnv(EyesEnv):
     """An `EyesEnv` whose episodes are truncated by Gymnasium's wrapper `TimeLimit`.
 
-    Further errors are those of `EyesEnv`.
-
     Raises:
-        ValueError: an argument is invalid, or `episode_steps` was given, which Gymnasium calls `max_episode_steps`.
+        ValueError: an argument is invalid, or `episode_steps` was given instead of Gymnasium's `max_episode_steps`.
+            All other errors of `EyesEnv` can occur as well.
     """
 
     def __init__(self, task: str | Task | type[Task], *args: Any, **options: Any) -> None:
@@ -37,11 +37,12 @@ class RegisteredEnv(EyesEnv):
 class RegisteredVectorEnv(EyesVectorEnv):
     """An `EyesVectorEnv` that truncates its episodes after `max_episode_steps` actions.
 
-    A course or a family of layouts with a smaller number of actions truncates them earlier. Further errors are those of
-    `EyesVectorEnv`.
+    Episodes are truncated earlier if the world itself has a smaller limit. This limit is the attribute `episode_steps`
+    of a `sim.Course` (a drawing of walls and starting positions) or of a `sim.LayoutFamily` (random layouts).
 
     Raises:
-        ValueError: an argument is invalid, or `episode_steps` was given, which Gymnasium calls `max_episode_steps`.
+        ValueError: an argument is invalid, or `episode_steps` was given instead of Gymnasium's `max_episode_steps`.
+            All other errors of `EyesVectorEnv` can occur as well.
     """
 
     def __init__(
@@ -55,7 +56,11 @@ def _begun(task: str | Task | type[Task]) -> str | Task:
 
 
 def _steps(asked: int, options: dict[str, Any]) -> int:
-    """Return the number of actions in an episode: the requested number, but at most that of the course or family.
+    """Return the number of actions after which an episode is truncated.
+
+    It is the requested number `asked`, or none if `asked` is -1. The options may contain a course (a drawing of walls)
+    or a family of random layouts. If the course or the family has a limit `episode_steps`, the result does not exceed
+    this limit.
 
     Raises:
         ValueError: `options` contains `episode_steps`, the number is out of range, or the course is unknown.

@@ -19,7 +19,7 @@ IDS = {f"rhabdom/{task.capitalize()}-v0": task for task in TASKS}
 
 
 def register() -> None:
-    """Register the ids that are not registered yet."""
+    """Register Gymnasium's id of each built-in task, unless it is already registered."""
     for id_, task in IDS.items():
         if id_ not in gymnasium.registry:
             _register(id_, EPISODE_STEPS, {"task": task})

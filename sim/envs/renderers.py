@@ -34,7 +34,7 @@ class AgentRenderers:
 
 
 def scenes_for(task: AgentTask) -> dict[str, WorldScene]:
-    """Return the task's world as one prepared scene for each kind of its eyes, by name of the kind."""
+    """Return a prepared scene of the task's world for each kind of the agent's eyes, by name of the kind."""
     kinds = task.eyes if isinstance(task.eyes, Mapping) else {EYES: task.eyes}
     return {name: WorldScene(task.world, eyes) for name, eyes in kinds.items() if eyes is not None}
 
@@ -47,8 +47,9 @@ def renderers_for(
 ) -> list[AgentRenderers | None]:
     """Return the renderers of all agents; None for agents whose eyes are not used.
 
-    agents: agents of the simulation, possibly with other eyes
-    fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
+    agents: agents of the simulation; their eyes may differ from those of `simulation.agents`
+    fidelities: for each agent, a dictionary from the name of each kind of its eyes to the accuracy with which the world
+        is rendered for them (see `Fidelity`); None instead of the dictionary if the agent's eyes are not used
     scenes: scenes of a built-in layout, by kind of eyes; None for other models
     """
     return [

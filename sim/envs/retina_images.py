@@ -40,14 +40,18 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
 
 
 def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Return images (y, x, 3) stacked vertically, padded to the same width with the grey of the gaps."""
+    """Return images (y, x, 3) stacked vertically with grey gaps; grey also fills the space beside narrower images."""
     width = max(picture.shape[1] for picture in pictures)
     rows = [np.pad(p, ((GAP, 0), (0, width - p.shape[1]), (0, 0)), constant_values=BETWEEN) for p in pictures]
     return np.concatenate(rows)[GAP:]
 
 
 def _palette(eye: Eye) -> np.ndarray:
-    """Return the linear sRGB colour that shows the signal of white, for each signal of an eye, (channel, h, w, 3)."""
+    """Return the linear sRGB colour in which each signal of an eye is shown if its receptor sees white.
+
+    If the receptor receives less light than from white, the colour is darker in proportion to the signal. The result is
+    an array (channel, row, column, 3).
+    """
     height, width = eye.resolution
     if eye.mosaic is not None:
         return hues_of(eye.receptors)[eye.mosaic][None]
@@ -69,11 +73,12 @@ def hues_of(receptors: Receptors) -> np.ndarray:
 
 
 def shares_of(hues: np.ndarray) -> np.ndarray:
-    """Return each type's share in red, green and blue, (type, 3), such that equal signals of all types give white.
+    """Return the share of each receptor type in the red, green and blue of a pixel, (type, 3).
 
-    If no type's colour contains a primary, all types contribute equally to this primary.
+    The shares in each primary add up to 1, so equal signals of all types give white. If no type's colour contains a
+    primary, all types contribute equally to this primary.
 
-    hues: linear colour of each type, (type, 3)
+    hues: linear colour in which each receptor type is shown, (type, 3)
     """
     sums = hues.sum(axis=0)
     return np.divide(hues, sums, out=np.full(hues.shape, 1 / len(hues)), where=sums > 0)

@@ -153,5 +153,13 @@ class Senses:
 
 
 def _part(number: int, kind: str, what: str) -> str:
-    """Return the name that an entry of one kind of eyes has in a stored state."""
+    """Return the name under which a stored state holds an array that belongs to one kind of eyes.
+
+    For the agent's first kind of eyes, it is the plain name of the array. For all others, the name of the kind precedes
+    it, as in "side.noise".
+
+    number: index of the kind of eyes
+    kind: name of the kind of eyes
+    what: name of the array, such as "noise"
+    """
     return what if number == 0 else f"{kind}.{what}"

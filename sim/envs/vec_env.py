@@ -31,7 +31,8 @@ class EyesVecEnv(OneEnvironment):
     documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
     observation is then the first observation of the new episode, and info["terminal_observation"] is the last
     observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
-    episodes depend only on the seed, the world's index and its actions. A `sim.BatchTask`'s exceptions are raised.
+    episodes depend only on the seed, the world's index and its actions. An exception in a `sim.Task` during an episode
+    ends it as a failure, whereas an exception in a `sim.BatchTask` is raised.
 
     simulation, renderers: the worlds, and renderers of every agent's eyes
     memory, render_mode: see `sim.make_vec_env`
@@ -72,12 +73,12 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def batch_task(self) -> BatchTask:
-        """The task on arrays of all worlds."""
+        """The task in its batched form, whose methods take and return arrays with one row for each world."""
         return self.simulation.task
 
     @property
     def eyes(self) -> Any:
-        """`sim.Eyes` of a built-in task's agent, or several kinds by name; None if a user task places the eyes."""
+        """Eyes of a built-in task's agent: a `sim.Eyes`, or a dictionary of them by name; None for other tasks."""
         return getattr(self.simulation.task, "eyes", None)
 
     @property
@@ -108,9 +109,9 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations)
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
-        """Seed each world with its own seed at the next reset; None: the world draws this seed itself.
+        """Give each world its own seed at the next reset; a world whose seed is None draws a seed itself.
 
-        An episode is then the same as in a single environment with this seed.
+        The episodes of a world are then the same as in a single environment with the world's seed.
 
         Raises:
             ValueError: there is not one seed per world, or a seed is neither None nor a whole number of at least 0.
@@ -154,7 +155,9 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations), step.reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[Arrays, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Take the actions of `step_async`; return the observations, rewards, ends of episodes and infos of all rows.
+        """Take the actions of `step_async`; return the observations, rewards, ends of episodes and infos.
+
+        Each of these has one row for each learning animal in each world.
 
         Raises:
             ValueError: a `sim.BatchTask` returns an invalid array.
@@ -178,8 +181,7 @@ class EyesVecEnv(OneEnvironment):
     def get_state(self) -> dict[str, np.ndarray]:
         """Return the state of all worlds as plain arrays whose first axis is the world.
 
-        Future steps depend only on this state and on the actions, unless a task stores values in its own attributes.
-        The state does not contain such values.
+        It contains all values on which future steps depend, except those that a task stores in its own attributes.
 
         Raises:
             RuntimeError: there was no reset, `close` was called, an action is pending, or MuJoCo's "sleep" is enabled.
@@ -191,7 +193,7 @@ class EyesVecEnv(OneEnvironment):
         """Restore a stored state in these worlds (None: all); return the current observations of all worlds.
 
         Raises:
-            ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
+            ValueError: the state is from another task or another number of worlds, or a world's index is out of range.
             RuntimeError: there was no reset, `close` was called, an action is pending, or MuJoCo's "sleep" is enabled.
         """
         held_state.checked(state, self.get_state())
@@ -206,7 +208,7 @@ class EyesVecEnv(OneEnvironment):
         self.simulation.close()
 
     def get_images(self) -> list[np.ndarray]:
-        """Return images (y, x, 3) uint8, see `WorldPictures.taken`; an empty list without a mode.
+        """Return images (y, x, 3) uint8, see `WorldPictures.taken`; an empty list if `render_mode` is None.
 
         Raises:
             RuntimeError: there has been no reset yet, `close` has been called, or an action is pending.
@@ -261,10 +263,7 @@ class EyesVecEnv(OneEnvironment):
         return infos
 
     def _first_infos(self, worlds: np.ndarray) -> list[dict[str, Any]]:
-        """Return the infos before the first action of an episode in these worlds.
-
-        The first learner's infos in all these worlds come first, followed by the second learner's.
-        """
+        """Return the infos of these worlds before the first action: one per world, learner after learner."""
         simulation = self.simulation
         more = simulation.task.first_info(simulation.physics, worlds) or [{}] * len(worlds)
         return [

@@ -25,8 +25,9 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     The returned observation and info are then those of the start of the new episode. info["final_obs"] and
     info["final_info"] contain the last observation and info of the old episode.
 
-    `reset` accepts one seed or, like Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, world
-    i has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.
+    `reset` accepts one seed or, like Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, the
+    episodes of each world are then the same as those of a single environment with this world's seed. A world whose seed
+    is None continues with its own random numbers.
 
     num_envs: number of worlds
     task: one of `sim.TASKS`, a `sim.Task` or a `sim.BatchTask`; for a `sim.Encounter`, use the result of its method
@@ -86,10 +87,10 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         return observation, reward, done & ~truncated, done & truncated, last | self._together(infos)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`; None without a mode.
+        """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`; None if this is None.
 
         Raises:
-            RuntimeError: there is a render mode, and there has been no reset yet or `close` has been called.
+            RuntimeError: `render_mode` is not None, and either there has been no reset yet or `close` has been called.
         """
         return None if self.render_mode is None else tuple(self._batch.get_images())
 

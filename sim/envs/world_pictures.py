@@ -1,4 +1,4 @@
-"""Images of worlds for human viewers: the model with all agents' eyes, or the signals of the learners' eyes."""
+"""Images of worlds for human viewers: either the world from a camera, or the signals of the learners' eyes."""
 
 from __future__ import annotations
 
@@ -37,9 +37,10 @@ class WorldPictures:
         self._photographer: Callable[[int], np.ndarray] | None = None
 
     def taken(self) -> list[np.ndarray]:
-        """Return images (y, x, 3) uint8: one of every world, or one of each learner's signals in every world.
+        """Return images (y, x, 3) uint8, as selected by the render mode.
 
-        The list is empty without a render mode.
+        "rgb_array": one image of each world; "eyes": for each learner, one image per world, which shows its signals;
+        None: an empty list
         """
         if self._mode == "eyes":
             learners = self._animals.learners
@@ -116,7 +117,8 @@ def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
 def _drawn(frame: np.ndarray, eye: WorldEye) -> np.ndarray:
     """Return an sRGB image (y, x, 3) uint8 of one world's signals.
 
-    For a compound eye, it is a map of the sphere around each mount; otherwise, it shows the retinas side by side.
+    For a compound eye, the image contains a map of the sphere of directions for each mount (each position of the eye on
+    the agent). For other eyes, it shows the retinas side by side.
     """
     if isinstance(eye, CompoundEye):
         return hexagon_map(frame if eye.rows is None else eye.as_frames(frame), eye)

@@ -2,6 +2,6 @@
 
 view             View: image of one eye
 files            write_exr, read_exr: files of views
-spectral_layout  channels of the spectral layout, also those of other programs
+spectral_layout  names of the channels in spectral OpenEXR files, also in files that other programs write
 previews         previews in linear sRGB
 """

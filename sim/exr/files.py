@@ -149,7 +149,7 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
 
 
 def _pixel_bytes(header: Mapping[str, Any]) -> int:
-    """Return the memory of a part's pixels [bytes], computed from its header."""
+    """Return the memory that the pixels of one part of an OpenEXR file need [bytes], computed from its header."""
     low, high = (np.asarray(corner, dtype=np.int64) for corner in header["dataWindow"])
     width, height = (int(side) for side in np.maximum(high - low + 1, 0))
     return width * height * len(header["channels"]) * 4
@@ -213,7 +213,7 @@ _OWN_ATTRIBUTES = ("spectralLayoutVersion", "emissiveUnits", "radianceScale", _H
 
 
 def _checked(part: Any, expected: int) -> tuple[str, dict[str, np.ndarray], dict[str, Any]]:
-    """Return a part's name, channels and stored values after checking its hash."""
+    """Return the name, channels and stored values of one part of an OpenEXR file, after checking its hash."""
     name, header = part.name(), part.header
     if _HASH not in header or _HELD not in header:
         raise ExrError(f"part {name!r} was not written by rhabdom")

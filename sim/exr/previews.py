@@ -1,4 +1,4 @@
-"""Previews of views in linear sRGB, (y, x, 3), which plain viewers of EXR files show."""
+"""Previews of views, which are shown by plain viewers of EXR files: images in linear sRGB, (y, x, 3)."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ def preview_of_spectra(radiance: np.ndarray | None, reflectance: np.ndarray | No
 
 
 def preview_of_receptors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
-    """Return an image (y, x, 3) whose red, green and blue show up to three channels, by decreasing wavelength.
+    """Return an image (y, x, 3) with the three channels of longest wavelength as its red, green and blue.
 
-    A single channel is shown as grey. Of two channels, the second is shown as green and blue.
+    Red is the channel of longest wavelength. A single channel is shown as grey. Of two channels, the second is shown as
+    green and blue.
 
     receptors: signals, (channel, y, x)
     peaks_nm: wavelength of each channel's maximum [nm]; None: the channels are used in the given order

@@ -34,7 +34,7 @@ _OF_STORAGE = ("pixelAspectRatio", "screenWindowWidth", "chunkCount", "name", "v
 
 
 class ExrWarning(UserWarning):
-    """Warning that names contents of an OpenEXR file that are not read."""
+    """Warning about contents of an OpenEXR file that are not read; its message names these contents."""
 
 
 def channel(nm: float, quantity: str = RADIANCE) -> str:
@@ -61,7 +61,7 @@ class NoSpectra(ValueError):
 def fields_of_views(parts: Sequence[Any], stem: str) -> list[dict[str, Any]]:
     """Return the fields of `View` for each part (`OpenEXR.Part`) with spectral channels.
 
-    stem: name of the view of a part without a name
+    stem: name that the view gets if its part has no name
 
     An ExrWarning names contents that are not read: polarisation, fluorescence, and parts without spectral channels.
 
@@ -84,7 +84,7 @@ def fields_of_views(parts: Sequence[Any], stem: str) -> list[dict[str, Any]]:
 
 
 def _fields_of_view(channels: Mapping[str, np.ndarray], header: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Return the fields of a `View` from the channels (y, x) of a part; empty without spectral channels.
+    """Return the fields of a `View` from one part of an OpenEXR file; {} if no channel (y, x) is spectral.
 
     Spectral channels of other quantities, such as reradiation, are left out with an `ExrWarning`.
 
@@ -140,7 +140,7 @@ def _attributes(header: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _preview(channels: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the preview (y, x, 3) as the field "rgb" of a `View`; {} if the channels contain none."""
+    """Return {"rgb": preview image (y, x, 3)} for a `View`, or {} if the channel R, G or B is missing."""
     if not all(name in channels for name in PREVIEW):
         return {}
     return {"rgb": np.stack([_float32(channels[name]) for name in PREVIEW], axis=-1)}

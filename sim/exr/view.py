@@ -24,8 +24,8 @@ class View:
         radiance of CIE D65, which is 1 at 560 nm.
     receptors: signals of receptors, (channel, y, x) float32, or None; y and x may differ from those of the radiance
     rgb: linear sRGB preview of the radiance, or of the reflectance in daylight, (y, x, 3) float32; None: `write_exr`
-        computes it. Without radiance and reflectance, it is ignored
-    attributes: further values by name that JSON can represent, such as seed, time step or position
+        computes it. This preview is ignored if there is neither radiance nor reflectance.
+    attributes: further values, such as seed, time step or position, by name; JSON must be able to represent the values
     peaks_nm: peak wavelength of each receptor channel [nm], (channel,); the preview shows the channel with the longest
         peak as red. None: channels are in descending order of their peaks.
     reflectance: reflectance or transmittance, (band, y, x) float32, or None
@@ -101,7 +101,7 @@ class View:
 
     @property
     def spectral(self) -> np.ndarray | None:
-        """The radiance if there is any, otherwise the reflectance; None without both."""
+        """The radiance if there is any, otherwise the reflectance; None if both are missing."""
         return self.reflectance if self.radiance is None else self.radiance
 
 
@@ -111,5 +111,5 @@ def _shape(image: Any) -> tuple[int, ...]:
 
 
 def _kind(image: Any) -> str:
-    """Return the shape or the value of an image, for messages."""
+    """Return the words of a message that state the shape of an array, or the value of another object."""
     return f"has shape {_shape(image)}" if hasattr(image, "shape") else f"is {shown(image)}"

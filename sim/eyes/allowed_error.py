@@ -1,4 +1,4 @@
-"""The largest acceptable error of a signal, derived from the receptors' noise and the signal of white."""
+"""The largest acceptable error of a signal, derived from the receptors' noise and their signal for a white surface."""
 
 from __future__ import annotations
 

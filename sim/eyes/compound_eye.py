@@ -148,7 +148,7 @@ class CompoundEye:
 
     @property
     def fov_deg(self) -> float:
-        """Horizontal angle [degrees] around straight ahead that contains all viewing directions, at most 360."""
+        """Horizontal angle [degrees] with its middle straight ahead that contains all viewing directions, up to 360."""
         return float(2 * np.degrees(np.abs(np.arctan2(self.directions[:, 1], self.directions[:, 0])).max()))
 
     @property
@@ -263,7 +263,7 @@ class CompoundEye:
         self._refuse_pairs(tree.query_pairs(float(sizes.max()), output_type="ndarray"), sizes)
 
     def _refuse_pairs(self, pairs: np.ndarray, sizes: np.ndarray) -> None:
-        """Refuse pairs (n, 2) of facets that are closer than the mean of their sizes [rad]. sizes: (ommatidium,)."""
+        """Refuse pairs (n, 2) of facets closer than the pair's mean size. sizes: of all facets [rad], (ommatidium,)."""
         pairs = pairs[pairs[:, 0] != pairs[:, 1]]
         chords = np.linalg.norm(self.directions[pairs[:, 0]] - self.directions[pairs[:, 1]], axis=1)
         close = np.flatnonzero(chords < sizes[pairs].mean(axis=1))
@@ -279,7 +279,7 @@ WorldEye: TypeAlias = optics.Eye | CompoundEye  # eyes that can be rendered in w
 
 
 def world_eye(name: str, value: Any) -> WorldEye:
-    """Return `value` if it is an eye that worlds can render.
+    """Return `value` if it is an eye for which worlds can be rendered.
 
     Raises:
         ValueError: it is neither an optics.Eye nor a CompoundEye; the message begins with `name`.

@@ -42,13 +42,13 @@ class Eyes:
         the same direction
     optics: optics.Pupil of every eye; None: a perfect lens
     sensor_width: width of the retina [m]
-    noise_sigma: standard deviation of a receptor's noise, in the unit of signals: white in full daylight behind a
-        perfect lens gives 1
+    noise_sigma: standard deviation of a receptor's noise; the unit is the signal of a receptor that sees a white
+        surface in full daylight through a perfect lens
     bands: number of spectral bands, 1 to 64
-    receptors: receptor types: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", "mouse",
-        "fruit_fly", "blowfly", "dragonfly", "jumping_spider", peak wavelengths of visual pigments [nm] such as (350,
-        440, 530), or an `optics.Receptors`, which can also describe a mosaic. The attribute is always converted to
-        optics.Receptors.
+    receptors: receptor types. A name: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", "mouse",
+        "fruit_fly", "blowfly", "dragonfly" or "jumping_spider"; or peak wavelengths of visual pigments [nm], such as
+        (350, 440, 530); or an `optics.Receptors`, which can also describe a mosaic. The attribute is always converted
+        to optics.Receptors.
     photon_budget: an optics.PhotonBudget, which defines the amount of light and the integration time of the receptors.
         The resulting shot noise is added to the noise of `noise_sigma`. None: unlimited light, without shot noise.
     waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; the eyes then need
@@ -57,10 +57,11 @@ class Eyes:
     vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170]. None: receptors are square
     dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: no memory
     density: density of receptors over the retina, such as `optics.Fovea()`, see `optics.Eye`. None: it is uniform
-    ommatidium: an optics.Ommatidium: the eyes are compound eyes. `resolution` is then the number of rows and of
-        ommatidia in a row of `sim.hexagonal_rows`; fov_deg / width is the mean difference in azimuth between
-        neighbours in a row. Compound eyes have neither optics, waveguide, vertical_fov_deg, dynamics nor density, and
-        ignore sensor_width. None: the eyes are camera eyes.
+    ommatidium: an optics.Ommatidium: the eyes are compound eyes. The ommatidia form the lattice of
+        `sim.hexagonal_rows`. `resolution` is then (rows of the lattice, ommatidia in each row). `fov_deg` divided by
+        the number of ommatidia in a row is the mean difference in azimuth between neighbours in a row. Compound eyes
+        have neither optics, waveguide, vertical_fov_deg, dynamics nor density, and ignore sensor_width. None: the eyes
+        are camera eyes.
     acute_zone: density of ommatidia in the middle of a compound eye, relative to the mean, 1 to 5; 1 for camera
         eyes; see `sim.hexagonal_rows`
 
@@ -176,7 +177,7 @@ class Eyes:
         )
 
     def with_perfect_lens(self) -> Eyes:
-        """Return camera eyes behind a perfect lens, with the same receptors and fields of view.
+        """Return camera eyes with a perfect lens, and with the receptors and fields of view of these eyes.
 
         Raises:
             ValueError: the vertical field of view is above 170 degrees.

@@ -26,8 +26,9 @@ BEYOND = 0.015
 class FieldAreas:
     """A lattice of rectangles of the visual field, numbered row by row.
 
-    edges: y of the edges of the rows (downwards) [receptor heights], (rows + 1,), and x of the edges of the columns
-        [receptor widths], (columns + 1,), both relative to the eye's axis
+    edges: two arrays of coordinates relative to the eye's axis. The first contains the edges of the rows, from top to
+        bottom, in units of a receptor's height, (rows + 1,). The second contains the edges of the columns, from left to
+        right, in units of a receptor's width, (columns + 1,).
     """
 
     edges: tuple[np.ndarray, np.ndarray]
@@ -59,15 +60,15 @@ class FieldAreas:
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width and height of a rectangle [receptor widths and heights]."""
+        """Width of each rectangle in units of a receptor's width, and its height in units of a receptor's height."""
         y, x = self.edges
         return float(x[1] - x[0]), float(y[1] - y[0])
 
     def weights(self, fields: ReceptiveFields, receptors: np.ndarray) -> np.ndarray:
-        """Return the weight of each rectangle's mean light in the signals of some receptors.
+        """Return the weights with which the mean light in each rectangle contributes to the signals of some receptors.
 
-        The shape is (plane, receptor, rectangle), with a plane for each band of each depth layer. A receptor's weights
-        sum to `fields.power`.
+        The rectangles are those into which the visual field is divided. A receptor's weights sum to `fields.power`. The
+        result is an array (plane, receptor, rectangle), with a plane for each band of each depth layer.
 
         receptors: indices of the receptors, counted row by row, (receptor,)
         """
@@ -85,18 +86,23 @@ class FieldAreas:
 
 
 def _within(n: int, per_receptor: float) -> int:
-    """Return the number of rectangles that n receptors in a line occupy."""
+    """Return the smallest number of adjacent rectangles that cover a row or a column of n receptors.
+
+    per_receptor: number of rectangles per receptor, which may be smaller than 1
+    """
     return math.ceil(n * per_receptor - 1e-9)
 
 
 def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
-    """Return the width of the rim before the first receptor of a line (a row or a column), as a number of rectangles.
+    """Return how many rectangles to add to the visual field before the first receptor of a row or a column.
 
-    It is the smallest number for which at most the fraction `beyond` of the light of the line's receptors comes from
-    beyond the rim.
+    These rectangles form a rim, because receptive fields extend beyond the outermost receptors. Some of the light that
+    the receptors of the row or column receive comes from outside the rim. The result is the smallest number for which
+    the light from outside the rim is at most the fraction `beyond` of all light that these receptors receive.
 
-    profile: fraction of the power of a receptor's field in each of its cells along the line, (cell,)
-    line: number of receptors in the line, and rectangles per receptor
+    profile: fraction of a receptor's light that comes from each cell (part of its receptive field) along the row or
+        column, (cell,)
+    line: number of receptors in the row or column, and number of rectangles per receptor
     cells: number of cells along a receptor's side
     """
     n, per_receptor = line
@@ -111,11 +117,14 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
 
 
 def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarray:
-    """Return the fraction of each cell of a field that lies between successive edges, (rectangle, cell).
+    """Return how much of each cell of a receptive field lies in each rectangle, along a row or a column.
 
-    edges: positions of the edges along a row or a column, in sides of a receptor, in increasing order
-    centre: centre of the field, in the same coordinate as the edges
-    size: number of cells along the field
+    Cells are the equal parts into which the receptive field is divided. The result contains fractions of a cell's
+    length, as an array (rectangle, cell).
+
+    edges: positions of the rectangles' edges, in units of a receptor's side, in increasing order, (rectangles + 1,)
+    centre: centre of the receptive field, in the same coordinate as the edges
+    size: number of cells along the receptive field, which may be longer than a receptor
     cells: number of cells along a receptor's side
     """
     places = (edges - centre) * cells + size / 2

@@ -24,8 +24,8 @@ def hexagonal_rows(rows: int, columns: int, fov_deg: float, acute_zone: float = 
 
     rows, columns: numbers of ommatidia, 1 to 1000
     fov_deg: horizontal field of view [degrees], above 0 and at most 360
-    acute_zone: density a of columns in the middle relative to their mean density, 1 to 5. An azimuth α of the equally
-        spaced lattice, in units of half the field of view, becomes α/a + (1 - 1/a) α³.
+    acute_zone: density of columns in the middle relative to their mean density, 1 to 5. If D is this value, an azimuth
+        α of the equally spaced lattice, in units of half the field of view, becomes α/D + (1 - 1/D) α³.
 
     Raises:
         ValueError: an argument is out of range.
@@ -44,5 +44,8 @@ def hexagonal_rows(rows: int, columns: int, fov_deg: float, acute_zone: float = 
 
 
 def lattice_fovy_deg(rows: int, columns: int, fov_deg: float) -> float:
-    """Return the vertical field of view of `hexagonal_rows` [degrees], including half a row above and below."""
+    """Return the vertical field of view of the lattice of `hexagonal_rows` [degrees].
+
+    Half a row is added above the first row and below the last one.
+    """
     return math.degrees(2 * math.atan(math.sinh(rows * ROW_DISTANCE * math.radians(fov_deg) / columns / 2)))

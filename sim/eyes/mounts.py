@@ -161,8 +161,9 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:
     """Return mounts from left to right, evenly spaced over a range of azimuths.
 
-    The azimuth of `mount` is the middle of the range. Offsets are rotated with the azimuth, about the upward axis of
-    the object that carries the eyes. A single eye keeps the azimuth of `mount`.
+    The azimuth of `mount` is the middle of the range. The offset of each mount is that of `mount`, rotated by the
+    difference between their azimuths about the upward axis of the object that carries the eyes. A single eye keeps the
+    azimuth of `mount`.
 
     n_eyes: number of eyes, 1 to 10,000
     placement_range_deg: angle from the first to the last eye [degrees]

@@ -27,10 +27,10 @@ class OmmatidialSampling:
     """Samples of a compound eye.
 
     An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
-    weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. With 8
-    rays or more, weights are corrected so that the signals of two test scenes are exact in every band. Equal ommatidia
-    share 16 arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random choice, so that the errors
-    of neighbours are nearly independent.
+    weight of a ray is the integral of the acceptance function over the directions that are nearer to it than to any
+    other ray. With 8 rays or more, weights are corrected so that the signals of two test scenes are exact in every
+    band. Equal ommatidia share 16 arrangements of rays. Each ommatidium has one of them, by a fixed pseudo-random
+    choice, so that the errors of neighbours are nearly independent.
 
     depth: a single layer, because facets have a large depth of field
     """
@@ -84,8 +84,9 @@ class _RayPattern:
 def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
     """Return rays at the centroids of a Voronoi tessellation of directions, by Lloyd's algorithm (1982).
 
-    The weight of a ray is the integral of the acceptance function over its cell. Importance weights at random points
-    would double the error at edges, because bands differ in their acceptance functions.
+    The weight of a ray in a band is the integral of the band's acceptance function over the ray's cell. Random points
+    with importance weights would double the error at edges in the scene. All bands share the rays but differ in their
+    acceptance functions, so these weights would vary from ray to ray.
 
     seed: determines the initial points
     """
@@ -108,22 +109,26 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
 
 
 def _tests(places: np.ndarray, spread: float) -> np.ndarray:
-    """Return the light of two test scenes in directions with these sines (place, 2), as an array (place, scene).
+    """Return the light of two test scenes in some directions, as an array (direction, scene).
 
-    The light is uniform in the first scene, and a Gaussian of variance `spread` around the axis in the second.
+    The light is uniform in the first scene, and a Gaussian of variance `spread` around the ommatidium's axis in the
+    second.
+
+    places: the two components perpendicular to the ommatidium's axis of each direction (a unit vector), (direction, 2)
     """
     return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
 
 
 def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray, powers: np.ndarray) -> np.ndarray:
-    """Return weights with which the signals of the test scenes are exact in every band.
+    """Return weights of an ommatidium's rays with which the signals of the test scenes are exact in every band.
 
     All bands share the same rays. Without the correction, the rays would represent a wide acceptance function as too
     narrow.
 
     weights: weights before the correction, (ray, band)
-    at_rays, everywhere: test scenes at the rays, (ray, scene), and at the places of `powers`, (place, scene)
-    powers: tabulated acceptance function of each band, (band, place)
+    at_rays: light of the test scenes along the rays, (ray, scene)
+    everywhere: light of the test scenes in the directions for which `powers` is tabulated, (direction, scene)
+    powers: fraction of the accepted power that comes from each direction, in each band, (band, direction)
     """
     found = weights.copy()
     for band, power in enumerate(powers):
@@ -137,11 +142,11 @@ def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray,
 def _centroids(
     points: np.ndarray, places: np.ndarray, masses: np.ndarray, nearest: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return for each point the centre of mass of the places that are nearest to it, (point, 2).
+    """Return for each point the centre of mass of the places that are nearer to it than to other points, (point, 2).
 
-    A point without mass stays where it is.
+    If the mass of these places is 0, the point stays where it is.
 
-    places, masses: positions (place, 2) and their masses (place,)
+    places, masses: positions (place, 2), and the mass at each position (place,)
     nearest: index of the nearest point for each place, (place,); None: computed here
     """
     nearest = KDTree(points).query(places)[1] if nearest is None else nearest

@@ -32,10 +32,12 @@ class NoRaysError(ValueError):
 
 @dataclass(frozen=True)
 class Draw:
-    """Low-discrepancy directions, drawn from the mixture of receptive fields.
+    """Low-discrepancy directions of rays, drawn from the mean of receptive fields as a probability density.
 
-    points: points on the tangent plane [receptor widths and heights], x right, y down, (ray, 2), in order of y
-    rows, columns: indices of the mixture's cells that contain the points, (ray,)
+    points: points on the tangent plane, x right and y down, in units of a receptor's width and height, in order of y,
+        (ray, 2)
+    rows, columns: row and column of the cell that contains each point, (ray,). Cells are the small rectangles of the
+        visual field for which the density is tabulated.
     """
 
     points: np.ndarray
@@ -48,14 +50,15 @@ class Draw:
 
 @dataclass(frozen=True)
 class ReceptiveFields:
-    """Tabulated receptive fields of an eye.
+    """Receptive fields of an eye, tabulated for cells: small rectangles into which the visual field is divided.
 
-    field: power per cell of one receptor's field, (plane, y, x), with one plane for each band of each depth layer. A
-        plane is the PSF, rotated by 180° and convolved with the receptor's area. If receptors are waveguides, a plane
-        is a waveguide's acceptance of light from each cell.
-    density: probability per cell of the mixture, which is the mean of the fields of all receptors and planes, (Y, X)
-    resolution: receptors (height, width)
-    cells: cells along a receptor's side
+    field: fraction of the pupil's power in each cell of one receptor's field, (plane, y, x). It contains one plane
+        (table) for each band of each depth layer. A plane is the PSF, rotated by 180° and convolved with the receptor's
+        area. If receptors are waveguides, a plane is a waveguide's acceptance of light from each cell.
+    density: probability of drawing a ray in each cell of the visual field: the mean of the fields of all receptors and
+        planes, (Y, X)
+    resolution: numbers of rows and columns of receptors
+    cells: number of cells along a receptor's side
     """
 
     field: np.ndarray
@@ -76,34 +79,37 @@ class ReceptiveFields:
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
 
     def drawn_for(self, receptors: np.ndarray) -> ReceptiveFields:
-        """Return a copy whose mixture, from which rays are drawn, contains only the fields of these receptors."""
+        """Return a copy that draws rays only for these receptors: its `density` is the mean of their fields."""
         return replace(self, density=_mixture(self.field, self.resolution, self.cells, receptors))
 
     @property
     def power(self) -> np.ndarray:
-        """Fraction of the pupil's power that falls inside a field, (plane,).
+        """Fraction of the pupil's power that falls inside a receptor's field, (plane,).
 
-        If receptors are waveguides, it is multiplied by the fraction of the power that a waveguide accepts.
+        There is a plane for each band of each depth layer. If receptors are waveguides, this fraction is multiplied by
+        the fraction of the power that a waveguide accepts.
         """
         power: np.ndarray = self.field.sum(axis=(1, 2))
         return power
 
     @property
     def widths(self) -> tuple[float, float]:
-        """Smallest height and smallest width of the field among its planes [receptor heights and widths].
+        """Smallest height and smallest width of a receptor's field, among all bands and depth layers.
 
-        They are the equivalent widths (sum p)² / sum p² of the field's vertical and horizontal profiles p. A uniform
-        field that covers a receptor's area has the width 1.
+        The units are a receptor's height and width. The height and width of a field are the equivalent widths
+        (sum p)² / sum p² of the field's vertical and horizontal profiles p. A uniform field that covers a receptor's
+        area has the width 1.
         """
         profiles = (self.field.sum(axis=axis) for axis in (2, 1))
         height, width = (((p.sum(axis=1) ** 2) / (p**2).sum(axis=1)).min() / self.cells for p in profiles)
         return float(height), float(width)
 
     def draw(self, n: int) -> Draw:
-        """Return n low-discrepancy draws from the mixture.
+        """Return n low-discrepancy directions, drawn from the mean of receptive fields.
 
-        The row of a draw is found by inverting the cumulative distribution of rows. Its column is found by inverting
-        the cumulative distribution within this row.
+        The mean is given as `density`, a table with one probability for each cell of the visual field. The row of a
+        direction's cell is found by inverting the cumulative distribution of rows. The column is found by inverting the
+        cumulative distribution within this row.
         """
         density, points = self.density, low_discrepancy(n)
         rows = np.concatenate([[0.0], np.cumsum(density.sum(axis=1))])
@@ -124,7 +130,7 @@ class ReceptiveFields:
     def weights(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
         """Return the weights of rays in the signals of some receptors (numbered row by row), (plane, receptor, ray).
 
-        A receptor's weights sum to `power`.
+        A plane contains the weights in one band of one depth layer. A receptor's weights in a plane sum to `power`.
 
         Raises:
             NoRaysError: a receptor has no ray in its field.
@@ -137,7 +143,15 @@ class ReceptiveFields:
         return weights
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the values of these receptors' fields in the cells of the drawn rays, (plane, receptor, ray)."""
+        """Return the fraction of the pupil's power that some receptors receive from the cell around each ray.
+
+        Cells are the small rectangles of the visual field for which receptive fields are tabulated. The value is 0 if a
+        ray lies outside a receptor's field. The result is an array (plane, receptor, ray), with a plane for each band
+        of each depth layer.
+
+        draw: rays that the method `draw` has returned
+        receptors: indices of the receptors, counted row by row
+        """
         row, column = np.divmod(receptors, self.resolution[1])
         y = draw.rows[None] - row[:, None] * self.cells
         x = draw.columns[None] - column[:, None] * self.cells
@@ -150,24 +164,32 @@ class ReceptiveFields:
 
 
 def cells_per_receptor(resolution: tuple[int, int]) -> int:
-    """Return the number of cells along a receptor's side for eyes of this resolution, if `cells_for` needs no more."""
+    """Return the usual number of cells along a receptor's side, for eyes of this resolution (height, width).
+
+    A receptor's area is divided into equal parts, the cells, and receptive fields are tabulated for each cell. There
+    are at least 4 cells along a receptor's side, and at least 32 along a row or a column of receptors, whichever
+    contains more receptors. Some eyes need more cells, see `cells_for`.
+    """
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
 def kernels_of(eye: optics.Eye, cells: int, depth: DepthLayers) -> np.ndarray:
     """Return the kernel of each depth layer, rotated by 180°, (plane, y, x).
 
-    A plane is a band of a depth layer, and a receptor's side consists of `cells` cells. If K is the kernel and L(v) the
-    light from the position v in the visual field, the signal of the receptor at r is the convolution Σ_v K(r - v) L(v).
-    The weights of the light are therefore the kernel, rotated by 180° and centred on the receptor.
+    There is a plane for each band of each depth layer. y and x count cells, of which `cells` fit along a receptor's
+    side. If K is the kernel and L(v) the light from the position v in the visual field, the signal of the receptor at r
+    is the convolution Σ_v K(r - v) L(v). The weights of the light are therefore the kernel, rotated by 180° and centred
+    on the receptor.
     """
     return _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
 
 
 def cells_for(eye: optics.Eye) -> int:
-    """Return the number of cells along an average receptor's side.
+    """Return the number of cells along the side of an eye's average receptor.
 
-    A narrow waveguide, or receptors much smaller than the average, require a larger number.
+    This receptor's area is divided into equal parts, the cells, and receptive fields are tabulated for each cell. The
+    usual number is the result of `cells_per_receptor`. Eyes with narrow waveguides, or with receptors much smaller than
+    the average, need more cells, but have at most 64.
     """
     fewest = cells_per_receptor(eye.resolution)
     if eye.lattice is not None:
@@ -180,9 +202,11 @@ def cells_for(eye: optics.Eye) -> int:
 def receptive_fields_of(
     eye: optics.Eye, depth: DepthLayers = ONE_PSF, kind: type[ReceptiveFields] = ReceptiveFields
 ) -> ReceptiveFields:
-    """Return the receptive fields of an eye, tabulated on the cells of `cells_for`.
+    """Return tables of the receptive fields of an eye.
 
-    If the PSF cannot be computed on these cells, coarser cells are used.
+    The tables have one value per cell. Cells are the equal parts into which an average receptor's area is divided.
+    `cells_for` defines the number of cells along a receptor's side. If the PSF covers too many cells to be computed,
+    the number of cells along the side is halved until the computation succeeds.
 
     kind: class of the table; `sim.eyes.varied_fields.VariedFields` for receptors of different sizes
 
@@ -252,9 +276,14 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 
 
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
-    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
+    """Return the mean of these receptors' fields, scaled so that all cells of the visual field sum to 1, (y, x).
 
-    field: power in each cell of the field, which is the same for all receptors, (plane, y, x)
+    Rays are drawn with this mean as their probability. A receptor's field is given as several planes, one for each band
+    of each depth layer, and the mean is also taken over these. Every plane has the same weight in the mean, whatever
+    its power.
+
+    field: power in each cell of a single receptor's field, (plane, y, x); all receptors have the same field, each
+        around its own position
     resolution: rows and columns of receptors
     cells: number of cells along a receptor's side
     receptors: indices of the receptors, counted row by row

@@ -1,9 +1,11 @@
 """Weighted sums over samples for each receptor, as one matrix product per row of receptors.
 
 Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. Narrow
-receptive fields have short ranges. A view is one eye in one world. If light is traced in few spectral
-components instead of bands (`sim.tracing.closed_form_tracer`), the contributions of components to bands, and of bands
-to channels, are multiplied into the receptors' weights in advance.
+receptive fields have short ranges. A view is one eye in one world.
+
+Light may be traced as a few spectral components (`sim.tracing.closed_form_tracer`). The light in each band is then a
+weighted sum of these components, and each channel of the signals is a weighted sum of bands. If it is cheaper, the
+receptors' weights are multiplied by both kinds of weights in advance (`of_components`).
 """
 
 from __future__ import annotations
@@ -28,8 +30,8 @@ class Stretch:
     """The contiguous range of rays that a row of receptors uses.
 
     first: index of the first ray
-    weights: weights of the rays, (ray, channel * width) float32
-    views: number of views in a product
+    weights: weight of each ray in each channel of each receptor in the row, (ray, channel * width) float32
+    views: number of views for which one matrix product computes the signals; a view is one eye in one world
     """
 
     first: int
@@ -38,7 +40,10 @@ class Stretch:
 
     @classmethod
     def from_weights(cls, weights: Sequence[scipy.sparse.csr_array]) -> Stretch:
-        """Return the rays of one row of receptors from a sparse matrix (receptor, ray) per channel."""
+        """Return the range of rays that one row of receptors uses, and the weights of these rays.
+
+        weights: weights of all rays in the signals of the row's receptors, a sparse matrix (receptor, ray) per channel
+        """
         used = np.concatenate([w.indices for w in weights])
         first, last = (int(used.min()), int(used.max()) + 1) if len(used) else (0, 1)
         dense = np.concatenate([w[:, first:last].toarray() for w in weights])
@@ -47,7 +52,8 @@ class Stretch:
     def product(self, radiance: np.ndarray, views: int) -> np.ndarray:
         """Return the signals of at least the first `views` views, (view, channel * width).
 
-        A product contains `self.views` views, so the result includes further views if `views` is not a multiple.
+        Each matrix product computes the signals of `self.views` views, so the number of views in the result is `views`,
+        rounded up to a multiple of `self.views`.
 
         radiance: radiance along all rays, (view, ray); the number of views is a multiple of `self.views`
         """
@@ -59,9 +65,10 @@ class Stretch:
 
 @dataclass(frozen=True)
 class RowProduct:
-    """Matrix products, one per row of receptors, that sum the radiance along rays to signals.
+    """Matrix products, one per row of receptors, that compute signals from the radiance along each ray.
 
-    signal[view, channel, i, j] is the sum over all rays of radiance[view, ray] W[channel, receptor (i, j), ray].
+    signal[view, channel, i, j] is the sum over all rays of radiance[view, ray] W[channel, receptor (i, j), ray]. A view
+    is one eye in one world.
 
     stretches: the rays of each row of receptors
     channels: number of channels
@@ -74,7 +81,11 @@ class RowProduct:
 
     @classmethod
     def from_weights(cls, weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int]) -> RowProduct:
-        """Build the products from one sparse matrix (receptor, ray) per channel."""
+        """Build the matrix products from the weights of rays in signals.
+
+        weights: weight of each ray in each receptor's signal, a sparse matrix (receptor, ray) per channel
+        resolution: rows and columns of receptors
+        """
         height, width = resolution
         rows = ([w[row * width : (row + 1) * width] for w in weights] for row in range(height))
         return cls(tuple(map(Stretch.from_weights, rows)), len(weights), width)
@@ -93,10 +104,13 @@ class RowProduct:
 
 
 def _views_at_once(weights: int) -> int:
-    """Return the largest number of views for which one thread computes a product with this number of weights.
+    """Return the number of views for which one matrix product computes the signals; a view is one eye in one world.
 
-    The result is one of 32, 16, 8 and 4. It is 32 if one thread cannot compute even 4 views, because such products are
+    The result is the largest of 32, 16, 8 and 4 for which OpenBLAS certainly computes the product on one thread. If
+    even the product for 4 views may use several threads, the result is 32, because products with so many weights are
     large enough for several threads.
+
+    weights: number of weights of all receptors in one row, in all channels
     """
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights <= ONE_THREAD), BLOCK)
 
@@ -129,9 +143,9 @@ def of_components(
 ) -> ReceptorSums:
     """Return the function that maps light along rays to signals by one `RowProduct` per component.
 
-    The factors of bands and channels are multiplied into the weights in advance.
+    The weights of rays are multiplied in advance by `basis` and `mixing`, and summed over bands.
 
-    weights: sparse matrices (receptor, ray), one for each band
+    weights: weight of each ray in each receptor's signal, sparse matrices (receptor, ray), one for each band
     resolution: rows and columns of receptors
     mixing: weight of each band in each channel, (channel, band)
     basis: contribution of each component of light to each band, (component, band)
@@ -186,9 +200,9 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band, with 0 for the negligible rays at both ends of each row of receptors.
 
-    At each end of a row, rays are omitted until one more omission would reduce the sum of some receptor's weights in
-    some band by more than the fraction `share` / 2. The remaining weights are then scaled so that the sums are
-    unchanged.
+    As many rays as possible are omitted at each end of a row. In every band, the omitted weights at one end may amount
+    to at most the fraction `share` / 2 of the sum of each receptor's weights. The remaining weights are then scaled so
+    that the sums are unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]

@@ -38,12 +38,12 @@ NEGLIGIBLE = 0.1
 
 @dataclass(frozen=True)
 class Trial:
-    """Samples for some of the receptors, computed without building the sensor of the whole eye.
+    """Rays or rectangular areas that sample the fields of some receptors, without the sensor of the whole eye.
 
     directions: directions of the rays, or centres of the areas on the tangent plane at distance 1, (ray, 3)
     bounce_samples: see `sim.eyes.sensor.BoxSensor`, (ray, 2)
     weights: weight of each ray in each receptor's signal, (layer * band, receptor, ray)
-    extent: width and height of the areas on this plane; None for rays
+    extent: width and height of a rectangular area on the tangent plane at distance 1; None for rays
     """
 
     directions: np.ndarray
@@ -70,7 +70,7 @@ class BoxSampling:
         return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> BoxSensor:
-        """Return the sensor whose samples divide each receptor into a grid of this number of rectangles.
+        """Return the sensor whose samples are rectangles: a grid of `per_receptor` rectangles fills each receptor.
 
         If `in_rows` is True, the rectangles are as nearly square as possible (see `parts_of`); otherwise the grid has a
         single row.
@@ -79,7 +79,7 @@ class BoxSampling:
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of some receptors (numbered row by row) in the sensor with this number of areas."""
+        """Return the same grids of rectangles as `areas`, but only for some receptors (numbered row by row)."""
         count = max(1, round(per_receptor))
         plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
         return Trial(plane, unused, self._means(len(receptors), count), extent)
@@ -95,7 +95,7 @@ class BoxSampling:
         return plane, _unused(plane), count, self.depth, extent_of(self.eye, (1 / columns, 1 / rows))
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of some receptors (numbered row by row) in the sensor with this number of rays."""
+        """Return the samples of some receptors (numbered row by row), with this number of rays for each of them."""
         rays = max(1, round(rays_per_receptor))
         return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
 
@@ -114,12 +114,15 @@ class BoxSampling:
         return self._through((low_discrepancy(rays) + shifts) % 1.0 + corners)
 
     def _means(self, receptors: int, samples: int) -> np.ndarray:
-        """Return weights that average this number of samples for each receptor, (band, receptor, sample)."""
+        """Return weights (band, receptor, sample) that give each receptor the mean of its own `samples` samples."""
         weights = np.kron(np.eye(receptors), np.full((1, samples), 1 / samples))
         return np.broadcast_to(weights, (self.eye.bands, *weights.shape))
 
     def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the directions (ray, 3) and the bounce samples (ray, 2) of these receptors' rays."""
+        """Return the directions of some receptors' rays, (ray, 3), and a point of the unit square per ray, (ray, 2).
+
+        The point determines the direction in which the ray is continued from the surface that it hits.
+        """
         height, width = self.eye.resolution
         shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
         corners = self._corners()[receptors]
@@ -127,7 +130,7 @@ class BoxSampling:
         return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
 
     def _through(self, points: np.ndarray) -> np.ndarray:
-        """Return the directions of rays through points (receptor, ray, 2) in units of the receptors' sides."""
+        """Return directions towards points of the tangent plane (receptor, ray, 2) [receptor widths and heights]."""
         return directions_of(self.eye, from_receptors(self.eye, points.reshape(-1, 2)))
 
     def _corners(self) -> np.ndarray:
@@ -142,12 +145,13 @@ class BoxSampling:
 
 @dataclass(frozen=True)
 class FieldSampling:
-    """Samples of an eye behind a pupil: rays drawn from the mixture of all receptive fields, or a lattice of areas.
+    """Samples of the visual field of an eye with a pupil: either rays, or the rectangles of a lattice.
 
-    If the requested number leaves a receptor without a ray, `sensor` draws more rays until every receptor has one.
+    The probability density of rays is the mean of all receptive fields. If the requested number leaves a receptor
+    without a ray, `sensor` draws more rays until every receptor has one.
 
-    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. White light from beyond each side of the lattice
-        of areas contributes at most this amount to a signal, on average over the receptors.
+    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. The lattice is so large that, in a white scene,
+        the receptors' mean signal changes by at most this error if the light from beyond one of its sides is omitted.
     """
 
     eye: optics.Eye
@@ -165,7 +169,7 @@ class FieldSampling:
                 rays += max(1, rays // 4)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of some receptors (numbered row by row) in the sensor with this number of rays.
+        """Return rays drawn for the eye, and their weights in the signals of some receptors (numbered row by row).
 
         Raises:
             NoRaysError: one of these receptors has no ray.
@@ -178,7 +182,7 @@ class FieldSampling:
         return max(1, round(rays_per_receptor * np.prod(self.eye.resolution)))
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> ReceptiveFieldSensor:
-        """Return the sensor whose samples are this number of rectangles per receptor.
+        """Return the sensor whose samples are rectangles, `per_receptor` of them for each receptor.
 
         Each receptor's square is divided as in `BoxSampling.areas`. If the number is below 1, several receptors share a
         rectangle. Additional rectangles cover the parts of receptive fields that lie outside all receptors' squares.
@@ -190,16 +194,19 @@ class FieldSampling:
         return ReceptiveFieldSensor(plane, _unused(plane), weights, self.eye.resolution, self.depth, extent)
 
     def may_share(self, per_receptor: float, *, in_rows: bool = True) -> bool:
-        """Return True if areas are small enough that neighbouring receptors have different signals.
+        """Return True if the rectangles of `areas` are so small that neighbouring receptors have different signals.
 
-        The width of an area must be at most that of one receptor, or at most half the width of one receptor's field.
-        The same applies to its height.
+        The width of a rectangle must be at most the width of a receptor, or at most half the width of a receptive
+        field. The same applies to the height.
         """
         sides = (1 / n for n in _parts_or_share(per_receptor, in_rows, aspect_of(self.eye)))
         return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of some receptors (numbered row by row) in the sensor with this number of areas."""
+        """Return the same rectangles as `areas`, but only with their weights in the signals of the given receptors.
+
+        receptors: indices of the receptors, counted row by row
+        """
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), extent_of(self.eye, lattice.size))
@@ -230,10 +237,10 @@ class FieldSampling:
 
 
 def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[float, float]:
-    """Return the numbers of rows and columns of areas per receptor.
+    """Return the number of rows, and the number of columns, of the rectangles that fill one receptor's area.
 
-    A `per_receptor` of 1 or more is rounded to a whole number. If it is below 1, several receptors share an area, so
-    there is less than one column per receptor, and with `in_rows` also less than one row.
+    A `per_receptor` of 1 or more is rounded to a whole number. If it is below 1, several receptors share a rectangle:
+    with `in_rows`, both numbers are √`per_receptor`; otherwise, there are 1 row and `per_receptor` columns.
 
     aspect: see `parts_of`
     """
@@ -243,7 +250,7 @@ def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
-    """Return placeholders for bounce samples, which areas do not use: their reflected light comes from a table."""
+    """Return zeros (area, 2) as `bounce_samples`, which only rays need: they determine how a ray is reflected."""
     return np.zeros((len(plane), 2), np.float32)
 
 
@@ -257,17 +264,12 @@ WorldSampling = EyeSampling | OmmatidialSampling
 
 
 def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
-    """Return the mask of the squares that are added if a field is extended by one square on every side.
-
-    Its shape is (height + 2, width + 2).
-    """
+    """Return a mask (height + 2, width + 2) that is True for the ring of squares around a field of receptors."""
     return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 
 def eye_sampling(eye: WorldEye, depth: DepthLayers = ONE_PSF) -> WorldSampling:
-    """Return the sampling of an eye.
-
-    It is `OmmatidialSampling` for a compound eye, `BoxSampling` for a perfect lens, and otherwise `FieldSampling`.
+    """Return `OmmatidialSampling` for a compound eye, `BoxSampling` for a perfect lens, and otherwise `FieldSampling`.
 
     Raises:
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
@@ -290,9 +292,9 @@ def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers =
 
 
 def negligible_share(eye: optics.Eye) -> float:
-    """Return the fraction of a receptor's weights that can be omitted.
+    """Return the fraction of a receptor's total weight that may be lost when small weights of samples are set to 0.
 
-    Omitting a fraction s changes a signal by at most s times the throughput of the aperture, in scenes nowhere brighter
-    than white in full daylight.
+    Losing a fraction s changes a signal by at most s times the throughput of the aperture, if nothing in the scene is
+    brighter than white in full daylight.
     """
     return min(NEGLIGIBLE * eye.noise_sigma / eye.aperture_throughput, eye.tolerance)

@@ -43,8 +43,8 @@ class BoxSensor(ReadOnlyArrays):
         `sim.tracing.lighting`), (ray, 2) float32
     rays_per_receptor: number of samples of one receptor; the renderer's kernel sums them
     depth: a single layer, because a perfect lens is in focus at all distances
-    extent: if the samples are areas, their width and height as rectangles of the tangent plane at distance 1;
-        `directions` are then the positions of the areas' centres on that plane. None: the samples are rays.
+    extent: None if the samples are rays. If they are areas, these are equal rectangles on the tangent plane at
+        distance 1: `extent` is their width and height, and `directions` are the positions of their centres.
     """
 
     directions: np.ndarray
@@ -62,7 +62,9 @@ class BoxSensor(ReadOnlyArrays):
         return sums * np.float32(1.0 / self.rays_per_receptor)
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-        """Return the function that maps sums of spectral components over each receptor's rays to signals.
+        """Return the function that computes signals from the light of each receptor.
+
+        The argument of that function is the sum of each spectral component over the receptor's rays.
 
         mixing: weight of each band in each channel, (channel, band)
         basis: contribution of each component to each band, (component, band)
@@ -79,16 +81,17 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
 
         signal_{r,b} = sum_p W_b[r, p] radiance_b(p),   W_b[r, p] ∝ RF_{r,b}(p) / q(p),   sum_p W_b[r, p] = power_b
 
-    RF is the receptive field, q is the density of the directions, and power_b is the fraction of the pupil's power
-    inside the field (see `sim.eyes.receptive_fields.ReceptiveFields`). With several depth layers, each layer has its
-    own W, which is applied to the fraction of a ray's light that the layer receives.
+    RF is the receptive field, q is the density of the directions, and power_b is the fraction of the power through the
+    pupil that falls inside the receptive field (see `sim.eyes.receptive_fields.ReceptiveFields`). With several depth
+    layers, each layer has its own W, which is applied to the fraction of a ray's light that the layer receives.
 
     If the samples are areas of the visual field instead of rays, W_b[r, p] is the integral of the receptive field
     over area p.
 
-    Small weights of rays far above and below a row of receptors are set to 0. For each receptor, they amount to at most
-    the fraction `eye.tolerance` of the sum of its weights. In scenes nowhere brighter than white in full daylight, this
-    changes no signal by more than `sim.eyes.sampling.NEGLIGIBLE` times the receptors' noise.
+    If a ray is far above or below the part of the visual field that a row of receptors sees, its small weights for
+    these receptors are set to 0. For each receptor, they amount to at most the fraction `eye.tolerance` of the sum of
+    its weights. If nothing in the scene is brighter than white in full daylight, this changes no signal by more than
+    `sim.eyes.sampling.NEGLIGIBLE` times the receptors' noise.
 
     directions: unit vectors in the eye's frame, (ray, 3) float32
     bounce_samples: points in the unit square, one for each ray, that determine the direction of its bounce ray (see
@@ -115,7 +118,10 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
         return layers.reshape(self.depth.count, -1, *layers.shape[1:]).sum(axis=0)
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-        """Return the function that maps spectral components along rays (layer * component, view, ray) to signals.
+        """Return the function that computes signals from the light along rays.
+
+        The argument of that function is the part of each spectral component that each depth layer receives, for each
+        view (one eye in one world) and ray, (layer * component, view, ray).
 
         mixing: weight of each band in each channel, (channel, band)
         basis: contribution of each component to each band, (component, band)
@@ -139,7 +145,7 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
 
     @property
     def density(self) -> float:
-        """Fraction of the weights that are not zero."""
+        """Number of nonzero weights divided by the number of all weights."""
         return float(np.mean([w.nnz / np.prod(w.shape) for w in self.weights]))
 
 
@@ -149,9 +155,10 @@ class OmmatidialSensor(ReadOnlyArrays):
 
     The kernel multiplies the light along each ray by the weight of the ray and sums over an ommatidium's rays. Let Ω_b
     be the integral of the acceptance function in band b over all directions. In this band, the weight of a ray is the
-    integral over the directions that are nearest to the ray, divided by the mean of Ω over all bands. The weights
-    therefore sum to Ω_b / mean(Ω). The signal of receptor type t is Σ_b mixing[t, b] times the sum in band b (see
-    `receptor_sums`), divided by the same expression for white light.
+    integral of the acceptance function over all directions that are closer to this ray than to any other, divided by
+    the mean of Ω over all bands. With 8 rays or more, the weights are then corrected (see
+    `sim.eyes.ommatidial_sampling`). They sum to Ω_b / mean(Ω). The signal of receptor type t is Σ_b mixing[t, b] times
+    the sum in band b (see `receptor_sums`), divided by the same expression for white light.
 
     directions, bounce_samples, rays_per_receptor: see `BoxSensor`
     facets: weights and starting points of the rays
@@ -177,9 +184,10 @@ class OmmatidialSensor(ReadOnlyArrays):
         return np.asarray(sums / weights.T[:, None].astype(np.float32))
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-        """Return the function that maps sums of spectral components over each ommatidium's rays to signals.
+        """Return the function that computes signals from the light of each ommatidium.
 
-        Components must be bands.
+        The argument of that function is the weighted sum of each spectral component over the ommatidium's rays. The
+        components must be the bands.
 
         mixing: weight of each band in each channel, (channel, band)
         basis: contribution of each component to each band, (component, band), the identity matrix

@@ -10,7 +10,9 @@ import optics
 
 
 def from_receptors(eye: optics.Eye, counted: np.ndarray) -> np.ndarray:
-    """Return points of the tangent plane (x right, y down) [average receptor widths and heights], (n, 2).
+    """Return points of the tangent plane, (n, 2): x to the right and y down.
+
+    The unit of x is the average width of a receptor, and the unit of y is the average height.
 
     counted: the same points in coordinates in which every receptor has the size 1. These coordinates differ from those
         of the result only if the eye's receptors differ in size (`optics.Eye(density=...)`).
@@ -23,7 +25,7 @@ def to_receptors(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
 
     This is the inverse of `from_receptors`.
 
-    plane: points (x right, y down) [average receptor widths and heights], (..., 2)
+    plane: points, x to the right in average receptor widths, y down in average receptor heights, (..., 2)
     """
     return plane if eye.lattice is None else eye.lattice.counted(plane)
 
@@ -31,7 +33,7 @@ def to_receptors(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
 def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
     """Return unit vectors (ray, 3) in the eye's frame towards points of the tangent plane.
 
-    plane: points (x right, y down) [average receptor widths and heights], (ray, 2)
+    plane: points, x to the right in average receptor widths, y down in average receptor heights, (ray, 2)
     """
     v = on_tangent_plane(eye, plane)
     return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
@@ -40,7 +42,7 @@ def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
 def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
     """Return points of the tangent plane as points in the eye's frame at distance 1 along its axis, (ray, 3).
 
-    plane: points (x right, y down) [average receptor widths and heights], (ray, 2)
+    plane: points, x to the right in average receptor widths, y down in average receptor heights, (ray, 2)
     """
     height, width = tangent_size(eye)
     return np.stack([plane[:, 0] * width, -plane[:, 1] * height, np.ones(len(plane))], axis=-1)
@@ -74,9 +76,9 @@ def aspect_of(eye: optics.Eye) -> float:
 
 
 def extent_of(eye: optics.Eye, size: tuple[float, float]) -> tuple[float, float]:
-    """Return a rectangle's width and height on the plane at distance 1.
+    """Return the width and height of a rectangle on the tangent plane, divided by the plane's distance from the eye.
 
-    size: width and height of the rectangle [receptor widths and heights]
+    size: width of the rectangle in average receptor widths, and height in average receptor heights
     """
     height, width = tangent_size(eye)
     return width * size[0], height * size[1]

@@ -1,6 +1,7 @@
 """Receptive fields of receptors of different sizes behind a pupil: the PSF, integrated over each receptor's rectangle.
 
-All receptors share the PSF. Its integral over a rectangle is a difference of its cumulative sums at the edges.
+All receptors share the PSF. The integral of the PSF between two edges of a rectangle is the difference between the
+cumulative sums of the PSF at these edges.
 """
 
 from __future__ import annotations
@@ -22,12 +23,16 @@ NEAR = 0.25, 0.5, 0.25
 class VariedFields(ReceptiveFields):
     """Tabulated receptive fields of an eye whose receptors differ in size (`optics.Eye(density=...)`).
 
-    field: power per cell of the PSF, rotated by 180°, (plane, y, x)
-    density: probability per cell of the mixture of all receptors' fields, see `ReceptiveFields`. It is high where
-        receptors are dense
+    The visual field is divided into equal cells, `cells` * `cells` of them for the area of an average receptor. Fields
+    are tabulated for these cells.
+
+    field: power of the PSF, rotated by 180°, in each cell that the PSF covers, (plane, y, x), with one plane for each
+        band of each depth layer
+    density: probability with which a ray is drawn in each cell of the visual field, (y, x). The density is the mean of
+        the fields of all receptors, so it is high where receptors are dense.
     resolution: receptors (height, width)
-    cells: cells along the side of an average receptor
-    lattice: rectangles of the receptors
+    cells: number of cells along the side of an average receptor
+    lattice: the rectangles that the receptors cover
     """
 
     lattice: ReceptorLattice
@@ -46,11 +51,19 @@ class VariedFields(ReceptiveFields):
         return cls(field, density, eye.resolution, cells, eye.lattice)
 
     def drawn_for(self, receptors: np.ndarray) -> VariedFields:
-        """Return a copy whose mixture, from which rays are drawn, contains only the fields of these receptors."""
+        """Return a copy that draws rays from the mean of these receptors' fields: this mean is its `density`."""
         return replace(self, density=_mixture(self.field, self.lattice, self.cells, receptors))
 
     def values(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the values of these receptors' fields at the points of the drawn rays, (plane, receptor, ray)."""
+        """Return the weights with which light along each ray enters some receptors' signals, (plane, receptor, ray).
+
+        A weight is the PSF, averaged over the receptor's rectangle. It applies to the light from one cell of the visual
+        field; a cell is as large as a small part of an average receptor. There is one plane for each band of each depth
+        layer. A depth layer is a distance for which the eye has a PSF.
+
+        draw: rays that `draw` has returned
+        receptors: indices of the receptors, counted row by row
+        """
         rows, columns = np.divmod(receptors, self.resolution[1])
         found = np.zeros((len(self.field), len(receptors), len(draw)))
         for row in np.unique(rows):
@@ -81,9 +94,9 @@ class VariedFields(ReceptiveFields):
 
 
 def _edges(edges: np.ndarray, receptors: int, cells: int) -> np.ndarray:
-    """Convert edges of receptors to numbers of cells from the top or the left of the retina.
+    """Return the distances of receptors' edges from the top or the left end of the retina [cells].
 
-    edges: positions from the middle, in sides of an average receptor
+    edges: positions of the edges relative to the middle of the retina [heights or widths of an average receptor]
     receptors: number of receptors along the axis
     cells: number of cells along the side of an average receptor
     """
@@ -92,7 +105,11 @@ def _edges(edges: np.ndarray, receptors: int, cells: int) -> np.ndarray:
 
 
 def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate a table (plane, n + 1, x) linearly along its second axis; return (plane, place, x)."""
+    """Interpolate a table linearly along its second axis, and return the values as an array (plane, position, x).
+
+    table: values, with one plane for each band of each depth layer, (plane, n + 1, x)
+    places: positions along the second axis, as indices with fractions, (position,)
+    """
     at = np.clip(places, 0, table.shape[1] - 1)
     k = np.minimum(at.astype(int), table.shape[1] - 2)
     share = (at - k)[:, None]
@@ -100,7 +117,11 @@ def _at(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Interpolate a table (plane, ray, n + 1) linearly at places (receptor, ray); return (plane, receptor, ray)."""
+    """Interpolate a table linearly along its third axis, and return the values as an array (plane, receptor, ray).
+
+    table: values for each ray, with one plane for each band of each depth layer, (plane, ray, n + 1)
+    places: position along the third axis for each receptor and ray, as an index with fractions, (receptor, ray)
+    """
     at = np.clip(places, 0, table.shape[2] - 1)
     k = np.minimum(at.astype(int), table.shape[2] - 2)
     share, rays = at - k, np.arange(table.shape[1])
@@ -108,11 +129,17 @@ def _across(table: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _mixture(field: np.ndarray, lattice: ReceptorLattice, cells: int, receptors: np.ndarray) -> np.ndarray:
-    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields.
+    """Return the mean of these receptors' fields in each cell of the visual field, (y, x), scaled to the sum 1.
 
-    A ray may be up to half a cell from the middle of its cell, at which the mixture is computed. The mixture is
-    therefore averaged over neighbouring cells. Otherwise a ray just beyond the rim, where the mixture is almost 0,
-    could get a huge weight.
+    Rays are drawn with this probability. The mean is also taken over all bands and all depth layers; a depth layer is a
+    distance for which the eye has a PSF. The mean is computed at the middles of cells, from which a ray may be up to
+    half a cell away. It is therefore averaged over neighbouring cells. Otherwise a ray just beyond the rim of the
+    fields, where the mean is almost 0, could get a huge weight.
+
+    field: power of the PSF, rotated by 180°, in each cell, (plane, y, x)
+    lattice: the rectangles that all receptors cover
+    cells: number of cells along the side of an average receptor
+    receptors: indices of the receptors, counted row by row
     """
     from scipy.ndimage import convolve1d
     from scipy.signal import fftconvolve

@@ -61,9 +61,11 @@ def _normalized(name: str, vectors: np.ndarray) -> np.ndarray:
 
 
 def facet_frames(directions: np.ndarray) -> np.ndarray:
-    """Return the frames of facets in the eye's frame (right, up, ahead), (n, 3, 3), with columns (right, up, axis).
+    """Return the rotation matrices of facets, (n, 3, 3).
 
-    A facet is turned like a `sim.Mount` with the same azimuth and elevation: its x axis is horizontal.
+    The columns of a matrix are unit vectors to the facet's right, to its top, and along its axis. Their components are
+    relative to the eye (right, up, ahead). A facet is turned like a `sim.Mount` with the same azimuth and elevation:
+    its x axis, to the right, is horizontal.
 
     directions: axes of the facets, unit vectors (ahead, left, up), (n, 3)
     """

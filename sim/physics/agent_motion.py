@@ -44,7 +44,10 @@ class Motion:
     unstable: np.ndarray
 
     def put(self, worlds: np.ndarray, motion: Motion) -> None:
-        """Overwrite the motion of the worlds with these indices. Use this only while a result is being assembled."""
+        """Overwrite the motion in the worlds with these indices, in place.
+
+        Call this only before the object is returned to other code, because results are not meant to change.
+        """
         for name, array in vars(self).items():
             array[worlds] = getattr(motion, name)
 
@@ -68,9 +71,9 @@ class AgentPhysics:
     world: the world, whose model all agents share
     threads: number of threads for MuJoCo's batched step of 128 or more worlds
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
-        obstacles are simulated in models of these obstacles alone (`local_contacts`). The attribute `free_motion` or
-        `local_contacts` is None if the model does not support the method. If False, MuJoCo simulates all agents in the
-        whole world.
+        obstacles are simulated in models of these obstacles alone (`local_contacts`). If `closed_form` is False, MuJoCo
+        simulates all agents in the whole world. The attributes `free_motion` and `local_contacts` are None if the model
+        does not support these methods, or if `closed_form` is False.
 
     Raises:
         ValueError: the model lacks the agent's joints, actuators or touch sensor, or an object could collide or is not
@@ -133,7 +136,7 @@ class AgentPhysics:
         return motion
 
     def _simulate(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """Step the agents in the whole world with MuJoCo."""
+        """Simulate the agents with MuJoCo in the complete model of the world, with all its geoms."""
         models = [self._model] * len(velocity)
         return self._motion(agents.position, *self._step_batch(models, *self._start_of(agents, velocity)))
 
@@ -161,7 +164,7 @@ class AgentPhysics:
     def _untouched(
         self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return MuJoCo's paths [m] and velocities [m/s] with contacts disabled, (n, substep, 2) each.
+        """Return paths [m] and velocities [m/s] of agents, simulated by MuJoCo without contacts, (n, substep, 2) each.
 
         speed, command: initial and commanded velocities [m/s], (n, 2)
         displacement: displacements of the starting points from the agent's initial position [m], (n, 2)

@@ -2,8 +2,8 @@
 
 Far from walls, an agent on slide joints with velocity servos responds linearly to its initial speed and to the command.
 Its motion during one action is a weighted sum of the two, with constant coefficients. The coefficients are measured in
-the model with contacts disabled, so they include the effects of its integrator, damping and servos. A model that
-responds nonlinearly has no such coefficients.
+the model with contacts disabled, so they include the effects of the model's integrator, damping and servos. A model
+that responds nonlinearly has no such coefficients.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ class FreeMotion:
         2). One response is to an initial speed of 1 m/s with command 0, the other to a command of 1 m/s from rest.
     obstacles: ids of the geoms that could be touched (n,)
     lower, upper: axis-aligned bounding boxes of the obstacles in the horizontal plane (n, 2) [m]
-    reach: distance of the agent's centre from a box beyond which the agent cannot touch the obstacle [m]
+    reach: largest distance between the agent's centre and an obstacle's box at which the agent may touch the obstacle
+        [m]
     strongest: largest component of a command for which the response was tested to be linear [m/s]
     """
 
@@ -61,9 +62,10 @@ class FreeMotion:
 
     @cached_property
     def _within(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Limits between which an agent's centre is within reach of a box [m].
+        """Limits of the obstacles' boxes, enlarged by `reach` on every side [m].
 
-        The arrays are the lower x, lower y, upper x and upper y, (box,) each.
+        An agent whose centre is outside an enlarged box cannot touch the obstacle. The arrays are the lower x, lower y,
+        upper x and upper y, (box,) each.
         """
         return (*(self.lower - self.reach).T.copy(), *(self.upper + self.reach).T.copy())
 
@@ -87,7 +89,10 @@ class FreeMotion:
         return in_reach
 
     def obeys(self, command: np.ndarray) -> np.ndarray:
-        """Return a mask of the commands (n, 2) whose components are at most `strongest` in magnitude, (n,) bool."""
+        """Return True for each command if both of its components are at most `strongest` in magnitude, (n,) bool.
+
+        command: commanded velocities [m/s], (n, 2)
+        """
         obeys: np.ndarray = (np.abs(command) <= self.strongest).all(axis=-1)
         return obeys
 

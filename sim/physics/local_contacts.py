@@ -29,8 +29,8 @@ class LocalContacts:
     """Small models that contain the agent and only a few of a world's geoms. They are built on demand and cached.
 
     whole: the world's complete model
-    alone: the model of the world's agent without the world (`sim.worlds.agent_model`)
-    free_motion: obstacles of the agent, and the distance at which it may touch them
+    alone: the model of the agent without the walls and objects of its world (`sim.worlds.agent_model`)
+    free_motion: obstacles that the agent can touch, and the largest distance at which it may touch one
     threads: number of threads for MuJoCo's batched step of 128 or more worlds
     """
 
@@ -47,18 +47,22 @@ class LocalContacts:
         self._step = BatchedStep(self._alone, threads)
 
     def few(self, in_reach: np.ndarray) -> np.ndarray:
-        """Return the obstacles of each agent's small model, (n, obstacle) bool.
+        """Return True for the obstacles in the small model in which each agent is simulated, (agent, obstacle) bool.
 
-        They are all obstacles within reach, or none if these are more than the placeholders in a small model
-        (`sim.worlds.agent_model.ROOM`).
+        The small model contains the agent and all obstacles within its reach. However, it has room for only 4 obstacles
+        (`sim.worlds.agent_model.ROOM`). If more are within reach, it contains none.
 
-        in_reach: obstacles within reach of each agent, (n, obstacle) bool
+        in_reach: True for the obstacles within reach of each agent, (agent, obstacle) bool
         """
         few: np.ndarray = in_reach & (in_reach.sum(axis=1, keepdims=True) <= len(self._slots))
         return few
 
     def step(self, few: np.ndarray, initial: np.ndarray, control: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Step each agent in the small model of the obstacles in `few`, (n, obstacle) bool; see `BatchedStep`."""
+        """Step each agent in its own small model; return states and sensor values after each step, (agent, step, ...).
+
+        few: True for the obstacles that an agent's small model contains, (agent, obstacle) bool
+        initial, control: state before the first step, and controls in each step, see `BatchedStep`
+        """
         if len(self._models) > MOST:
             self._models.clear()
         packed = np.packbits(few, axis=1)
@@ -68,12 +72,14 @@ class LocalContacts:
         return self._step(models, initial, control)
 
     def strayed(self, position: np.ndarray, path: np.ndarray, few: np.ndarray) -> np.ndarray:
-        """Return whether agents came within reach of obstacles other than `few` (n, obstacle) on their path, (n,) bool.
+        """Return whether each agent came within reach of an obstacle that its small model lacks, (n,) bool.
 
-        This happens if one obstacle deflects an agent towards another one.
+        The small model, in which the agent is simulated, contains only the obstacles that it would reach without
+        contacts. One of these may deflect the agent towards another obstacle.
 
         position: positions at the beginning (n, 2) [m]
         path: positions after each substep, relative to `position` (n, substep, 2) [m]
+        few: True for the obstacles that an agent's small model contains, (n, obstacle) bool
         """
         strayed: np.ndarray = (self._free_motion.obstacles_in_reach(position, path) & ~few).any(axis=1)
         return strayed
@@ -93,11 +99,12 @@ class LocalContacts:
 def local_contacts_of(
     world: World, whole: mujoco.MjModel, free_motion: FreeMotion | None, threads: int
 ) -> LocalContacts | None:
-    """Return the local contacts of a world's agent; None if small models cannot replace the whole model.
+    """Return the small models that simulate contacts of a world's agent; None if they cannot replace the whole model.
 
-    Small models cannot replace it if agents have no free motion or no obstacles, or if the model has joints, actuators
-    or sensors besides those of the agent. Every obstacle must be a simple primitive that is fixed to the world, and the
-    world's model must not have been changed since it was compiled.
+    A small model contains only the agent and the few obstacles near it. Small models cannot replace the whole model if
+    `free_motion` is None or names no obstacles, or if the whole model has joints, actuators or sensors besides those of
+    the agent. Every obstacle must be a simple primitive that is fixed to the world, and the world's model must not have
+    been changed since it was compiled.
 
     whole: the world's complete model
     """

@@ -1,4 +1,4 @@
-"""MuJoCo's batched step, accelerated for small batches by omitting repeated checks, threads and timers."""
+"""MuJoCo's batched step, which is faster for small batches: it omits threads, timers, and repeated checks of models."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ class _ClockStopped:
     """Context manager that disables the clock with which MuJoCo measures the times in MjData.timer.
 
     MuJoCo reads this clock about twenty times per step, which takes a fifth of the time of a small model's step. All
-    threads of a process share the clock. It is disabled while any rollout runs, and restored when the last one has
-    finished.
+    threads of a process share the clock. It is disabled while at least one thread is inside the context, and restored
+    when the last one leaves it.
     """
 
     def __init__(self) -> None:
@@ -93,9 +93,10 @@ class _ClockStopped:
 
 @cache
 def _clock() -> ctypes.c_void_p:
-    """Return mjcb_time, MuJoCo's pointer to its clock, which mujoco.set_mjcb_time cannot clear.
+    """Return mjcb_time, MuJoCo's pointer to the function that reads its clock.
 
-    If MuJoCo's library is not in the folder of its package, an unused pointer is returned.
+    The pointer is accessed directly, because mujoco.set_mjcb_time cannot clear it. If MuJoCo's library is not in the
+    folder of its package, an unused pointer is returned.
     """
     for library in Path(mujoco.__file__).parent.glob("*mujoco*.*"):
         with contextlib.suppress(OSError, ValueError):

@@ -114,7 +114,7 @@ class MujocoWorlds:
         return broken
 
     def _replace_passed(self, broken: list[int]) -> None:
-        """Replace the poses at moments during the action by those after it, in worlds whose physics broke down."""
+        """Replace the poses during the last action by the poses after it, in the worlds whose physics broke down."""
         for world in broken:
             self.require_places(world)
         fine = [world for world in range(self.n) if world not in broken]
@@ -161,7 +161,11 @@ class MujocoWorlds:
         mujoco.mj_forward(data.model, data)
 
     def _pass_frame(self, world: int) -> None:
-        """Advance a world to the next frame. Then only update its poses, so that frames do not change the physics."""
+        """Advance a world to the next moment before the end of an action at which its poses are recorded.
+
+        Receptors with dynamics see the world at these moments. After the last step, only the poses that follow from the
+        new state are computed, so recording them does not change the physics.
+        """
         data = self.datas[world]
         mujoco.mj_step(data.model, data, self.substeps // self.frames)
         mujoco.mj_kinematics(data.model, data)

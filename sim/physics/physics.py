@@ -22,8 +22,9 @@ class Physics(Protocol):
     model: model for which renderers are built
     n: number of worlds
     seconds: duration of one action [s]
-    frames: number of moments of an action at which receptors with dynamics see the worlds, 1 or a divisor of `substeps`
-    passed: poses at the `frames` - 1 moments of the last action that precede its end
+    frames: number of equally spaced moments of an action at which receptors with dynamics see the worlds. The last one
+        is the end of the action. The number is 1 or another divisor of `substeps`.
+    passed: poses at these moments of the last action, except at its end, so there are `frames` - 1
     substeps: number of physics steps per action
     chance: random streams of the worlds, set whenever the worlds are seeded
     varied: names of geoms whose size, colour or material differs between worlds, with the materials that they may have

@@ -1,4 +1,4 @@
-"""Physics of the built-in worlds: agents that slide over a floor among walls, and objects that their task moves."""
+"""Physics of the built-in worlds: agents that slide over a floor among walls, and objects that the task moves."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ UNSTABLE = "unstable physics"
 class SlidingAgents:
     """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
 
-    `sim.Physics` describes the methods that have no description in this class. However, `step` also moves the skipped
-    worlds. Methods that need the state raise a RuntimeError before the first call of `place`, and so does `step` before
-    the first call of `move_objects`.
+    `sim.Physics` describes the methods that have no description in this class. In contrast to the description there,
+    `step` moves all worlds, also those in its argument `skipped`. Methods that need the state raise a RuntimeError
+    before the first call of `place`, and so does `step` before the first call of `move_objects`.
 
     world: layout, model and starting positions
     n: number of worlds, 1 to 1,000,000

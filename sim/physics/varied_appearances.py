@@ -14,7 +14,7 @@ __all__ = ["VariedAppearances", "varied_appearances"]
 
 
 class VariedAppearances:
-    """A copy of the model for each world, which only renderers use. Physics uses the shared model.
+    """Copies of the model for rendering, one per world. Physics uses one model for all worlds.
 
     models: the models of the worlds
     varied: names of the geoms that differ between worlds, with the materials that they may have
@@ -42,7 +42,7 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
     """Return the varied appearances; None if only light varies.
 
     Raises:
-        ValueError: the model has no such object, the object cannot vary, or a starting position varies.
+        ValueError: `variation` names an object that the model lacks or that cannot vary, or a starting position varies.
     """
     if starts := variation.of_things(START):
         raise ValueError(
@@ -52,7 +52,12 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
 
 
 def _weightless(model: mujoco.MjModel, thing: str, name: str) -> int:
-    """Return the id of the geom `thing`, after checking that its size may differ between worlds of one layout.
+    """Return the id of the geom `thing`, after checking that the geom's size may differ between worlds.
+
+    Only the renderers' models differ in size, and physics uses one model for all worlds, so no agent may touch the
+    geom.
+
+    name: name of the varied quantity, for error messages
 
     Raises:
         ValueError: there is no such geom, agents touch it, or it is not a plain primitive.

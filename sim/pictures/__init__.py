@@ -8,6 +8,6 @@ eye_marks      marks of eyes on images of a model
 
 Photographs through the eyes of animals:
 
-photograph       from sRGB to the signals of receptors
+photograph       conversion of sRGB images to the signals of receptors
 receptor_mosaic  signals, drawn as hexagons or squares and written as EXR
 """

@@ -68,7 +68,8 @@ class CameraInputs:
     samples: positions of the samples relative to a pixel's middle [pixels], two floats each
     weights: irradiance from each directional light, four floats each (one per wavelength)
     closed: for each shape, True if a camera inside it sees through it
-    bsdfs: not used by the kernel; a recording includes textures only if their BSDFs are among the inputs
+    bsdfs: BSDFs of all shapes. The kernel does not use this input. However, Dr.Jit records the kernel, and the
+        recording includes a texture only if the BSDF with this texture is among the inputs.
     """
 
     samples: Array
@@ -122,7 +123,7 @@ class CameraRays:
 
     @property
     def recordings(self) -> int:
-        """Number of times that the kernels were recorded."""
+        """Number of times that Dr.Jit recorded the kernels, instead of reusing an earlier recording."""
         return int(self._outside.n_recordings + self._inside.n_recordings)
 
     def _trace(
@@ -167,9 +168,9 @@ class CameraRays:
 
 
 def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
-    """Return the first hits of rays, which the inner sides of closed shapes do not stop.
+    """Return the first hit of each ray, if rays pass through the inner sides of closed shapes.
 
-    si: first hits of the rays, including inner sides
+    si: first hits of the rays, including hits on inner sides
     closed: see `CameraInputs`
     """
 
@@ -221,7 +222,11 @@ def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarra
 def _pose(
     view: Viewpoint, size: tuple[int, int], near: float, suns: Mapping[int, np.ndarray], n_lights: int
 ) -> np.ndarray:
-    """Return the view and directions to directional lights, which change between frames: rows of four floats, flat."""
+    """Return the kernel inputs that change between frames: the view, and the directions to the directional lights.
+
+    The inputs are rows of four floats, joined to a one-dimensional array. The view comes first, followed by a row for
+    each light, which is used only if the light is directional.
+    """
     rows = aligned(4 * (_VIEW + n_lights), np.float32).reshape(-1, 4)
     rows[0, :3], rows[1:4, :3] = view.position, view.rotation.T
     rows[4] = np.tan(np.radians(view.fovy_deg) / 2), near, size[1], size[0]
@@ -246,7 +251,12 @@ def _is_sun(lamp: Emitter) -> bool:
 
 
 def _is_textured_glow(light: MitsubaObject) -> bool:
-    """Return whether a light is a surface with a texture. (A sky is not, and Mitsuba exposes its sampling tables.)"""
+    """Return whether a light is a surface that glows with a texture.
+
+    Dr.Jit records a kernel so that it can run again for later images. A kernel that samples such a light cannot be
+    recorded, because Mitsuba does not expose the tables from which it samples the texture. A sky is not a surface, and
+    its tables are available.
+    """
     kinds = int(mi.EmitterFlags.Surface) | int(mi.EmitterFlags.SpatiallyVarying)
     return int(light.flags()) & kinds == kinds
 

@@ -18,11 +18,13 @@ OPACITY = 0.8
 def with_eyes(
     picture: np.ndarray, view: Viewpoint, eyes: tuple[np.ndarray, np.ndarray], fov_deg: float, reach: float
 ) -> np.ndarray:
-    """Return an image (y, x, 3) uint8 of a model with marks of its eyes.
+    """Return an image of a model, (y, x, 3) uint8, in which the model's eyes are marked.
+
+    Each eye gets a dot, and two lines along the left and right borders of its field of view.
 
     eyes: pupils [m] (eye, 3) and frames (eye, 3, 3), columns (right, up, ahead)
     fov_deg: horizontal field of view of the eyes [degrees]
-    reach: length of the borders that are drawn [m]
+    reach: length of the lines along the borders [m]
     """
     shown, half = picture.astype(np.float64), np.radians(fov_deg) / 2
     scale = picture.shape[0] / 360
@@ -57,7 +59,7 @@ def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: flo
 
 
 def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distances of the pixels' centres from a line segment [pixels], (y, x).
+    """Return the distance [pixels] of each pixel's centre from a line segment, array (y, x).
 
     start, end: ends of the segment, (x, y) [pixels]
     size: height and width of the image [pixels]

@@ -17,12 +17,13 @@ _CROSS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 @dataclass(frozen=True)
 class Lattice:
-    """The pixels of an image that are traced first.
+    """The subset of an image's pixels that is traced first: every fifth pixel, and some pixels at the border.
 
     size: size of the image (height, width)
-    pixels: indices of the lattice's pixels, row by row, and of border pixels that are adjacent to none of them, (n,)
-    nearest: for each pixel, the index in `pixels` of the nearest one, (height · width,)
-    pairs: neighbours in the lattice, as indices in `pixels`, (2, m)
+    pixels: indices of the subset's pixels in the image, (n,). First come every fifth pixel, row by row, and then the
+        border pixels that are adjacent to none of those.
+    nearest: for each pixel of the image, the index in `pixels` of the subset's nearest pixel, (height · width,)
+    pairs: pairs of pixels that are neighbours in the lattice, as indices in `pixels`, (2, m)
     """
 
     size: tuple[int, int]
@@ -51,9 +52,11 @@ class Lattice:
     def between(self, differ: np.ndarray) -> np.ndarray:
         """Return the indices of pixels outside the lattice that may lie on an edge.
 
-        The pixel of the lattice nearest to such a pixel differs in colour from a neighbouring pixel of the lattice.
+        The lattice consists of every fifth pixel, and of some pixels at the border. Consider the lattice pixel that is
+        nearest to a pixel outside the lattice. The pixel outside may lie on an edge if this lattice pixel differs in
+        colour from a neighbouring lattice pixel.
 
-        differ: True for the pairs of neighbours whose colours differ, (m,)
+        differ: True for the pairs of neighbouring lattice pixels (`pairs`) whose colours differ, (pair,)
         """
         rough = np.zeros(len(self.pixels), bool)
         rough[self.pairs[:, differ]] = True

@@ -25,7 +25,7 @@ from sim.scene.variant import variant as in_variant
 
 
 class MergedMirror(Mirror):
-    """A Mitsuba scene that mirrors all bodies of a model, in the geom groups that MuJoCo shows by default (0 to 2).
+    """A Mitsuba scene with copies of all bodies of a model, in the geom groups that MuJoCo shows by default (0 to 2).
 
     Merged meshes are called "still_<n>", all other shapes "geom_<geom id>_<part>".
 
@@ -74,9 +74,9 @@ class MergedMirror(Mirror):
         return np.asarray(direction / np.linalg.norm(direction))
 
     def surrounds(self, point: np.ndarray) -> bool:
-        """Return whether a point is inside the bounding box of a geom, enlarged by `near`; planes have no box.
+        """Return whether a point lies in or close to the bounding box of any geom except planes.
 
-        The point may then be inside the geom.
+        The point may then be inside the geom. Close means within the distance `near`, along every axis of the box.
         """
         sizes, bounded = self.model.geom_rbound[self.geoms], self.model.geom_rbound[self.geoms] > 0
         offset = point - self._places.geom_xpos[self.geoms]

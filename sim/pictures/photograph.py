@@ -116,8 +116,8 @@ def see_photograph(
     Raises:
         ValueError: an argument is outside its range, the image or `depth` has the wrong shape, the field has more than
             40,000 ommatidia, or `depth` is given for a compound eye.
-        optics.AccuracyError: the depth varies too much, or the scene is too near, for the kernels of one image; see
-            `optics.Eye.see`.
+        optics.AccuracyError: the depth varies so much, or the scene is so near, that its blur cannot be computed
+            accurately enough; see `optics.Eye.see`.
         optics.BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     one_of("animal", animal, ANIMALS)

@@ -37,7 +37,8 @@ class QuickImage:
 
     picture: sRGB, (y, x, 3) uint8
     planes: planes that rays hit, see `RayLight`, (3, ray)
-    ray: for each pixel, the index of the ray through its middle, or through the nearest lattice pixel, (pixel,)
+    ray: index of a ray for each pixel, (pixel,). The ray passes through the pixel's middle or, if no such ray was
+        traced, through the nearest pixel of a lattice, which consists of every fifth pixel (`Lattice`).
     fovy_deg: vertical field of view of the camera
     """
 
@@ -113,9 +114,11 @@ class QuickCamera:
         return image
 
     def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[QuickImage, np.ndarray]:
-        """Return an image in which a pixel has the colour of its middle or of the nearest lattice pixel.
+        """Return an image from at most one ray per pixel, and the linear sRGB values along the rays, (3, ray).
 
-        Also return the linear sRGB values along the rays, (3, ray).
+        The lattice consists of every fifth pixel. Rays are traced through the middles of these pixels. Then, rays are
+        also traced through the middles of other pixels that may lie on an edge. All remaining pixels have the colour of
+        the nearest pixel of the lattice.
         """
         found = self._rays.trace(view, lattice.size, CODES * lattice.pixels)
         linear, planes, ray, shown = found.linear, found.plane, lattice.nearest, _displayed(found.linear)

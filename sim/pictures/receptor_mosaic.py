@@ -1,4 +1,7 @@
-"""Signals of the receptors that see a photograph, drawn as hexagons or squares and written as EXR."""
+"""Signals of receptors that see a photograph.
+
+The receptors are drawn as hexagons or squares, and their signals can be written to an EXR file.
+"""
 
 from __future__ import annotations
 
@@ -67,8 +70,8 @@ class ReceptorMosaic:
         height: height of the image in pixels, 16 to 8192.
 
         Raises:
-            ValueError: the height is not a whole number in its range, or the photograph has another shape or
-                values.
+            ValueError: the height is not a whole number from 16 to 8192, or the photograph does not have the shape
+                (y, x, 3) or contains values outside [0, 1].
         """
         from PIL import Image
 

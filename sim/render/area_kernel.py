@@ -1,7 +1,7 @@
-"""The kernel of area sampling.
+"""The kernel of area sampling, which computes the mean light in areas, rectangles of an eye's visual field.
 
-Results that several areas share are computed once, in advance: the light on the bodies of a world, and the walls at
-the borders between columns of areas.
+Areas form rows and columns, whose borders are straight. Results that several areas share are computed once, in
+advance: the light on the bodies of a world, and the walls in the directions of the borders between columns.
 """
 
 from __future__ import annotations
@@ -26,9 +26,13 @@ from sim.tracing.areas.patch import Area
 
 @dataclass(frozen=True)
 class BorderInputs:
-    """Horizontal directions to the borders between columns of areas.
+    """Borders between areas, with the horizontal directions in which they lie.
 
-    lanes: index of each lane; there is one lane for each border of each eye in each world
+    Areas are the rectangles into which an eye's visual field is divided. Areas in the same column share their left and
+    right borders.
+
+    lanes: indices of lanes, the parallel computations of a kernel; there is one for each border of each eye in each
+        world
     counts: number of borders of an eye, and number of eyes of a world
     along: directions to the borders
     sides: indices of each area's left and right border
@@ -42,7 +46,9 @@ class BorderInputs:
 
 @dataclass(frozen=True)
 class AreaInputs(KernelInputs):
-    """Inputs of an area kernel that are the same in every call, in addition to `KernelInputs`.
+    """Inputs of an `AreaKernel` that are the same in every call, in addition to `KernelInputs`.
+
+    The kernel computes the mean light in areas, the rectangles of an eye's visual field.
 
     extent: width and height of areas on the tangent plane
     borders: directions to the borders that areas share; None: areas share no borders
@@ -56,9 +62,9 @@ class AreaInputs(KernelInputs):
 
 
 class AreaKernel(RayKernel):
-    """A kernel that computes the light in areas.
+    """A kernel that computes the mean light in each area, a rectangle of an eye's visual field.
 
-    areas: tracer that computes the light in areas
+    areas: tracer that computes this mean light
     eyes: upright eyes
     sensor: directions and extent of the areas
     n_envs, n_eyes: numbers of worlds, and of eyes in each world
@@ -73,8 +79,9 @@ class AreaKernel(RayKernel):
     def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None, facets: Facets | None = None) -> AreaInputs:
         """Return the inputs of the kernel; see `RayKernel.inputs`.
 
-        ways: centres of the areas on the plane at distance 1, (area, 3)
-        bounces, facets: ignored, because areas do not use them
+        ways: centres of the areas on the tangent plane, which is perpendicular to the eye's axis at the distance 1,
+            (area, 3)
+        bounces, facets: ignored, because they describe rays, which this kernel does not trace
         """
         whole, places = super().inputs(ways), self._areas.places
         return AreaInputs(
@@ -100,7 +107,11 @@ class AreaKernel(RayKernel):
         )
 
     def layers(self, scenes: Any, frame: Frame, inputs: AreaInputs) -> list[Array]:  # type: ignore[override]
-        """Return the components of the mean light in each lane's area, for each depth layer."""
+        """Return the spectral components of the mean light in each area, for each depth layer.
+
+        An area is a rectangle of an eye's visual field. The kernel has one lane (parallel computation) for each area of
+        each eye in each world.
+        """
         lit = self._lit(frame, inputs)
         lane = Lane.from_index(inputs.lanes, inputs.counts)
         seen = self.eyes.ray(frame.eyes, inputs.along, lane, inputs.counts.samples.number)
@@ -116,7 +127,10 @@ class AreaKernel(RayKernel):
         return self._areas.radiance(area, faces, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
-        """Return the tables of the light on the bodies of all worlds (`IlluminatedBodies`); [] if none are needed."""
+        """Return tables of the light that reaches and leaves bodies in all worlds; [] if none are needed.
+
+        Their rows are described in `IlluminatedBodies`.
+        """
         if inputs.places is None:
             return []
         world = inputs.places // self._areas.places
@@ -130,14 +144,25 @@ class AreaKernel(RayKernel):
     def _shared_border_faces(
         self, frame: Frame, inputs: AreaInputs, borders: BorderInputs, lane: Lane
     ) -> tuple[Array, Array]:
-        """Return the faces at the left and right border of a lane's area."""
+        """Return two indices for each area: of the wall's face visible at its left border, and of that at its right
+        border.
+
+        An area is a rectangle of an eye's visual field. The face is the one that a horizontal ray from the eye towards
+        the border hits first.
+
+        lane: the area for which each lane (parallel computation) of the kernel is responsible
+        """
         faces = self._faces(frame, inputs, borders)
         first = lane.row * borders.counts.samples.number
         sides = dr.gather(mi.Vector2u, borders.sides, lane.sample)
         return dr.gather(mi.UInt32, faces, first + sides.x), dr.gather(mi.UInt32, faces, first + sides.y)
 
     def _faces(self, frame: Frame, inputs: AreaInputs, borders: BorderInputs) -> Array:
-        """Return the face that is hit at each border of each eye, flat (world, eye, border)."""
+        """Return the index of the wall's face that is visible at each border between columns of areas.
+
+        Areas are the rectangles of an eye's visual field. A face is visible at a border if a horizontal ray from the
+        eye towards this border hits it first. The result is a flat array (world, eye, border).
+        """
         lane = Lane.from_index(borders.lanes, borders.counts)
         ray = self.eyes.ray(frame.eyes, borders.along, lane, borders.counts.samples.number).ray
         faces = self._areas.first_faces(ray.o, ray.d.xy, inputs.tables)

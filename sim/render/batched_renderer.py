@@ -1,4 +1,4 @@
-"""Rendering of all eyes of all agents in a built-in world, as one wavefront."""
+"""Rendering of a built-in world as all eyes of all agents see it; the rays of all eyes are traced together."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ class BatchedRenderer(EyeRenderer):
     world: geometry, materials and lights, which all worlds share
     eyes: the eyes of every agent
     n_envs: number of worlds in a state
-    fidelity: number and kind of samples, bands, depth layers and light. `Fidelity(4, bands=4)` traces 4 rays for each
-        receptor in 4 bands. None: `choose_fidelity(world, eyes, bands="own")`, the cheapest fidelity whose error is
-        small compared with the receptors' noise. The fidelity in use is in `.fidelity`
+    fidelity: accuracy of rendering: number and kind of samples (rays or areas), number of spectral bands, depth layers,
+        and reflections of light. `Fidelity(4, bands=4)` traces 4 rays for each receptor in 4 bands. None: the result of
+        `choose_fidelity(world, eyes, bands="own")`. It has the eyes' own bands, and is the cheapest fidelity whose
+        error of the signals is small compared with the receptors' noise. The fidelity in use is in `.fidelity`
     tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto": the closed
         form if the world has one. The tracer in use is in `.tracer.name`, and the reason for its choice in
         `.tracer.why`
-    brightest: attribute, the signal of a white surface that faces all directional lights at once, or of veiling light
-        if it is larger
+    brightest: attribute, the larger of two signals: that of a white surface that faces all directional lights at once,
+        and that of veiling light
 
     Raises:
         ValueError: n_envs is below 1, the rays do not fit into memory, an argument has the wrong type, the world or the
@@ -73,9 +74,11 @@ class BatchedRenderer(EyeRenderer):
 
 
 def in_whole_rays(fidelity: Fidelity, eye: WorldEye) -> Fidelity:
-    """Return the fidelity with a whole number of samples per receptor, unless receptors share their samples.
+    """Return the fidelity, with the number of samples per receptor rounded to a whole number of at least 1.
 
-    Receptors behind a pupil share rays. They share areas only if there are fewer areas than receptors.
+    If receptors share their samples, return the fidelity unchanged. Receptors behind a pupil share rays. They share
+    areas (rectangles of the visual field, which are the other kind of samples) only if there are fewer areas than
+    receptors.
     """
     asked = fidelity.rays_per_receptor
     if isinstance(eye, CompoundEye) or eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):

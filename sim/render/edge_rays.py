@@ -29,13 +29,18 @@ FIRST = 4  # number of first rays, which are traced through every receptor's squ
 
 
 class EdgeRays:
-    """The sums of `RayKernel.sums` over many rays per receptor, estimated from fewer rays.
+    """Sums of the light over each receptor's rays, with many rays only for receptors that see an edge.
+
+    An edge is a border between surfaces of different brightness or colour. Four rays are traced for every receptor. The
+    full number of rays is traced if the four signals differ, or if the receptor's signal differs strongly from the
+    signal of a neighbouring receptor. The result approximates the sums of `RayKernel.sums`, for which every receptor
+    has the full number of rays.
 
     kernel: kernel that traces the rays
-    sampling: sampling of the receptors
-    rays: number of rays for a receptor at an edge
-    signals: contribution of a component to the signal of each type of receptor, (channel, component)
-    noticed: rays whose signals differ by at most this amount count as equal
+    sampling: rule by which the directions of the receptors' rays are chosen
+    rays: full number of rays, for a receptor that sees an edge
+    signals: contribution of a component of light to the signal of each type of receptor, (channel, component)
+    noticed: largest difference at which the signals of two rays still count as equal
     """
 
     def __init__(
@@ -50,11 +55,14 @@ class EdgeRays:
         self._first, self._along = kernel.inputs(first), kernel.inputs(fine.directions)
 
     def launch(self, launch: Launch) -> Callable[[], np.ndarray]:
-        """Start rendering, and return a function that waits for the sums, flat (component, world, eye, receptor).
+        """Start rendering, and return a function that waits for the sums of light over each receptor's rays.
 
-        All sums are scaled to 4 rays per receptor. The worlds must not change before the sums are read.
+        Sums over more than 4 rays are multiplied by 4 and divided by the number of rays, so that all receptors are
+        comparable. The worlds must not change before the sums are read. The sums are a flat array (component, world,
+        eye, receptor).
 
-        launch: function that starts a frozen kernel
+        launch: function that launches a `FrozenKernel` with its inputs, and returns a function that waits for the
+            result
         """
         found = launch(self._coarse, self._first)
         return lambda: self._refined(found(), launch)
@@ -76,11 +84,14 @@ class EdgeRays:
         return light.ravel()
 
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
-        """Return a mask of the receptors that differ strongly from a neighbour, flat (view, receptor).
+        """Return a mask that is True for receptors whose signal differs strongly from that of a neighbour.
 
-        An edge may pass between the first rays of such receptors.
+        An edge between two surfaces may pass unnoticed between the first four rays of such a receptor. Each receptor
+        covers a square of the visual field. Further squares of this size lie just outside the field, and receptors at
+        its rim are also compared with them. The mask is a flat array (view, receptor).
 
-        light: (component, view, receptor or square beyond the rim)
+        light: sums of the light over the first four rays of each square, array (component, view, square). The squares
+            are those of the receptors, and those just outside the visual field
         """
         means = np.tensordot(np.array(self._signals), light, 1) / FIRST
         field = np.empty((*means.shape[:2], *self._beyond.shape), means.dtype)
@@ -95,7 +106,14 @@ class EdgeRays:
         return found[:, 1:-1, 1:-1].ravel()
 
     def _render_all(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
-        """Return the sums over each receptor's rays, per component, and the spread of the rays' signals."""
+        """Return the sums of light over the first four rays of each square, and the spread of the signals of these
+        rays.
+
+        The squares are those of the receptors, and those just outside the visual field. The four rays test whether a
+        receptor sees an edge. There is one array of sums for each component of the light's spectrum. For one type of
+        receptor, the spread is the difference between the largest and the smallest signal of the four rays. The largest
+        spread of all types is returned.
+        """
         components = self._kernel.layers(scenes, frame, inputs)
         signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]
         dr.eval(components, signals)  # otherwise each component's sums would trace all rays again
@@ -106,7 +124,10 @@ class EdgeRays:
         return *_sums(components, FIRST), spread
 
     def _render_edges(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
-        """Return the sums over the rays of the receptors that are rendered again, per component."""
+        """Return sums of light over the rays of each receptor that sees an edge, one array per component of light.
+
+        Only these receptors are rendered again, with the full number of rays.
+        """
         components = self._kernel.layers(scenes, frame, inputs)
         dr.eval(components)
         return _sums(components, self._rays)
@@ -124,7 +145,12 @@ def _sums(components: list[Array], rays: int) -> tuple[Array, ...]:
 def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
     """Return whether adaptive edge sampling is likely to save rays.
 
-    The first rays, including those beyond the rim of the retina, must be at most half of the rays without adaptive
-    sampling. With more first rays, nothing would be saved once a few receptors need all rays.
+    Adaptive edge sampling first traces four rays for every receptor, and for further squares of a receptor's size just
+    beyond the rim of the retina. It then traces the full number of rays, but only for receptors that see an edge.
+    Return True if the first rays are at most half of the rays without adaptive sampling. If they are more, a few
+    receptors that see an edge may use up what is saved at the others.
+
+    resolution: number of rows and of columns of receptors
+    rays: number of rays per receptor without adaptive sampling
     """
     return 2 * FIRST * beyond_rim_of(resolution).size <= rays * resolution[0] * resolution[1]

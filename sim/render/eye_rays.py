@@ -30,7 +30,7 @@ class Counts:
 
     @classmethod
     def from_numbers(cls, samples: int, eyes: int) -> Counts:
-        """Return these numbers on the device."""
+        """Return the numbers of samples and eyes, copied to the device the device."""
         return cls(Divisor.from_number(samples), Divisor.from_number(eyes))
 
 
@@ -49,7 +49,7 @@ class Lane:
 
     @classmethod
     def from_index(cls, index: Array, counts: Counts) -> Lane:
-        """Return the lane with this index, flat (world, eye, sample)."""
+        """Return the lane with this index in the flat array (world, eye, sample) of all samples."""
         row = counts.samples.quotient(index)
         world = counts.eyes.quotient(row)
         return cls(world, row - world * counts.eyes.number, index - row * counts.samples.number, row)
@@ -57,12 +57,15 @@ class Lane:
 
 @dataclass(frozen=True)
 class Directions:
-    """Directions of samples on the device, in rows of four floats.
+    """Directions of an eye's samples, stored on the device in rows of four floats.
+
+    Upright eyes stand on one body that moves and turns on a level plane. Free eyes may be anywhere and may have any
+    orientation.
 
     ways: directions of all samples. For free eyes, they are in the eye's frame. For upright eyes, they are in the
         body's frame, and the fourth float is the cosine of the angle to the eye's axis
-    origins: pupils of upright eyes in the body's frame. For free eyes: starting points of all samples in the eye's
-        frame, or None if they start at the pupil
+    origins: for upright eyes, the positions of the pupils in the body's frame. For free eyes, the starting points of
+        all samples in the eye's frame, or None if all samples start at the pupil
     axes: axes of upright eyes in the body's frame; None for free eyes
     """
 
@@ -75,23 +78,28 @@ class EyeRays(Protocol):
     """The eyes of all worlds, and the rays that start at them."""
 
     def fill(self, poses: Poses) -> None:
-        """Write the eyes of these worlds to the kernel's buffer."""
+        """Write the positions and orientations that the eyes have in these poses to the kernel's buffer."""
 
     def array(self) -> Array:
-        """Return the buffer of the eyes on the device, which the kernel reads."""
+        """Return the buffer, on the device, from which the kernel reads what `fill` wrote."""
 
     def directions(self, ways: np.ndarray, origins: np.ndarray | None = None) -> Directions:
         """Return the directions of all samples on the device, in the frame that `Directions` describes.
 
-        ways: directions of the samples in the eye's frame, (ray, 3)
-        origins: starting points in the eye's frame [m], (ray, 3), of free eyes; None: the pupil
+        ways: directions of the samples in the eye's frame, array (ray, 3)
+        origins: starting points of the samples in the eye's frame [m], array (ray, 3); None: all samples start at the
+            pupil. For upright eyes (see `Directions`), `origins` is ignored, as if it were None
         """
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
-        """Return the ray of a lane, inside the kernel.
+        """Return the ray of one lane of the kernel, which is one sample of one eye in one world.
 
-        rows: see `array`
+        The kernel calls this method, so all arguments and the result are Dr.Jit variables on the device.
+
+        rows: the return value of the method `array`, in rows of four floats. It contains the poses of all free eyes, or
+            the poses of the bodies of upright eyes
         along: directions of the samples
+        lane: the world, the eye and the sample of this ray
         samples: number of samples of an eye
         """
 

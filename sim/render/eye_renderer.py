@@ -1,4 +1,4 @@
-"""Rendering of all eyes in all worlds as one wavefront, by frozen kernels, with any tracer.
+"""Rendering of all eyes in all worlds together, by frozen (recorded) kernels, with any tracer.
 
 Directions and wavelengths are fixed. A call only uploads poses and launches the kernels that the first call recorded.
 """
@@ -47,13 +47,13 @@ class EyeRenderer:
 
     scene: the model and its eyes
     n_envs: number of worlds
-    fidelity: samples, depth layers and light; its number of bands must equal that of the scene
+    fidelity: accuracy of rendering, see `Fidelity`; it must have as many spectral bands as the scene
 
     Further attributes:
     eye, mounts, model: the scene's eye, mounts and model
     sensor: the sampled directions
     tracer: the method of tracing rays, see `sim.tracing.tracer.Tracer`
-    brightest: signal of a white surface that faces all directional lights at once, or of veiling light if it is larger
+    brightest: larger signal of two: a white surface that faces all directional lights at once, and veiling light
 
     One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
     with spectral lines for which the eye has too few bands.
@@ -103,7 +103,7 @@ class EyeRenderer:
 
     @property
     def _samples_per_receptor(self) -> float:
-        """Number of samples per receptor. Behind a pupil, areas around the receptors' squares are counted, too."""
+        """Number of samples per receptor. Behind a pupil, it includes areas beyond the rim of the retina."""
         return len(self.sensor.directions) / float(np.prod(self.eye.resolution))
 
     def _check_memory(self, n_envs: int, samples_per_receptor: float) -> None:
@@ -140,14 +140,13 @@ class EyeRenderer:
         """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32.
 
         poses: poses of every world: a list of their MjData after mj_forward or mj_step, or `sim.Poses`, arrays stacked
-            over worlds. The MjData of a single world need not be in a list. For built-in worlds, a
-            `WorldState` is also accepted
-        light: factors of all lights of each world, (env, band); None: lights as in the model
+            over worlds. A single world's MjData needs no list. For built-in worlds, a `WorldState` is also accepted
+        light: factors by which all lights of each world are multiplied, (env, band); None: lights as in the model
 
         Raises:
-            ValueError: the number of worlds or `light` is wrong; the poses belong to another model, are
-                not finite or have not been computed yet; or the worlds differ from the model in a part that is not in
-                `varied` (see `sim.ModelRenderer`).
+            ValueError: the number of worlds or `light` is wrong; the poses belong to another model, are not finite or
+                have not been computed yet; or geoms differ from the model that the argument `varied` of
+                `sim.ModelRenderer` does not name.
         """
         return self.launch(poses, light).wait()
 
@@ -162,11 +161,12 @@ class EyeRenderer:
         return self._launched(poses).then(lambda found: self._signals(found, factors))
 
     def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
-        """Start rendering some of the worlds; the signals are (len(worlds), eye, channel, height, width).
+        """Start rendering the worlds with the indices `worlds`; `wait` of the returned frame returns their signals.
 
-        `worlds` contains their indices. `poses` and `light` are those of all worlds, as in `signals`. Up to 8 of more
-        than 8 worlds are rendered in separate buffers, so that a frame of all worlds may be pending at the same time.
-        Otherwise, all worlds are rendered. The errors are those of `signals`, and a ValueError for an unknown world.
+        `poses` and `light` are given for all worlds, as in `signals`. If at most 8 indices are given and the renderer
+        has more than 8 worlds, separate buffers are used, so that a frame of all worlds may be pending at the same
+        time. Otherwise, all worlds are rendered. An unknown world is a ValueError; other errors are as in `signals`.
+        The signals are an array (index in `worlds`, eye, channel, height, width).
         """
         worlds = world_indices("worlds", worlds, self.n_envs)
         if not len(worlds) <= FEW < self.n_envs:
@@ -186,8 +186,8 @@ class EyeRenderer:
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
         """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32.
 
-        The unit is that of `sim.mirror`: a white surface that faces a light with `diffuse` = 1 has the spectrum of
-        D65, scaled to 1 at 560 nm. Errors: see `signals`.
+        The unit is chosen so that a white surface that faces a light with `diffuse` = 1 has the radiance 1 at 560 nm.
+        Its spectrum is that of D65. Errors: see `signals`.
         """
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())
@@ -202,7 +202,7 @@ class EyeRenderer:
         return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)
 
     def eye_frames(self, poses: Placed) -> EyeFrames:
-        """Return the pupils [m], (env, eye, 3), and the eyes' frames, (env, eye, 3, 3), in the world."""
+        """Return pupil positions [m], (env, eye, 3), and rotations of the eyes, (env, eye, 3, 3), in the world."""
         return self.scene.places.frames(self.scene.placed(poses))
 
     @cached_property
@@ -223,7 +223,7 @@ class EyeRenderer:
         return self.labels.flow(poses, later)
 
     def brightest_in(self, light: np.ndarray) -> float:
-        """Return the attribute `brightest` for lights that are multiplied by these factors, (band,)."""
+        """Return the attribute `brightest` for lights that are brighter by the factors `light`, array (band,)."""
         return float((self.eye.throughput * self.eye.spectral_bands.weights @ (self._white * light)).max())
 
     @property
@@ -256,7 +256,7 @@ class EyeRenderer:
         return recorded + (0 if labels is None else labels.recordings)
 
     def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
-        """Launch the kernels for the receptors' sums in these worlds, or the kernel `frozen` if it is given."""
+        """Start the kernel `frozen` or, by default, the kernels that sum the light over each receptor's rays."""
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 
@@ -296,5 +296,5 @@ class EyeRenderer:
         return self.sensor.receptor_sums(self._mixing, np.eye(self.eye.bands))
 
     def _components(self, found: np.ndarray) -> np.ndarray:
-        """Return a kernel's flat output as (layer, component, n), with n rays of all views, or n sums over rays."""
+        """Return a kernel's flat output as (layer, component, value). There is a value per ray or sum over rays."""
         return found.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)

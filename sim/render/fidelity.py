@@ -23,12 +23,17 @@ MOST_FRAMES = 10**6
 
 @dataclass(frozen=True)
 class Level:
-    """The level that was chosen for one stage, and the reason.
+    """One decision in the choice of a `Fidelity`, with its reason.
 
-    stage, level: names of the stage and of the level
-    why: the reason
-    predicted_error: error of a signal (root mean square); None if unknown. For the eyes' own bands it is an upper
-        bound: the largest error over measured reflectances and types of receptors. The bound may exceed the tolerance
+    The accuracy of rendering is chosen in stages: the number of spectral bands, the depth layers, the reflections of
+    light, the samples (rays or areas), and sometimes the frames per action. The options in a stage are its levels.
+
+    stage, level: names of the stage and of its chosen level, for example "light" and "bounce"
+    why: reason for this choice
+    predicted_error: error of a signal that this level causes (root mean square); None if it is unknown. If the
+        eyes keep the number of bands that they were built with, the error in the stage "bands" is an upper bound, which
+        may exceed the tolerance. This bound is the largest error over all types of receptors and over several surfaces:
+        measured reflectances and, in a medium, white and black
     """
 
     stage: str
@@ -42,23 +47,26 @@ class Fidelity:
     """Accuracy with which a world is rendered for given eyes. `print` shows it as a table.
 
     rays_per_receptor: average number of samples (rays or areas) per receptor, above 0 and at most 10⁷. With
-        samples="edges", it is the number for receptors at an edge. Behind a pupil it may be below 1, since receptors
-        share rays and may share areas.
-    bands: number of spectral bands, 1 to 4096, used instead of the eye's own; an eye allows at most 64
+        samples="edges", it is the number for receptors that see an edge. If the eye has a pupil, rays_per_receptor may
+        be below 1, because several receptors then use the same ray or area.
+    bands: number of spectral bands, 1 to 4096. It replaces the number of bands that the eye was built with. An eye in a
+        world has at most 64 bands, so a larger number cannot be rendered.
     depth: distances for which the eye has a PSF
     light: "direct": light of lamps after one reflection; "bounce": also after two reflections; "all": after any number
         of reflections, with samples="areas" only
     samples: "rays", "areas" or "edges". With "areas", each receptor's square is divided into rays_per_receptor
-        rectangles, and the mean light in each of them is computed in closed form. Behind a pupil, there are also
-        rectangles around the receptors, and receptors share larger rectangles if rays_per_receptor is below 1. Areas
-        need a world of upright walls, a floor and spheres. "edges" is adaptive edge sampling: four rays per receptor,
-        and rays_per_receptor rays if the signals of the four differ, or if a neighbouring receptor differs strongly. It
-        needs a perfect lens and direct light, and is chosen automatically only for user models.
+        rectangles, and the mean light in each of them is computed in closed form. If the eye has a pupil, there are
+        also rectangles outside the retina, along its rim, and receptors share larger rectangles if rays_per_receptor is
+        below 1. Areas need a world of upright walls, a floor and spheres. "edges" is adaptive edge sampling. A receptor
+        has four rays. It has rays_per_receptor rays instead if the signals of the four differ, or if its signal differs
+        strongly from that of a neighbouring receptor. Adaptive edge sampling needs a perfect lens and direct light, and
+        is chosen automatically only for user models.
     frames: number of rendered frames per action, for receptors with `dynamics`: a divisor of the number of physics
-        steps per action, at most 10⁶. None: environments choose the fewest whose error is allowed
+        steps per action, at most 10⁶. None: environments choose the smallest number with which the error of the signals
+        is allowed.
     tolerance: allowed error of a receptor's signal (root mean square), above 0; None if nothing was chosen. In adaptive
         edge sampling, rays whose signals differ by at most the tolerance count as equal.
-    levels: chosen level of each stage, with its reason
+    levels: decisions by which this fidelity was chosen, with their reasons; see `Level`
 
     Raises:
         ValueError: bands, rays_per_receptor, tolerance or frames is not a number or is out of range, light or samples
@@ -91,16 +99,17 @@ class Fidelity:
 
     @property
     def predicted_error(self) -> float | None:
-        """Error of a receptor's signal due to all stages (root mean square); None if no stage predicts one.
+        """Predicted error of a receptor's signal (root mean square); None if no error is known.
 
-        It includes the error of the bands, which may be an upper bound (see `Level`).
+        It combines the known errors due to bands, depth layers, light and samples, as the root of the sum of their
+        squares. The error due to the bands may be an upper bound (see `Level`).
         """
         known = [level.predicted_error for level in self.levels if level.predicted_error is not None]
         return math.hypot(*known) if known else None
 
     @property
     def why(self) -> str:
-        """Reasons for the chosen levels, one line per stage."""
+        """Reasons for the decisions about bands, depth layers, light and samples, one per line."""
         return "\n".join(f"{level.stage}: {level.why}" for level in self.levels) or "as requested"
 
     def __str__(self) -> str:
@@ -120,7 +129,9 @@ class Fidelity:
 
 
 def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
-    """Return the fidelity with this number of rays, direct light and the eyes' own bands; None for "auto".
+    """Return a fidelity with this number of rays per receptor; None for "auto".
+
+    The fidelity includes only light that is reflected once ("direct"). Its number of spectral bands is `eyes.bands`.
 
     Raises:
         ValueError: the value is neither a positive number nor "auto".

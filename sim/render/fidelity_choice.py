@@ -3,8 +3,8 @@
 By default, the allowed error is half of the receptors' noise. A brain could not distinguish such an error from the
 noise. Every stage has levels, ordered by cost. The cheapest level whose predicted error is allowed is chosen, and
 stored with the reason. The available levels and their errors depend on the kind of scene (`world_fidelity`,
-`model_fidelity`). The rule for choosing a level is the same for all scenes (`cheapest`). Environments without a given
-fidelity apply this rule (`sim.envs.prepared_task`), and so do user tasks with the setting "auto"
+`model_fidelity`). The rule for choosing a level is the same for all scenes (`cheapest`). It is used in environments for
+which the user specifies no fidelity (`sim.envs.prepared_task`), and in user tasks whose setting `fidelity` is "auto"
 (`sim.tasks.task_fidelity`).
 """
 
@@ -21,17 +21,18 @@ from sim.render.fidelity import Fidelity, Level
 
 
 class FidelityWarning(UserWarning):
-    """Warning that no available level keeps the error within the tolerance."""
+    """Warning that even the most accurate rendering available has an error above the tolerance."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """The chosen samples: rays, areas or adaptive edge sampling.
+    """The samples with which a view is rendered: their kind and number, with the predicted error.
 
-    kind: "rays", "areas" or "edges"
-    light, level: chosen levels of light and of samples
+    kind: "rays", "areas" or "edges" (adaptive edge sampling: more rays for receptors that see an edge)
+    light: record of how many reflections of light are followed, with the error due to further reflections
     number: number of samples per receptor
-    enough: True if the error is at most the allowed one
+    level: the same kind and number as text for reports, with the predicted error and the reason for the choice
+    enough: True if the error due to the samples is at most the allowed one
     """
 
     kind: str
@@ -42,16 +43,17 @@ class Samples:
 
     @property
     def error(self) -> float:
-        """Error due to the samples and to the omitted light."""
+        """Error of a signal due to the samples and to the reflections that are not followed (root mean square)."""
         return math.hypot(self.light.predicted_error or 0, self.level.predicted_error or 0)
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """Allowed error of the samples (root mean square).
+    """Upper limits of the root mean square error that the samples (rays or areas) may cause in a signal.
 
-    error: allowed error if some light is omitted, which also uses a part of the tolerance
-    without_light: allowed error if no light is omitted
+    error: limit if some reflections of light are omitted. It is smaller than `without_light`, because the omitted light
+        already causes a part of the error that is allowed for all causes together.
+    without_light: limit if no light is omitted
     """
 
     error: float
@@ -60,9 +62,11 @@ class Allowed:
 
 @dataclass(frozen=True)
 class Shares:
-    """Fractions of the tolerance that the stages before the samples may use.
+    """Limits of the errors due to bands, depth layers and omitted light, as fractions of the tolerance.
 
-    Errors of different stages are independent, so their squares add up. The samples may use the remainder.
+    The tolerance is the allowed error of a signal. These three errors and the error of the samples (rays or areas) are
+    independent, so their squares add up. The limit for the samples is the part of the tolerance that the three others
+    leave.
     """
 
     bands: float
@@ -70,11 +74,13 @@ class Shares:
     light: float
 
     def left(self, allowed: float, has_layers: bool, light: float) -> Allowed:
-        """Return the remainder of an allowed error, which the samples may use.
+        """Return the largest error that the samples (rays or areas) may cause.
 
-        allowed: allowed error of all stages together
-        has_layers: True if the eye has depth layers
-        light: error due to the omitted light
+        It is the part of the allowed error that remains after the errors due to bands, depth layers and omitted light.
+
+        allowed: allowed error of a signal due to all causes together
+        has_layers: True if the eye has depth layers, which are distances for which it has a PSF
+        light: error due to the reflections of light that are omitted
         """
         spent = self.bands**2 + (self.depth**2 if has_layers else 0)
         for_light = min(light / allowed, self.light) ** 2
@@ -82,11 +88,13 @@ class Shares:
 
 
 class Stages(Protocol):
-    """Levels of fidelity that a scene offers, and their errors.
+    """The stages in which the accuracy of rendering a scene is chosen, one method per stage.
+
+    The stages are the spectral bands, the depth layers, the reflections of light, and the samples (rays or areas).
 
     eye: its receptor noise determines the allowed error
     allowed: allowed error of a signal due to all stages (root mean square)
-    shares: fractions of the allowed error; None: each stage may use all of it
+    shares: fractions of the allowed error that single stages may use; None: each stage may use all of it
 
     In the methods, `allowed` is the largest error that the stage may cause.
     """
@@ -96,22 +104,31 @@ class Stages(Protocol):
     shares: Shares | None
 
     def bands(self) -> Level:
-        """Return the level for the eye's own bands, with their predicted error if it is known."""
+        """Return a record of the number of spectral bands, and of the error due to this number if the error is known.
+
+        There is no choice in this stage: the number is that of the eye.
+        """
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
-        """Return the depth layers for which the eye has a PSF, and the chosen level (None if there was no choice)."""
+        """Return the depth layers, and a record of their choice with the reason (None if there was no choice).
+
+        Depth layers are the distances for which the eye has a PSF.
+        """
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
-        """Return the level of light: which reflections are followed."""
+        """Return a record of how many reflections of light are followed, why, and the error due to all others."""
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """Return the kind and number of samples."""
 
 
 def cheapest(stages: Stages) -> Fidelity:
-    """Return the fidelity with the eye's own bands, and the cheapest level with an allowed error of each other stage.
+    """Return the cheapest fidelity (accuracy of rendering) whose predicted error is allowed.
 
-    If these levels exceed the allowed error, a FidelityWarning states by how much.
+    The spectral bands are not chosen, but are those of the eye. The settings `depth`, `light` and `samples` of a
+    Fidelity are chosen one after the other. For each of them, the result is the cheapest option whose predicted error
+    is allowed. If no available option is accurate enough, a FidelityWarning states by how much the allowed error is
+    exceeded.
     """
     allowed, shares = stages.allowed, stages.shares
     depth, depth_level = stages.depth(allowed * (shares.depth if shares else 1))

@@ -1,6 +1,7 @@
-"""The first stages in the choice of a fidelity for a built-in world: bands, depth layers and light.
+"""Choice of spectral bands, depth layers and light for a built-in world, before the choice of rays or areas.
 
-Each stage has levels, ordered by cost. The cheapest level whose error is allowed is chosen, with a reason.
+These are the first stages in the choice of a fidelity, the accuracy of rendering. Each stage has levels, ordered by
+cost. The cheapest level whose error is allowed is chosen, with a reason.
 """
 
 from __future__ import annotations
@@ -28,13 +29,15 @@ NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the 
 
 
 def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = None) -> tuple[int, Level]:
-    """Return the smallest number of bands with an allowed error for surfaces of any colour, and its `Level`.
+    """Return the smallest number of spectral bands that is accurate enough, and a record of this choice.
 
-    If no number is accurate enough for the surfaces, return the eye's own number. If some numbers are accurate enough
-    for the surfaces, but none of them for the medium, return 64.
+    A number is accurate enough if the error is allowed for surfaces of any colour up to white. If no number is accurate
+    enough for the surfaces, return the number of bands that the eye has. If some numbers are accurate enough for the
+    surfaces, but none of them for the medium, return 64.
 
     allowed: allowed error of a signal
-    medium: if it is given, the error for white and black in it must also be allowed
+    medium: water or air that fills the world. If it is given, the error for white and for black surfaces that are seen
+        through it must also be allowed
     """
     within = min(max(allowed / eye.throughput, 1e-6), 0.5)  # the tolerances that an Eye accepts
     try:
@@ -54,10 +57,10 @@ def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = 
 
 
 def own_bands(world: World, eye: optics.Eye) -> Level:
-    """Return the level for the eye's own bands, with the error for measured reflectances and for the medium.
+    """Return a record of the spectral bands that the eye has, with the error that they cause.
 
-    The error for the medium is that of white and black surfaces seen through it. For RGB colours in clear air, the
-    error is unknown.
+    The error is the larger of two: the error for the world's measured reflectances, and the error for white and black
+    surfaces that are seen through the medium. For RGB colours in clear air, the error is unknown.
     """
     spectra = measured(world.model, world.spectra)
     errors, cases = [], []
@@ -73,17 +76,19 @@ def own_bands(world: World, eye: optics.Eye) -> Level:
 
 
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
-    """Return the smallest number of depth layers with an allowed error, and its `Level`.
+    """Return the smallest number of depth layers that is accurate enough, and a record of this choice.
 
-    For a perfect lens, or if the bound below is allowed, the result is a single PSF for light from infinity. Otherwise,
-    the errors of several numbers of layers are computed in random views. If none is accurate enough, the result is the
-    largest number. If the PSFs of the layers cannot be computed, the result is one PSF for the mean depth.
+    Depth layers are distances for which the eye has a PSF. A perfect lens needs only a single PSF, for light from
+    infinity. Other eyes, too, get only this PSF if it is accurate enough, that is, if an upper bound of the error that
+    it causes is at most `allowed`. Otherwise, the errors of several numbers of layers are computed in random views, and
+    the smallest number whose error is allowed is chosen. If none is accurate enough, the result is the largest number.
+    If the PSFs of the layers cannot be computed, the result is one PSF for the mean depth.
 
-    Consider light that passes the pupil at the position p. On the retina, light from a point at the distance z is
-    displaced by (Δx, Δy) = f p/z relative to light from infinity, with the focal length f. The means of |Δx| and |Δy|
-    over a pupil of radius R are both 4/(3π) f R/z. Divided by a receptor's width and height, respectively, they add up
-    to the fraction of the receptor's field that moves. This fraction is an upper bound of the error in scenes that are
-    not brighter than white.
+    The upper bound is derived as follows. Consider light that passes the pupil at the position p. On the retina, light
+    from a point at the distance z is displaced by (Δx, Δy) = f p/z relative to light from infinity, with the focal
+    length f. The means of |Δx| and |Δy| over a pupil of radius R are both 4/(3π) f R/z. Divided by a receptor's width
+    and height, respectively, they add up to the fraction of the receptor's light that is displaced across its border.
+    This fraction is an upper bound of the error in scenes that are not brighter than white.
     """
     if eye.pupil is None:
         return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens does not blur")
@@ -106,11 +111,12 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
 
 
 def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
-    """Return the level "direct" if a second reflection adds little, otherwise "bounce", with two reflections.
+    """Return a record of how many reflections of light are followed, with the error due to further reflections.
 
-    In the second case, the error due to further reflections is estimated from a geometric series. The ratio of each
-    further reflection to the previous one is assumed to be the ratio of the second reflection to direct light, but at
-    most 1/2. If the tracer cannot follow a second reflection, the result is direct light with an unknown error.
+    The choice is "direct" (one reflection) if light that is reflected twice adds at most `allowed`, otherwise "bounce"
+    (two). After "bounce", the further reflections are assumed to be a geometric series: each is weaker than the one
+    before by the same factor. This factor is the second reflection divided by direct light, but at most 1/2. If the
+    tracer cannot follow a second reflection, the result is direct light with an unknown error.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

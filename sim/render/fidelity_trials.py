@@ -1,8 +1,8 @@
-"""Trials of sampling methods in views of a world, before a renderer of the world is built.
+"""Trial renderings of a world, which determine the errors of sampling methods before the renderer is built.
 
 A trial renders some of an eye's receptors and compares their signals with signals from many more rays. The errors of
-rays and areas are computed for the populations in `sim.render.populations`, those of depth layers only for random
-receptors. All draws have fixed seeds, so the same world and eyes give the same result.
+rays and areas are computed for random receptors and, if there are objects, also for receptors that see an object
+(`sim.render.populations`), the errors of depth layers only for random receptors. Seeds are fixed, so errors repeat.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class FidelityTrials:
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Return a function that maps rays per receptor to the root mean square error of signals.
 
-        If there are two populations of receptors (`sim.render.populations`), the larger of their errors is returned.
+        In worlds with objects, the result is the larger of the errors for random receptors and for views of objects.
 
         Raises:
             NoRaysError: raised by the returned function if a receptor has no rays.
@@ -93,7 +93,10 @@ class FidelityTrials:
         return error
 
     def have_areas(self, *lights: str) -> bool:
-        """Return whether this eye and this world permit area sampling with all of these levels of light."""
+        """Return whether this eye and this world permit area sampling with light of all these kinds.
+
+        lights: "direct" (light after one reflection), "bounce" (one or two) or "all" (any number of reflections)
+        """
         if self._eye.lattice is not None:
             return False
         try:
@@ -104,7 +107,10 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """Return a function that maps areas per receptor to errors, with the reference's noise; see `errors`."""
+        """Return a function that maps the number of areas per receptor to the root mean square error of signals.
+
+        The reference is computed with many random rays, whose noise is included. Objects count as in `errors`.
+        """
         populations = self._populations(sampling)
         truths = [
             self._signals(self._truth(sampling, p.receptors), sampling.depth, light, p.views, TRUE_RAYS)
@@ -122,16 +128,16 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals."""
+        """Return whether receptors may share areas without losing the differences between neighbouring receptors."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:
-        """Return the number of rendered areas per receptor. Behind a pupil, it includes areas around the receptors."""
+        """Return the number of areas per receptor, including the areas beyond the rim of the retina."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
     def _truth(self, sampling: EyeSampling, receptors: np.ndarray) -> Trial:
-        """Return many rays as a reference for areas. Behind a pupil, they are drawn for these receptors only."""
+        """Return many rays for these receptors, as a trial whose signals are the reference for area sampling."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
             return sampling.trial(int(np.clip(of_a_view // len(receptors), *TRUE_AREA)), receptors)
@@ -149,7 +155,7 @@ class FidelityTrials:
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
         """Return root mean squares of the signals due to the second reflection and to direct light.
 
-        They are for the population in which the second reflection is larger.
+        Both are for random receptors or for receptors that see an object, whichever makes the first value larger.
 
         Raises:
             ValueError: light cannot be followed after the first reflection.
@@ -164,7 +170,7 @@ class FidelityTrials:
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
         """Return, for each n in `counts`, the root mean square error of signals with n depth layers.
 
-        The reference has the `finest` layers, and the n layers must be among them. The rays are always the same.
+        The reference has the same rays and all `finest` layers. Each n must select evenly spaced ones of them.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -183,7 +189,7 @@ class FidelityTrials:
         return found
 
     def distances(self) -> np.ndarray:
-        """Return distances of hit points along the eyes' axes in all views [m], sorted; infinite without a hit."""
+        """Return the depth of the surface that each ray hits, along the eye's axis [m], sorted; infinite for no hit."""
         _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
         return np.sort(np.array(z))
 
@@ -192,11 +198,10 @@ class FidelityTrials:
     ) -> np.ndarray:
         """Return signals (view, channel, receptor) in as many of the views as the number of rays allows.
 
-        trial: samples of each eye, and their weights
-        depth: layers among which light is divided
-        light: level of light
-        views: views of the signals; None: the views of the trials
-        most: largest number of rays in all views together, unless fewer than 12 views would remain
+        trial: samples (rays or areas), with their weights in the signals
+        depth: layers, to which light is assigned by the distance of its surface; light: reflections that are followed
+        views: places and directions of the eyes; None: the random views of this object
+        most: largest total number of rays, which limits the number of views; at least 12 views are rendered anyway
         """
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
@@ -214,15 +219,14 @@ class FidelityTrials:
     def _factors(self, light: str, trial: Trial) -> np.ndarray:
         """Return the contribution of component k of the light in band b to channel c: mixing[c, b] basis[k, b].
 
-        The shape is (channel, component, band). `mixing` is the weight of a band, times the aperture's throughput. With
-        weights W of ray p, receptor r and depth layer l, the signals are signal_c[r] = sum_b mixing[c, b] sum_l sum_k
-        basis[k, b] sum_p W_lb[r, p] light_lk[p].
+        The shape is (channel, component, band). `mixing` is a band's weight times the aperture's throughput. Signals
+        are sum_bklp mixing[c, b] basis[k, b] W_lb[r, p] light_lk[p] for the weight W of ray p, receptor r and layer l.
         """
         basis = (self._scene.areas if trial.extent else self._scene.tracers.tracer_for)(light).basis
         return self._eye.aperture_throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
 
     def _see_areas(self, views: RandomViews, trial: Trial, light: str, depth: DepthLayers) -> list[np.ndarray]:
-        """Return the components of the mean light in a trial's areas, for each depth layer, flat (view, area)."""
+        """Return the mean light in all areas: a flat array (view, area) per depth layer and component of light."""
         tracer = self._scene.areas(light)
         origins, directions = views.in_agents(self._eyes, trial.directions)
         n = len(trial.directions)
@@ -271,17 +275,15 @@ class FidelityTrials:
 
 
 def _in_fours(trial: Trial) -> np.ndarray:
-    """Return four numbers per ray: its bounce sample, and a sample for a second reflection, (ray, 4)."""
+    """Return two numbers that determine the first bounce of each ray, and two for the second, (ray, 4)."""
     return np.concatenate([trial.bounce_samples, np.random.default_rng(SECOND).random(trial.bounce_samples.shape)], 1)
 
 
 def _summed(weights: np.ndarray, layers: np.ndarray) -> np.ndarray:
-    """Return sums over depth layers, components and rays, (view, channel, receptor).
+    """Return signals (view, channel, receptor): weighted light, summed over depth layers, components and rays.
 
-    The sums are one matrix product, since `np.einsum` takes up to twice as long.
-
-    weights: (channel, layer, component, receptor, ray)
-    layers: (layer, component, view, ray)
+    The weights are (channel, layer, component, receptor, ray), and the light (`layers`) is (layer, component, view,
+    ray). `np.einsum` takes up to twice as long.
     """
     (channels, receptors), views = (weights.shape[0], weights.shape[3]), layers.shape[2]
     of_receptors = np.moveaxis(weights, 3, 1).reshape(channels * receptors, -1)

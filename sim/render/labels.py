@@ -58,12 +58,12 @@ class Labels:
     def depth(self, poses: Placed) -> np.ndarray:
         """Return the depth [m], along the eye's axis, of the point that each receptor's centre sees.
 
-        The shape is (env, eye, height, width), float32. The depth is infinite without a hit.
+        The shape is (env, eye, height, width), float32. The depth is infinite where the receptor's centre sees no geom.
         """
         return self._at_centres(self._distances, self._scenes, poses)
 
     def ids(self, poses: Placed) -> np.ndarray:
-        """Return the id of the geom at each receptor's centre, (env, eye, height, width) int32; -1 without a hit."""
+        """Return the id of the geom at each receptor's centre, (env, eye, height, width) int32; -1 if there is none."""
         scene = self.scene.scene
         apart, geoms = scene.one_shape_per_geom
         found = self._at_centres(self._hits, Scenes(apart, self._scenes.meshes), poses).astype(int)
@@ -73,7 +73,7 @@ class Labels:
         """Return the optic flow between two moments: its components to the right and down [receptors].
 
         It is the motion on the retina of the point that each receptor's centre sees: (env, eye, 2, height, width)
-        float32. It is NaN without a hit, or if the point is not in front of the eye at the later moment.
+        float32. It is NaN if the centre sees no geom, or if the point is not in front of the eye at the later moment.
         """
         moments = self.scene.placed(poses), self.scene.placed(later)
         self.scene.check_poses(moments[1], self.n_envs)
@@ -81,7 +81,7 @@ class Labels:
         return flow_between(self.eye, self.depth(moments[0]), self.ids(moments[0]), moments, frames)
 
     def eye_frames(self, poses: Placed) -> EyeFrames:
-        """Return positions of the pupils [m], (env, eye, 3), and the eyes' frames, (env, eye, 3, 3), in the world."""
+        """Return pupil positions [m], (env, eye, 3), and rotations of the eyes, (env, eye, 3, 3), in the world."""
         return self.scene.places.frames(self.scene.placed(poses))
 
     @property

@@ -35,12 +35,13 @@ class LightFactors:
 
     @property
     def is_level(self) -> bool:
-        """True if all bands of a world have the same factor, so that it can multiply the signals."""
+        """True if each world has the same factor in all its bands. Signals can then be multiplied by this factor."""
         return bool((self.bands == self.bands[:, :1]).all())
 
     @property
     def level(self) -> np.ndarray:
-        """Common factor of all bands in each world, (env, 1, 1, 1, 1), to multiply signals."""
+        """Factor by which the signals of each world are multiplied, (env, 1, 1, 1, 1). It is the factor of all its
+        bands."""
         return self.bands[:, :1, None, None, None]
 
     def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A check of the memory that rendering needs, before it starts.
+"""A check, before rendering starts, that its arrays fit into memory.
 
 Without this check, the system would kill the process without a message.
 """
@@ -30,8 +30,10 @@ class Demand:
     worlds: number of worlds
     eyes: number of eyes of one agent
     resolution: receptors (height, width) of an eye
-    planes: number of values that are stored for every ray: components of light times depth layers
-    weights: number of sets of weights that are stored: bands times depth layers; 0 without a pupil
+    planes: number of values that are stored for every ray, which is the number of components of light times that of
+        depth layers
+    weights: number of weights that each ray has for each receptor, which is the number of bands times that of depth
+        layers; 0 without a pupil
     """
 
     rays_per_receptor: float
@@ -53,7 +55,11 @@ class Demand:
 
     @property
     def bytes(self) -> float:
-        """Bytes of the kernel's array, of the rays, and of the weights from all rays to one row of receptors."""
+        """Number of bytes that rendering needs, at least.
+
+        They are for the array that the rendering kernel writes, for the directions and starting points of the rays, and
+        for the weights of all rays in the signals of one row of receptors.
+        """
         return 4 * self.elements + self.rays * (RAY_BYTES * self.eyes + 16 * self.weights * self.resolution[1])
 
 
@@ -78,10 +84,11 @@ def check_memory(demand: Demand) -> None:
 
 
 def available() -> float:
-    """Return the bytes that are available without swapping: the smaller number of the machine and its container.
+    """Return the number of bytes that are available without swapping.
 
-    If the system does not report the machine's available bytes, its total memory is used; infinity if that is unknown,
-    too.
+    It is the smaller of two numbers: the bytes available on the machine, and those that the limit of its container
+    leaves. If the system does not report the machine's available bytes, its total memory is used. If that is unknown,
+    too, it counts as infinite.
     """
     return min(_of_machine(), _of_container(CGROUPS))
 
@@ -101,9 +108,9 @@ def _of_machine() -> float:
 
 
 def _of_container(root: Path) -> float:
-    """Return the free bytes below the limits of control groups; infinite without limits.
+    """Return how many bytes the memory limits of control groups leave; infinite without limits.
 
-    The result is at least 1, because a group may exceed its limit.
+    If a group has reached or exceeded its limit, the result is 1, because the caller divides by it.
     """
     free = math.inf
     for limit, used, statistics, prefix in _GROUPS:
@@ -116,7 +123,7 @@ def _of_container(root: Path) -> float:
 
 
 def _of_files(statistics: Path, prefix: str) -> int:
-    """Return the bytes of cached files, which the system frees when memory is needed."""
+    """Return the number of bytes in cached files. The system frees these bytes when memory is needed."""
     try:
         lines = [line.split() for line in statistics.read_text("ascii").splitlines()]
         return sum(int(size) for name, size in lines if name in (f"{prefix}active_file", f"{prefix}inactive_file"))

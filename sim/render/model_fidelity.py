@@ -1,9 +1,10 @@
-"""Choice of the fewest rays for eyes on a user model, from trials at given moments.
+"""Choice of the number of rays for eyes on a user model: the smallest with an allowed error at given moments.
 
 A moment is a set of poses. Each moment is rendered with increasing numbers of rays, and with many rays as a reference.
-A receptor with a uniform field needs only one ray. If most receptors have a uniform field, they would hide the error of
-the others. The error is therefore computed only over receptors whose error with the smallest number of rays exceeds a
-tenth of the allowed error.
+A receptor needs only one ray if the light is the same in all parts of its visual field (a uniform field). If most
+receptors have a uniform field, a mean error over all receptors would be small, even if the others had large errors. The
+error is therefore computed only over receptors whose error with the smallest number of rays exceeds a tenth of the
+allowed error.
 """
 
 from __future__ import annotations
@@ -47,9 +48,13 @@ SPLIT = 0.1
 
 @dataclass(frozen=True)
 class Trials:
-    """Errors of signals over the receptors without a uniform field (root mean square), by rays per receptor.
+    """Errors of signals for several numbers of rays per receptor.
 
-    share: fraction of all receptors that do not have a uniform field
+    Receptors are left out if the smallest number of rays already gives them nearly the right signal. The light in the
+    visual field of such a receptor is almost uniform.
+
+    errors: root mean square error over the other receptors, for each number of rays per receptor
+    share: fraction of all receptors that are not left out
     """
 
     errors: Mapping[float, float]
@@ -69,17 +74,21 @@ def choose_model_fidelity(
     light: str = lighting.DIRECT,
     medium: optics.TurbidMedium | str | None = None,
 ) -> Fidelity:
-    """Return the fidelity for `ModelRenderer` that has the fewest rays with an error within the tolerance.
+    """Return a fidelity (accuracy of rendering) for `ModelRenderer`, with the smallest sufficient number of rays.
 
-    If there is none, a FidelityWarning states by how much the tolerance is exceeded. Bands are the eye's own.
+    Increasing numbers of rays are tried until the error is within the tolerance. If even the largest number is not
+    enough, a FidelityWarning states by how much the tolerance is exceeded. The number of spectral bands is not chosen:
+    it is the number that the eye has.
 
     model, eye, mounts: see `ModelRenderer`
     poses: poses at one or more moments that are typical of later use, as a list of MjData or as `sim.Poses`
-    tolerance: allowed error of a signal (root mean square), over receptors whose field is not uniform; None: half of
-        the eye's `noise_sigma`, but at least 0.005 times the signal of a white surface
+    tolerance: allowed error of a signal (root mean square), over the receptors that need more than the smallest number
+        of rays, because the light in their visual field is not uniform; None: half of the eye's `noise_sigma`, but at
+        least 0.005 times the signal of a white surface
     groups, spectra, varied, medium: see `ModelRenderer`
-    light: "direct" or "bounce", see `Fidelity`; "auto": "bounce" if direct light alone has an error above the tolerance
-        at these moments, over receptors that bounced light reaches
+    light: "direct" (one reflection) or "bounce" (up to two), see `Fidelity`. "auto" considers the receptors that light
+        reaches after two reflections in these poses. If their error without this light is above the tolerance, "bounce"
+        is chosen, otherwise "direct"
 
     Raises:
         ValueError: the tolerance is not positive and finite, `light` is unknown, or ModelRenderer refuses an argument.
@@ -104,10 +113,12 @@ def choose_model_fidelity(
 
 
 class ModelStages:
-    """Levels of fidelity for a model, tried at moments of its worlds; see `Stages`.
+    """The stages in which the accuracy of rendering a user model is chosen, see `Stages`.
+
+    Errors are computed by rendering the model in given poses.
 
     scene: the model and its eyes
-    moments: poses in which signals are compared
+    moments: poses for which errors are computed, one or more sets of them
     allowed: allowed error of a signal (root mean square)
     light: see `choose_model_fidelity`
     """
@@ -120,7 +131,11 @@ class ModelStages:
         self._cached_signals = cache(self._signals)
 
     def _signals(self, rays: float, light: str) -> np.ndarray:
-        """Return the noise-free signals at all moments, with this number of rays and this level of light."""
+        """Return the noise-free signals at all moments (sets of poses) at which errors are computed.
+
+        rays: number of rays per receptor
+        light: reflections that are followed: "direct" (one) or "bounce" (up to two)
+        """
         fidelity = _with(rays, self.eye, self.allowed, light)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MirrorWarning)  # the final renderer repeats the warnings
@@ -158,7 +173,9 @@ class ModelStages:
 
 
 def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Level:
-    """Return the level of light: the requested one or, for "auto", the one that the allowed error requires.
+    """Return a record of how many reflections of light are followed: "direct" (one) or "bounce" (up to two).
+
+    The choice is the requested one or, for "auto", "direct" if its error is allowed and otherwise "bounce".
 
     truth: function that returns signals with many rays in "direct" or "bounce" light
     """
@@ -174,10 +191,11 @@ def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Le
 
 
 def _with(rays: float, eye: WorldEye, allowed: float, light: str) -> Fidelity:
-    """Return the fidelity with this number of rays.
+    """Return a fidelity with this number of rays per receptor.
 
-    In direct light through a perfect lens it uses adaptive edge sampling if that saves rays, except for the fidelity
-    with which the others are compared.
+    The fidelity prescribes adaptive edge sampling if the light is direct, the eye has a perfect lens, and this kind of
+    sampling saves rays. The exception is the fidelity with the most rays, which is the reference for the errors of all
+    others.
     """
     at_edges = light == lighting.DIRECT and _is_perfect(eye) and rays < PERFECT_TRUTH
     at_edges = at_edges and edges_pay(eye.resolution, rays)
@@ -185,11 +203,11 @@ def _with(rays: float, eye: WorldEye, allowed: float, light: str) -> Fidelity:
 
 
 def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: float, allowed: float) -> Trials:
-    """Return the errors of increasing numbers of rays, up to the first error that is allowed.
+    """Return the errors of signals for increasing numbers of rays, up to the first error that is allowed.
 
-    seen: function that maps rays per receptor to signals (env, eye, channel, height, width)
+    seen: function that maps a number of rays per receptor to signals, array (env, eye, channel, height, width)
     ladder: numbers of rays per receptor to try, in ascending order
-    truth: number of rays per receptor of the signals with which all others are compared
+    truth: number of rays per receptor in the reference. Errors are differences from the signals of the reference
     allowed: largest allowed error of a signal
     """
     right = seen(truth)

@@ -26,16 +26,19 @@ SIXTEEN = 16  # rays per receptor
 
 
 class ModelRenderer(EyeRenderer):
-    """A renderer of many worlds of one model, with eyes of one kind that are mounted anywhere on it.
+    """A renderer of many worlds that share one MuJoCo model; eyes of one kind are mounted anywhere on the model.
 
     model: an MjModel, or a source that compiles to one (`sim.mirror`)
-    eye: optics and retina of all eyes (`optics.Eye`), or a `sim.CompoundEye`; the fidelity's bands replace its bands
+    eye: optics and retina of all eyes (`optics.Eye`), or a `sim.CompoundEye`; the number of bands in `fidelity` is used
+        instead of the eye's own
     mounts: places of the eyes on the model, one or more `sim.Mount`
     n_envs: number of worlds
     fidelity: samples, bands, depth layers and light. None: 16 rays per receptor, direct light of lamps, and the eye's
         own bands, 4 by default. light="bounce" adds light after a second reflection, and the light of the sky and of
-        glowing geoms. samples="edges" traces all rays only where the first four differ; it needs a perfect lens and
-        direct light. samples="areas" uses closed forms instead of rays, if the model has them
+        glowing geoms. samples="edges" first traces four rays per receptor, and traces the full number of rays only if
+        those four differ or a neighbouring receptor differs strongly; it needs a perfect lens and direct light.
+        samples="areas" computes mean light by closed forms instead of rays; it needs a model of upright walls, a floor
+        and spheres
     groups: visible geom groups
     spectra: reflectances of materials and emission of lights by name, instead of their colours, see `sim.mirror`
     varied: names of geoms whose size or colour may differ between worlds. The poses that are rendered then contain the
@@ -44,8 +47,8 @@ class ModelRenderer(EyeRenderer):
     tracer: "mitsuba" (any shapes), "closed_form" (upright walls, a floor and spheres), or "auto": the closed form if
         the model has one. Compound eyes need "mitsuba". The tracer in use is in `.tracer.name`
     medium: water or air between surfaces and eyes, see `sim.build_world`
-    brightest: attribute, the signal of a white surface that faces all directional lights at once, or of veiling light
-        if it is larger
+    brightest: attribute, the larger of two signals: that of a white surface that faces all directional lights at once,
+        and that of veiling light
 
     One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
     with spectral lines for which the eye has too few bands.

@@ -1,7 +1,7 @@
 """The simplest renderer: one world, one ray per receptor, a perfect lens, and direct light of lamps.
 
 Read this file from top to bottom. `BatchedRenderer` computes the same for all worlds at once. It can also trace many
-rays per receptor, and render eyes with pupils. A test compares the two.
+rays per receptor, and render eyes with pupils. A test compares this renderer with `BatchedRenderer`.
 """
 
 from __future__ import annotations

@@ -28,10 +28,11 @@ def receptor_centres(eye: optics.Eye) -> np.ndarray:
 def flow_between(
     eye: optics.Eye, depth: np.ndarray, ids: np.ndarray, moments: tuple[Poses, Poses], frames: tuple[Frames, Frames]
 ) -> np.ndarray:
-    """Return how far the point that each receptor sees moves in the image, (world, eye, 2, height, width) float32.
+    """Return, for each receptor, how far the image of the point that it sees moves between two moments.
 
-    The components are to the right and down [receptors], from the first to the second moment. They are NaN if there is
-    no such point, or if the point is not in front of the eye at the second moment.
+    The flow is the displacement from the first to the second moment, to the right and down [receptors]. It is NaN if a
+    receptor sees no point, or if the point is not in front of the eye at the second moment. The result is an array
+    (world, eye, 2, height, width) float32.
 
     depth, ids: depth and geom that each receptor's centre sees at the first moment, (world, eye, height, width)
     moments: poses at both moments

@@ -24,7 +24,7 @@ class PendingFrame:
         self._taken = False
 
     def settle(self) -> None:
-        """Wait until the device has finished this frame; the values are stored for `wait`."""
+        """Wait until the device has finished this frame, and keep its values for the method `wait`."""
         if self._read is not None:
             read, self._read = self._read, None
             self._values = read()
@@ -53,13 +53,13 @@ def settled(values: np.ndarray) -> PendingFrame:
 
 
 class FrameSlot:
-    """The only frame that may be pending in a kernel's buffers."""
+    """A kernel's pending frame, of which there is at most one, because every frame uses the same buffers."""
 
     def __init__(self) -> None:
         self._under_way: PendingFrame | None = None
 
     def clear(self) -> None:
-        """Read the pending frame, so that the buffers may be written."""
+        """Wait for the pending frame and read its values, so that the next frame may overwrite the kernel's buffers."""
         if self._under_way is not None:
             self._under_way.settle()
             self._under_way = None

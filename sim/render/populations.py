@@ -1,9 +1,10 @@
-"""Populations of views and receptors for which the errors of trials are computed.
+"""Sets of views and receptors (populations) for which errors of rendering are computed.
 
-There are two: random receptors in views from random places and, in worlds with objects, receptors that see an object,
-in views with an object nearby. The second is separate because objects decide how an episode ends. Most receptors see
-floor and walls, and would hide errors at objects. All draws have fixed seeds, so the same world and eyes give the same
-populations.
+To test a way of rendering, the signals of a few receptors in some views are computed and compared with a reference.
+There are two populations. The first contains random receptors in views from random places. The second, in worlds with
+objects, contains receptors that see an object, in views with an object nearby. It is separate because objects decide
+how an episode ends. Most receptors see floor and walls, and would hide errors at objects. All draws have fixed seeds,
+so the same world and eyes give the same populations.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ ON_OBJECT = 0.02  # a receptor sees an object that fills more than this fraction
 
 @dataclass(frozen=True)
 class Population:
-    """Views, and the receptors whose errors are computed in them.
+    """Views of a world through single eyes, and the receptors whose signals are computed in each view to find errors.
 
     receptors: indices of the receptors, row by row
-    counted: True if a receptor counts in a view, (view, receptor)
+    counted: True if the receptor's error in this view is included in the mean error, (view, receptor)
     """
 
     views: RandomViews
@@ -34,22 +35,32 @@ class Population:
     counted: np.ndarray
 
     def rms(self, error: np.ndarray) -> float:
-        """Return the root mean square of an error (view, channel, receptor) over this population; 0 if it is empty."""
+        """Return the root mean square of errors of signals, over the pairs of view and receptor that `counted` marks.
+
+        In views near objects, for example, only the receptors that see an object are marked. The result is 0 if nothing
+        is marked.
+
+        error: error of each signal, array (view, channel, receptor)
+        """
         counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
         return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 
 
 def everywhere(scene: WorldScene, views: int) -> Population:
-    """Return random receptors in this number of views from random places."""
+    """Return a given number of views from random places, and random receptors, which all count in every view.
+
+    views: number of views
+    """
     receptors = _drawn(np.ones(int(np.prod(scene.eyes.resolution))))
     counted = np.ones((views, len(receptors)), bool)
     return Population(random_views(scene.world, scene.eyes, views), receptors, counted)
 
 
 def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int) -> Population:
-    """Return views near objects, and random receptors, counted in those views in which they see an object.
+    """Return views near objects, and random receptors that see an object in some of them.
 
-    In a wide eye, an object fills few receptors. Receptors that often see an object are therefore drawn more often.
+    A receptor counts only in the views in which it sees an object. In an eye with a wide field, an object fills few
+    receptors. Receptors that often see an object are therefore drawn with a higher probability.
 
     views: number of views
     rays: number of rays, through all receptors together, that test which receptors see an object

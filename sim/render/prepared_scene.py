@@ -1,4 +1,7 @@
-"""A model prepared for given eyes: built once, for choosing a fidelity and for rendering."""
+"""A MuJoCo model and its eyes, prepared once for rendering.
+
+The same prepared scene serves to choose the accuracy of rendering (`sim.render.fidelity`) and to render.
+"""
 
 from __future__ import annotations
 
@@ -35,16 +38,19 @@ Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # pos
 
 
 class PreparedScene:
-    """A model in the spectral bands of given eyes. Nothing in it depends on the fidelity, except for the bands.
+    """A MuJoCo model and its eyes, prepared for rendering; light and materials are stored in the eyes' spectral bands.
+
+    The scene can be rendered with any fidelity (number of samples, depth layers and light) that has these bands.
 
     model: the MuJoCo model
-    eye: optics and retina, with its own bands
+    eye: optics and retina, with the spectral bands
     mounts: places of the eyes on the model
     spectra: measured spectra of materials and lights, by name
     groups: visible geom groups
     varied: names of geoms whose size, colour or material may differ between worlds, see `sim.ModelRenderer`
     tracer: "mitsuba", "closed_form" or "auto", see `sim.BatchedRenderer`
-    stand: the body that carries the eyes, if all eyes stand upright on one body; None: derived from the mounts
+    stand: the body that carries all eyes and moves only in a horizontal plane, with their places on it. None: it is
+        derived from the mounts, if there is such a body
     medium: water or air that fills the world; under water, an `optics.Eye` is immersed, but the refractive index in
         front of the facets of a compound eye does not change. None: clear air
 
@@ -111,14 +117,14 @@ class PreparedScene:
             self.scene.warn_of_missing(light)
 
     def eye_rays(self, tracer: Tracer | AreaTracer, n_envs: int) -> EyeRays:
-        """Return the eyes in `n_envs` worlds, in the form for this tracer."""
+        """Return an object that computes the rays of the eyes in `n_envs` worlds for this tracer."""
         if isinstance(tracer, ClosedForm | AreaTracer):
             return UprightEyes(self.upright.stand, n_envs)
         return FreeEyes(self.places, n_envs)
 
     @property
     def upright(self) -> UprightScene:
-        """The closed form of the scene.
+        """The scene as upright walls, a floor and spheres, for which light is computed by formulas (closed form).
 
         Raises:
             NoClosedForm: the scene has no closed form.
@@ -128,39 +134,60 @@ class PreparedScene:
         raise self.tracers.upright
 
     def areas(self, light: str) -> AreaTracer:
-        """Return the tracer that uses area sampling.
+        """Return the tracer for area sampling, which computes the mean light in areas of the visual field.
+
+        light: reflections that are followed: "direct" (one), "bounce" (up to two) or "all" (any number)
 
         Raises:
-            ValueError: the world has no closed forms for areas, or the tracer is "mitsuba", which traces only rays.
+            ValueError: the mean light in an area of this world has no closed form, or the tracer is "mitsuba", which
+                traces only rays.
         """
         return self.tracers.areas(light)
 
     def area_sensor(self, sampling: EyeSampling, per_receptor: float) -> Sensor:
-        """Return a sensor with this number of areas per receptor."""
+        """Return a sensor whose samples are areas, rectangles of the visual field in which light is averaged.
+
+        per_receptor: number of areas per receptor; below 1 if receptors share areas
+        """
         return sampling.areas(per_receptor, in_rows=self._in_rows)
 
     def area_trial(self, sampling: EyeSampling, per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the part of an area sensor, with this number of areas per receptor, that these receptors need."""
+        """Return the areas that contribute to the signals of these receptors, with their weights.
+
+        Areas are rectangles of the visual field in which the mean light is computed.
+
+        per_receptor: number of areas per receptor in the whole eye
+        receptors: indices of the receptors, which are numbered row by row
+        """
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether this number of areas per receptor, below 1, gives neighbouring receptors different signals.
+        """Return whether large areas, each shared by several receptors, preserve the differences between neighbours.
 
-        It is False for a perfect lens, whose receptors share no areas.
+        Areas are rectangles of the visual field in which the mean light is computed. If they are too large,
+        neighbouring receptors may have equal signals. The result is False for a perfect lens, whose receptors share no
+        areas.
+
+        per_receptor: number of areas per receptor, below 1
         """
         return isinstance(sampling, FieldSampling) and sampling.may_share(per_receptor, in_rows=self._in_rows)
 
     @property
     def _in_rows(self) -> bool:
-        """True if areas are divided into rows as well as columns.
+        """True if a receptor's field is divided into rows and columns of areas, false if into columns only.
 
-        Walls and floor have closed forms along columns of any height, but the outlines of spheres need rows.
+        Areas are rectangles in which light is averaged. The mean light of walls and floor in a column has a closed
+        form, however high the column is. The outlines of spheres need rows as well.
         """
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0
 
     def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> WorldSampling:
-        """Return the sampling of the eye with these depth layers; its PSFs are computed once, on first use.
+        """Return the method that places samples in the eye's visual field and weights them for each receptor.
+
+        The eye's PSFs for the distances in `depth` are computed at the first call, and kept.
+
+        depth: distances for which the eye has a PSF
 
         tolerance: allowed error of a signal, see `sim.eyes.allowed_error`
 

@@ -77,7 +77,7 @@ def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Return views of agents with an object at 0.8 to 8 m (NEAR), within the field of view of one eye.
+    """Return views in which an eye of an agent has an object in its field of view, at a distance of 0.8 to 8 m (NEAR).
 
     Places and directions are random, with a fixed seed.
     """
@@ -102,10 +102,14 @@ def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def on_objects(views: RandomViews, origins: np.ndarray, directions: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return which of the directions (n, r, 3) hit the ball of an object, (n, r).
+    """Return a mask of the directions in which an eye sees an object, array (view, direction).
 
-    origins: positions of the eyes [m], (n, 3)
-    radii: radius of each object's ball [m], (k,)
+    Objects are spheres.
+
+    views: views with the centres of the objects
+    origins: positions of the eyes [m], array (view, 3)
+    directions: unit vectors in the world, array (view, direction, 3)
+    radii: radii of the objects [m], array (object,)
     """
     found = np.zeros(directions.shape[:2], bool)
     for k, radius in enumerate(radii):
@@ -135,11 +139,13 @@ def _stray(rng: np.random.Generator) -> np.ndarray:
 
 
 def _clear_of(objects: np.ndarray, draw: Callable[[], np.ndarray], clearance: float = CLEARANCE) -> np.ndarray:
-    """Return the first of 100 random places (2,) that is clear of objects, or the last one if none is.
+    """Return a random place [m], (2,), that is clear of objects.
 
-    objects: centres of the objects [m], (k, 2)
+    Up to 100 places are drawn. If none of them is clear, the last one is returned.
+
+    objects: centres of the objects [m], array (object, 2)
     draw: function that returns a random place [m], (2,)
-    clearance: distance from all objects' centres that a clear place exceeds [m]
+    clearance: a place is clear if its distance from every object's centre is larger than this [m]
     """
     place = np.zeros(2)
     for _ in range(TRIES):

@@ -52,10 +52,11 @@ class KernelInputs:
 
 @dataclass(frozen=True)
 class Frame:
-    """Inputs of a kernel for all worlds at one moment.
+    """Inputs of a kernel that change from moment to moment: the poses in all worlds.
 
-    eyes: buffer of the eyes, see `EyeRays.array`
-    things: the tracer's rows, see `sim.tracing.tracer.Buffers`
+    eyes: buffer with the positions and orientations of the eyes, see `EyeRays.array`
+    things: values that the tracer reads and that differ between worlds, such as positions of moving geoms, see
+        `sim.tracing.tracer.Buffers`
     """
 
     eyes: Array
@@ -63,14 +64,17 @@ class Frame:
 
 
 class Moving:
-    """Buffers of all worlds that a kernel reads, its only inputs that change between calls."""
+    """Buffers from which a kernel reads the poses in all worlds, the only inputs that change between its calls."""
 
     def __init__(self, eyes: EyeRays, things: Buffers) -> None:
         self._eyes, self._things = eyes, things
         self._frame: Frame | None = None
 
     def fill(self, poses: Poses) -> None:
-        """Write the eyes and the tracer's rows of these worlds to the buffers."""
+        """Write the poses of all worlds to the buffers that the kernel reads.
+
+        One buffer is for the eyes. The others are for the scene's values that differ between worlds.
+        """
         self._eyes.fill(poses)
         self._things.fill(poses)
 
@@ -90,7 +94,8 @@ class RayKernel:
     tracer: tracer that intersects the rays and computes their light
     eyes: eyes at which the rays start
     n_envs, n_eyes: numbers of worlds, and of eyes in each world
-    depth: layers among which light is divided
+    depth: depth layers, which are distances for which the eye has a PSF. The light of a ray is divided between the two
+        layers next to the distance of the visible surface
     """
 
     def __init__(self, tracer: Tracer, eyes: EyeRays, n_envs: int, n_eyes: int, depth: DepthLayers) -> None:
@@ -119,7 +124,10 @@ class RayKernel:
         return KernelInputs(counted(lanes), counts, one_number(lanes), along, self.tracer.inputs, more, weights)
 
     def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
-        """Return sums of the light over groups of `reduced` adjacent lanes, flat (layer, component, world, eye, sum).
+        """Return sums of the light over groups of `reduced` adjacent lanes.
+
+        Each lane traces one ray: a sample of an eye in a world. Components are the parts, such as spectral bands, in
+        which light is computed. The sums are a flat array with the axes (layer, component, world, eye, group of lanes).
 
         lanes: total number of lanes
         """
@@ -134,7 +142,11 @@ class RayKernel:
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
     def layers(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> list[Array]:
-        """Return the components of the light along each lane's ray, for each depth layer."""
+        """Return the light along each lane's ray, one array per depth layer and component.
+
+        Each lane traces one ray: a sample of an eye in a world. Components are the parts, such as spectral bands, in
+        which light is computed. All components of the first depth layer come first.
+        """
         lane = Lane.from_index(inputs.lanes, inputs.counts)
         seen, there = self.seen(scenes, frame, inputs, lane)
         bounces = inputs.bounces is not None
@@ -150,7 +162,11 @@ class RayKernel:
         return [component * share for share in shares for component in components]
 
     def seen(self, scenes: Any, frame: Frame, inputs: KernelInputs, lane: Lane) -> tuple[EyeRay, Any]:
-        """Return the ray of a lane, and the geometry of the lane's world in the tracer's form."""
+        """Return each lane's ray, and the surfaces and lights that it can meet in its world.
+
+        A lane is a sample of an eye in a world. The tracer determines the type of the second result, see
+        `Tracer.around`.
+        """
         seen = self.eyes.ray(frame.eyes, inputs.along, lane, inputs.counts.samples.number)
         return seen, self.tracer.around(scenes, frame.things, inputs.tables, lane.world)
 

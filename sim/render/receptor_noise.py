@@ -3,8 +3,8 @@
 A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
 world's noise therefore depends on the world's own seed and history, and not on other worlds.
 
-This noise has the same mean, and nearly the same variance and third moment, as the noise of `optics.Eye.see`, which is
-drawn as numbers of photons (`optics.eye.photoreceptor`).
+This noise has the same mean, and nearly the same variance and third moment, as the noise of `optics.Eye.see`. That
+method draws numbers of photons (`optics.eye.photoreceptor`).
 """
 
 from __future__ import annotations
@@ -31,10 +31,12 @@ FEW = 8  # number of worlds of a second, narrower kernel
 
 
 class Normals:
-    """Standard normal numbers, an array of shape `shape` per world and frame.
+    """Standard normal numbers for the noise of receptors, from a random generator for each world.
 
-    keys: Philox key of each world, (n,) uint64
-    shape: shape of one world's receptors
+    Each draw gives a frame, which contains one number for each receptor of a world.
+
+    keys: key of each world's generator (Philox), array (world,) uint64
+    shape: shape of one world's receptors, and of each frame
     """
 
     def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:
@@ -44,22 +46,32 @@ class Normals:
         self._kernels: dict[int, _Kernel] = {}
 
     def restart(self, keys: np.ndarray) -> None:
-        """Start again at the first frame, with these keys (n,)."""
+        """Set the random generators to these keys, so that the next frame that is drawn is the first.
+
+        keys: key of each world's generator, array (world,)
+        """
         self._keys, self._frames = keys, np.zeros(len(keys), np.uint32)
 
     @property
     def place(self) -> np.ndarray:
-        """State of every world's generator: its key and its number of drawn frames, (n, 2) uint64."""
+        """State of every world's random generator, array (world, 2) uint64.
+
+        It consists of the generator's key and the number of frames drawn so far. A frame contains one random number for
+        each receptor of the world.
+        """
         return np.stack([self._keys, self._frames.astype(np.uint64)], axis=1)
 
     def go_on_from(self, place: np.ndarray) -> None:
-        """Restore the state from `place`, (world, 2)."""
+        """Restore the state of every world's random generator.
+
+        place: value of the property `place` at an earlier time, array (world, 2)
+        """
         self._keys, self._frames = place[:, 0].astype(np.uint64), place[:, 1].astype(np.uint32)
 
     def launch(self, worlds: np.ndarray | None = None) -> PendingFrame:
-        """Start drawing the next frame of these worlds (None: all), (len(worlds), *shape) float32.
+        """Start drawing the next random numbers of these worlds (None: all), one number for each receptor.
 
-        The kernel runs asynchronously.
+        The kernel runs asynchronously. The numbers are an array (len(worlds), *shape) float32.
         """
         n, chosen = len(self._keys), slice(None) if worlds is None else worlds
         count = n if worlds is None else len(worlds)
@@ -74,17 +86,23 @@ class Normals:
         return drawn
 
     def _frame(self, parts: list[Array], n: int) -> np.ndarray:
-        """Return the numbers of the first n worlds from the kernel's output arrays, each flat (world, draw)."""
+        """Return the random numbers of the first n worlds, (n, *shape).
+
+        parts: output arrays of the kernel, each flat (world, draw)
+        """
         ends = (max(self._size - k * self._draws, 0) for k in range(len(parts)))  # columns of each part in use
         used = [part.numpy().reshape(-1, self._draws)[:n, :end] for part, end in zip(parts, ends, strict=True)]
         return np.concatenate(used, axis=1).reshape(n, *self._shape)
 
 
 class _Kernel:
-    """A kernel for a fixed number of worlds, with its own buffers of keys and of indices of frames.
+    """A kernel that draws standard normal numbers for a fixed number of worlds.
+
+    A frame contains one number for each receptor of a world. The kernel has its own input buffers: one for the keys of
+    the worlds' random generators, and one for the indices of the frames to draw.
 
     worlds: number of worlds
-    draws: number of draws in each world
+    draws: number of evaluations of the generator in each world; one evaluation gives four normal numbers
     """
 
     def __init__(self, worlds: int, draws: int) -> None:
@@ -108,10 +126,12 @@ class _Kernel:
     def launch(
         self, keys: np.ndarray, frames: np.ndarray, frame_of: Callable[[list[Array]], np.ndarray]
     ) -> PendingFrame:
-        """Start drawing normal numbers.
+        """Start drawing standard normal numbers, one frame for each world.
 
-        keys, frames: key and index of the frame, for each world
-        frame_of: function that converts the arrays on the device to the values of the frame
+        A frame contains one number for each receptor of the world.
+
+        keys, frames: key of each world's random generator, and index of the frame to draw, arrays (world,)
+        frame_of: function that converts the kernel's output arrays on the device to the values of the frames
         """
 
         def launch() -> Callable[[], np.ndarray]:
@@ -145,8 +165,8 @@ class NoiseModel:
     def in_frames(self, share: float) -> tuple[NoiseModel | None, NoiseModel | None]:
         """Return the shot noise of a frame that lasts a part of the integration time, and the remaining noise.
 
-        Each is None if it is 0. Receptors with dynamics sum the photons of their frames. Only the shot noise passes
-        their filters.
+        Each is None if it is 0. Receptors with dynamics (`optics.ReceptorDynamics`) filter their signals in time, and
+        so sum the photons of several frames. Shot noise is added before these filters, the remaining noise after them.
 
         share: duration of the frame, as a fraction of the integration time
         """

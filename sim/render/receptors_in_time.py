@@ -61,7 +61,7 @@ class ReceptorsInTime:
         self.state[worlds] = rows
 
     def store(self, worlds: np.ndarray) -> None:
-        """Store the state of these worlds, to which `undo` returns."""
+        """Store the state of the filters in these worlds, so that `undo` can restore it."""
         self._before[worlds] = self.state[worlds]
 
     def undo(self, worlds: np.ndarray) -> None:
@@ -88,14 +88,17 @@ class ReceptorsInTime:
         return found
 
     def reset_counts(self, worlds: np.ndarray) -> None:
-        """Set the counts of events to 0 after an observation."""
+        """Set the number of events of each receptor to 0 after an observation.
+
+        An event is a change of a signal's logarithm by `event_threshold`. Without a threshold, nothing changes.
+        """
         if self.dynamics.event_threshold:
             self.state[worlds, self._others + 1] = 0
 
     def _filtered(self, rows: np.ndarray, signals: np.ndarray) -> np.ndarray:
-        """Return the signals (world, *shape) after low-pass filter and latency, and advance these filters.
+        """Return the signals after the low-pass filter and the delay by the latency, (world, *shape).
 
-        rows: states of the filters of these worlds, (world, filter, *shape), changed in place
+        rows: states of the filters of these worlds, (world, filter, *shape), which are advanced by a frame in place
         """
         x = self._ms / self.dynamics.time_constant_ms
         low, decay = rows[:, self._low], np.float32(math.exp(-x))

@@ -1,4 +1,4 @@
-"""A slow reference for the fast renderer: Mitsuba's own integrators, and the convolution of `optics`.
+"""A slow reference for the fast renderer: Mitsuba's integrators render an image, and `optics.Eye.see` blurs it.
 
 It uses the same world model and the same places of the eyes as the batched renderer, but computes light independently.
 """
@@ -103,7 +103,11 @@ class ReferenceRenderer:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Numbers of rows and columns of cells (Y, X) of an image, which covers the fields of all receptors."""
+        """Numbers of rows and columns of cells (Y, X) of an image.
+
+        Cells are the squares or rectangles into which the receptors are divided. The image covers the fields of all
+        receptors.
+        """
         sides = np.max([kernel.shape[1:] for kernel in self.sight.kernels.values()], axis=0)
         height, width = (
             n * self.samples_per_receptor + 2 * (int(side) // 2)
@@ -116,9 +120,11 @@ class ReferenceRenderer:
         return np.array([[self._picture(view) for view in self._views(state, i)] for i in range(state.n)])
 
     def radiance(self, state: WorldState) -> np.ndarray:
-        """Return the spectral radiance (env, eye, ray, band), as the batched renderer does.
+        """Return the spectral radiance in each cell of the image of each eye, (env, eye, cell, band).
 
-        Rays are the cells of an image, row by row.
+        The unit and the axes are the same as in the batched renderer's `radiance`, except that the third axis lists
+        cells instead of rays. Cells are the squares or rectangles into which the receptors are divided. They are listed
+        row by row.
         """
         pictures = self.pictures(state)
         return np.moveaxis(pictures.reshape(*pictures.shape[:3], -1), 2, 3)
@@ -162,7 +168,11 @@ class ReferenceRenderer:
 
 
 def _pixels_per_cell(receptor: tuple[float, float]) -> tuple[int, int]:
-    """Return the rows and columns of square pixels in a cell, which has the shape of a receptor.
+    """Return the numbers of rows and columns of square pixels in a cell.
+
+    A receptor is divided into cells that have the same ratio of height to width as the receptor.
+
+    receptor: height and width of a receptor
 
     Raises:
         ValueError: the ratio of the sides is not a ratio of whole numbers up to 16.

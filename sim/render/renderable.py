@@ -1,4 +1,4 @@
-"""A check that a fidelity fits the eye for which it is used."""
+"""A check that the accuracy settings of a rendering (`Fidelity`) can be used with an eye."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ from sim.tracing import lighting
 
 
 def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
-    """Refuse a fidelity that does not fit the eye.
+    """Refuse a fidelity (accuracy of rendering) with which an eye cannot be rendered.
+
+    fidelity: accuracy of rendering, such as the number of bands and the kind of samples
+    eye: an eye in a world
 
     Raises:
-        ValueError: the eye has an eccentricity, its number of bands differs from the fidelity's, or it does not support
-            the samples or depth layers of the fidelity. Adaptive edge sampling needs a perfect lens, direct light and
-            at least four rays per receptor. Areas need receptors of equal size. Compound eyes support only rays and a
-            single depth layer.
+        ValueError: the eye has an eccentricity, its number of bands differs from the fidelity's, or it cannot be
+            rendered with the kind of samples or the depth layers of the fidelity. Samples "edges" (adaptive edge
+            sampling) need a perfect lens, direct light and at least four rays per receptor. Samples "areas" (rectangles
+            of the visual field over which light is averaged) need receptors of equal size. Compound eyes support only
+            samples "rays" and a single depth layer.
     """
     world_eye("eye", eye)
     if not isinstance(eye, CompoundEye) and any(eye.eccentricity_deg):

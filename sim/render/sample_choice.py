@@ -1,4 +1,7 @@
-"""Choice of the number and kind of samples per receptor: rays, or areas in worlds with closed forms for them."""
+"""Choice of the number and kind of samples per receptor: rays, or areas of the visual field.
+
+Areas are available in worlds in which the mean light in an area has a closed form.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +33,9 @@ HARDLY_MORE = 1.1  # errors up to this multiple of the smallest error count as c
 def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: Allowed) -> Samples:
     """Return the cheapest samples whose error, including the error due to light that they omit, is allowed.
 
-    Areas are not tried if a few rays are enough. If no samples are accurate enough, return the cheapest samples whose
-    error is close to the smallest error.
+    Samples are rays, or areas: rectangles of the visual field over which light is averaged in closed form. Areas are
+    not tried if a few rays are enough. If no samples are accurate enough, return the cheapest samples whose error is
+    close to the smallest error.
 
     light: level of light (number of reflections) if rays are used
     """
@@ -69,9 +73,11 @@ def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, 
 
 
 def _left(light: Level, allowed: Allowed) -> float:
-    """Return the part of the allowed error that remains for the samples, because omitted light uses the rest.
+    """Return the largest error due to sampling with which the total error is at most the allowed one.
 
-    If nothing remains, the result is so small that no number of rays is enough.
+    The total error has two causes: a finite number of samples, and light that is omitted. The squares of the two errors
+    add. If omitted light alone causes the allowed error or more, the result is nearly 0, so that any number of rays is
+    rejected.
     """
     left_out = light.predicted_error or 0
     return math.sqrt(max(allowed.without_light**2 - left_out**2, (1e-6 * allowed.without_light) ** 2))
@@ -84,12 +90,14 @@ def _areas(
     shared: tuple[float, ...],
     allowed: Allowed,
 ) -> Samples | None:
-    """Return the fewest areas whose error is allowed, or None if area sampling is not possible in the world.
+    """Return the lowest number of areas per receptor that is accurate enough; None if the world permits no areas.
 
-    If no number is accurate enough, return the fewest areas whose error is close to the smallest error.
+    An area is a rectangle of the visual field over which light is averaged. If every number of areas that is tried
+    causes an error above the allowed one, return the lowest number whose error is close to the smallest.
 
-    shared: fractions of an area per receptor (neighbours then share areas), in decreasing order; they are tried if one
-        area per receptor is accurate enough
+    shared: numbers below 1 of areas per receptor, in decreasing order. With such a number, an area is larger than a
+        receptor, and neighbouring receptors share it. These numbers are tried only if one area per receptor is accurate
+        enough.
     """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
@@ -109,10 +117,10 @@ def _areas(
 def _fewest(
     error: Callable[[float], float], numbers: tuple[float, ...], allowed: float, kind: str
 ) -> tuple[float, Level, bool]:
-    """Return the lowest number of samples whose error is allowed, its `Level`, and whether it is accurate enough.
+    """Return the lowest number of samples whose error is allowed, its `Level`, and True.
 
-    If all errors are too large, return the lowest number whose error is close to the smallest one. Errors are assumed
-    to fall at most like 1/n, so numbers that are certainly too low are skipped.
+    If no number is accurate enough, return the lowest number whose error is close to the smallest one, its `Level`, and
+    False. Errors are assumed to fall at most like 1/n, so numbers that are certainly too low are skipped.
     """
     at = 0
     tried: dict[float, float] = {}

@@ -1,4 +1,4 @@
-"""Choice of a fidelity for a built-in world and given eyes, from trials in random views."""
+"""Choice of a fidelity (accuracy of rendering) for a built-in world and given eyes, by trials in random views."""
 
 from __future__ import annotations
 
@@ -28,17 +28,18 @@ SHARES = Shares(bands=0.35, depth=0.35, light=0.5)  # chosen; 0.71 of the tolera
 def choose_fidelity(
     world: World, eyes: Eyes, tolerance: float | None = None, *, bands: str = "auto", tracer: str = "auto"
 ) -> Fidelity:
-    """Return the cheapest fidelity whose predicted error is within the tolerance.
+    """Return the cheapest fidelity (accuracy of rendering) whose predicted error is within the tolerance.
 
-    If there is none, a FidelityWarning states by how much the tolerance is exceeded.
+    Most errors are predicted by rendering random views of the world. If no fidelity is accurate enough, a
+    FidelityWarning states by how much the tolerance is exceeded.
 
     world, eyes: the world, and the eyes of every agent in it
-    tolerance: allowed error of a receptor's signal (root mean square, in the unit of signals), both over all receptors
-        and over receptors that see a nearby object; None: half of the eyes' `noise_sigma`, but at least 0.005 times the
-        signal of a white surface
-    bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments.
-        Compound eyes always use their own bands.
-    tracer: tracer for the trials, see `sim.BatchedRenderer`
+    tolerance: allowed error of a receptor's signal (root mean square, in the unit of signals). The error over
+        all receptors and the error over receptors that see a nearby object must both be within it. None: half of the
+        eyes' `noise_sigma`, but at least 0.005 times the signal of a white surface
+    bands: "auto": the lowest number of spectral bands that is accurate for scenes of any colours; "own": the number in
+        `eyes`, which environments also use. Compound eyes always use their own bands.
+    tracer: tracer that renders the random views, see `sim.BatchedRenderer`
 
     Raises:
         ValueError: an argument has the wrong type, the tolerance is not positive and finite, `bands` is unknown, or
@@ -59,21 +60,24 @@ def choose_fidelity(
 
 
 def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fidelity:
-    """Return the result of `choose_fidelity` for a prepared scene with its own bands."""
+    """Return the result of `choose_fidelity` for a prepared scene, with the spectral bands of the scene's eyes."""
     if isinstance(scene.eye, CompoundEye):
         return cheapest(ModelStages(scene, _moments(scene), allowed_error(scene.eye, tolerance), AUTO))
     return cheapest(WorldStages(scene, tolerance))
 
 
 def _moments(scene: WorldScene) -> Poses:
-    """Return poses at random places and, if there are objects, near an object, for trials of compound eyes."""
+    """Return poses of the world in which the error of rendering compound eyes is measured.
+
+    The agent stands at random places. If the world has objects, further poses place it near an object.
+    """
     drawn = [random_views, near_views] if scene.world.objects else [random_views]
     views = [draw(scene.world, scene.eyes, MOMENTS) for draw in drawn]
     return Poses.joined(*(scene.poses_at(view.position, view.heading, view.objects) for view in views))
 
 
 class WorldStages:
-    """Levels of fidelity for a built-in world, tried in random views; see `Stages`."""
+    """The stages in which the accuracy of rendering a built-in world is chosen, by trials; see `Stages`."""
 
     shares: Shares | None = SHARES
 

@@ -34,7 +34,7 @@ class WorldScene(PreparedScene):
     """A world and the eyes of every agent in it.
 
     world: geometry, materials and lights
-    eyes: the eyes of every agent, with their own bands
+    eyes: the eyes of every agent; the scene uses their spectral bands
     tracer: method of tracing rays, see `sim.BatchedRenderer`
 
     Raises:

@@ -1,8 +1,8 @@
 """Appearances of geoms: one for each geom, or one for each material that an episode may choose for the geom.
 
-Every appearance is built as if the geom had this material in the model, including texture, mapping and glow. If a geom
-has appearances in several materials, each of them is a separate moving shape, and a world shows only one. Worlds with
-different materials therefore share one kernel, and geoms with a single appearance cost nothing extra.
+The appearance in a material is built as if the geom had that material in the model, including texture, mapping and
+glow. If a geom has appearances in several materials, each of them is a separate moving shape, and a world shows only
+one. Worlds with different materials therefore share one kernel, and geoms with a single appearance cost nothing extra.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Appearance:
 
     geom: id of the geom
     model: a model in which the geom has this appearance
-    drawn: True if episodes choose the geom's material, and this is its appearance in one of the materials
+    drawn: True if each episode chooses the geom's material from several, of which this appearance shows one
     """
 
     geom: int
@@ -62,8 +62,11 @@ def appearances_of(
 ) -> list[Appearance]:
     """Return all visible appearances of these geoms.
 
+    A geom has one appearance, or one for each material that it may have. Appearances with an alpha of 0 are omitted.
+
     geoms: ids of visible geoms
-    materials: ids of the materials among which episodes choose for a geom, by the geom's id
+    materials: for geoms whose material differs between episodes, by the geom's id: ids of the materials of which each
+        episode chooses one
     """
     found = []
     for geom in geoms:
@@ -114,8 +117,8 @@ def varied_geoms(
     varied: names of the geoms; or a mapping from each of these names to the names of the geom's materials
 
     Raises:
-        ValueError: `varied` does not consist of names, or contains a name that no visible geom or no material of the
-            model has; or a geom without listed materials has a measured spectrum.
+        ValueError: `varied` does not consist of names; it names a geom that is not visible or not in the model, or a
+            material that is not in the model; or a geom for which it lists no materials has a measured spectrum.
     """
     if isinstance(varied, str) or not (is_sized(varied) and all(isinstance(name, str) for name in varied)):
         raise ValueError(f"varied = {shown(varied)}: must be names of geoms, such as ('ball',)")

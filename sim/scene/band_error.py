@@ -1,4 +1,4 @@
-"""Errors of measured colours and lamps in a few spectral bands."""
+"""Errors of receptor signals if measured spectra of materials and lamps are represented by a few spectral bands."""
 
 from __future__ import annotations
 
@@ -21,12 +21,13 @@ LEAST_MISS = 1e-3  # relative to white in daylight: largest error of a quantum c
 def lights_in_bands(
     model: mujoco.MjModel, spectra: Spectra, bands: SpectralBands, receptors: Receptors
 ) -> tuple[Spectra, list[str]]:
-    """Return measured spectra, with lights converted to an eye's bands, and messages about inaccurate lights.
+    """Return the measured spectra, with those of lights converted to an eye's bands, and messages about large errors.
 
-    The values of lights at the bands' centres are chosen such that each receptor type has the correct quantum catch
-    from white, as far as values of at least 0 permit this (`SpectralBands.band_values`). Sampling at the centres would
-    include a spectral line only by chance. Spectra of materials are unchanged. A message names each light for which the
-    quantum catch of a receptor type is wrong by more than 0.001 times that of white in daylight.
+    For each light, the values at the bands' centres are chosen such that each receptor type has the correct quantum
+    catch from a white surface in this light. Values are at least 0, and if this prevents correct catches, they are as
+    close as possible (`SpectralBands.band_values`). Sampling at the centres would include a spectral line only by
+    chance. Spectra of materials are unchanged. There is a message for each light in which the catch of a receptor type
+    is wrong by more than 0.001 times its catch from a white surface in daylight.
     """
     materials = {model.material(i).name for i in range(model.nmat)}
     found, off = dict(spectra), []
@@ -57,10 +58,11 @@ def measured(model: mujoco.MjModel, spectra: Spectra) -> list[Spectrum]:
 
 
 def band_error(reflectances: Iterable[Spectrum], receptors: Any, bands: int) -> float:
-    """Return the error of signals of these reflectances in daylight with this number of bands, compared with 64 bands.
+    """Return the error of signals if `bands` spectral bands represent these reflectances in daylight.
 
-    It is the largest difference over reflectances and receptor types, as a fraction of the signal of white. It is 0
-    without reflectances, and does not include blur that differs from band to band.
+    The reference has 64 bands. The error is the largest difference over reflectances and receptor types, as a fraction
+    of the signal of a white surface. It is 0 without reflectances, and does not include blur that differs from band to
+    band.
 
     Raises:
         ValueError: `optics.receptors_of` does not accept the receptors, or `bands` is not a whole number from 1 to 64.

@@ -83,7 +83,7 @@ def require_finite(model: mujoco.MjModel, name: str) -> None:
     """Refuse a model in which a geom, a body, the pose of a light or the colour of a material is not finite.
 
     Raises:
-        ValueError: a value is not finite; the message names its element.
+        ValueError: a value is not finite; the message names the element that has this value.
     """
     for key in PLACES:
         wrong = ~np.isfinite(getattr(model, key)).all(axis=1)
@@ -103,7 +103,10 @@ def _copies(element: ElementTree.Element) -> float:
 
 
 def _count(text: str | None) -> float:
-    """Return the number in an attribute; 0 without the attribute, or for any other text, which MuJoCo refuses."""
+    """Return the number in an attribute; 0 if the attribute is missing (None) or is not a number.
+
+    MuJoCo itself refuses text that is not a number.
+    """
     try:
         number = float(text or 0)
     except ValueError:

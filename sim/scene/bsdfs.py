@@ -54,8 +54,8 @@ def bsdf(
 ) -> MitsubaObject:
     """Return a geom's BSDF (a Mitsuba object of the active variant).
 
-    It is two-sided for planes, meshes and signed distance fields, which may be open, and transparent according to the
-    alpha of the geom's rgba.
+    The BSDF is two-sided for geoms that may be open surfaces: planes, meshes and signed distance fields. Its
+    transparency is given by the alpha of the geom's rgba.
 
     to_uv: matrix from the shape's texture coordinates to MuJoCo's, (3, 3); None: they are equal
     measured: a reflectance that replaces the geom's colour

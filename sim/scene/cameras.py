@@ -1,7 +1,7 @@
 """MuJoCo's cameras as Mitsuba sensors, and user-defined viewpoints.
 
-A MuJoCo camera looks along its -z with x to the right. A Mitsuba sensor looks along +z with x to the left. Its to_world
-is therefore the camera's rotation times diag(-1, 1, -1).
+A MuJoCo camera looks along its -z with x to the right. A Mitsuba sensor looks along +z with x to the left. The sensor's
+`to_world` is therefore the MuJoCo camera's rotation times diag(-1, 1, -1).
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Geoms whose surfaces coincide. As in MuJoCo, the geom that is defined last is visible.
 
 If two surfaces are in the same place, rounding would decide which of them a ray hits. All renderers therefore move the
-surface of the later geom outwards by a small distance, which exceeds the rounding errors of float32. Coincidence is
-decided once, in the given pose. Planes are moved to their front, so the earlier of two planes is visible from behind.
+surface of the later geom outwards by a small distance, which exceeds the rounding errors of float32. The geoms to be
+moved are found once, in the poses that are passed to `coincidences`. A plane is moved along its normal, so the earlier
+of two planes is visible from behind.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Coincidences:
         return self.lifts.get(geom, 0.0)
 
     def message(self, model: mujoco.MjModel) -> str | None:
-        """Return a warning if geoms of different groups coincide (such as collision and visual ones), or None."""
+        """Return a warning if geoms of different groups (such as collision and visual) coincide, otherwise None."""
         found = [pair for pair in self.pairs if len(set(model.geom_group[list(pair)])) > 1]
         if not found:
             return None
@@ -81,7 +82,11 @@ def _coincidences(data: mujoco.MjData, geoms: Sequence[int]) -> Coincidences:
 
 
 def _near(data: mujoco.MjData, geoms: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """Generate pairs of geoms whose bounding boxes overlap, in the order of the second geom."""
+    """Generate pairs of geoms whose bounding boxes overlap.
+
+    In a pair, the geom that comes first in `geoms` is first. The pairs are sorted by the position of their second geom
+    in `geoms`.
+    """
     model, turns = data.model, data.geom_xmat[geoms].reshape(-1, 3, 3)
     box = model.geom_aabb[geoms]
     middle = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turns, box[:, :3])
@@ -92,7 +97,11 @@ def _near(data: mujoco.MjData, geoms: Sequence[int]) -> Iterator[tuple[int, int]
 
 
 def _scale(data: mujoco.MjData, first: int, last: int) -> float:
-    """Return the length [m] to which rounding errors of two geoms are proportional."""
+    """Return a length [m] that measures how inaccurately float32 places the surfaces of two geoms.
+
+    Rounding errors of points on the surfaces are proportional to this length. It grows with the size of the smaller
+    geom and with the distance of the geom `last` from the world's origin.
+    """
     model = data.model
     sizes = [float(model.geom_rbound[geom]) or np.inf for geom in (first, last)]  # a plane has no bound
     size = min(*sizes, float(model.stat.extent) if np.isinf(sizes).all() else np.inf)
@@ -125,9 +134,11 @@ def _points(data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom: int, apart: float) -> bool:
-    """Return whether any of the points is closer than `apart` to a geom's surface, with nearly parallel normals.
+    """Return whether another geom's surface touches this geom's surface in at least one point.
 
-    points, normals: points of another surface [m], and its normals there, unit vectors, in the world's frame, (n, 3)
+    It does if the distance is at most `apart` and the normals of the two surfaces are nearly parallel there.
+
+    points, normals: points of the other surface [m], and its normals there, unit vectors, in the world's frame, (n, 3)
     apart: distance [m]
     """
     model, turn = data.model, data.geom_xmat[geom].reshape(3, 3)

@@ -4,8 +4,8 @@ MuJoCo looks up a cube texture by direction. The direction consists of a point's
 primitives, these coordinates are divided by the geom's half sizes (see `directions` for the caps of capsules), unless
 the texture is uniform. Mitsuba has no such texture. Triangles are therefore cut along the seams between faces of the
 cube. Their texture coordinates refer to one image in which the six faces are stacked vertically, in MuJoCo's order R L
-U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The directions of each face's own axes are OpenGL's (table 3.19 of its
-2.1 specification).
+U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The columns and rows of each face are oriented as in OpenGL (table 3.19
+of its 2.1 specification).
 """
 
 from __future__ import annotations
@@ -40,13 +40,17 @@ def padded(pixels: np.ndarray) -> np.ndarray:
 
 
 def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uniform: bool) -> np.ndarray:
-    """Return the directions of MuJoCo's cube texture lookups, (n, 3), for points (n, 3) in a geom's frame.
+    """Return the directions in which MuJoCo looks up a cube texture for points of a geom, (point, 3).
 
+    A direction is the point divided by the geom's half sizes. On a capsule's caps, its z is ±(1 + d / radius) instead,
+    where d [m] is the distance along z beyond the end of the cylindrical side. For meshes, SDFs and height fields, the
+    direction is the point itself. If `uniform` is True, x, y and z of all these directions are then multiplied by the
+    half sizes.
+
+    vertices: points in the geom's frame [m], (point, 3)
     kind: type of the geom
+    size: half sizes (3,) along x, y, z [m]; for a capsule, those of its cylindrical side
     uniform: True if the material has `texuniform`
-    size: half sizes (3,) along x, y, z; for a capsule, those of its cylindrical side. On a capsule's caps, z becomes
-        ±(1 + d / radius), where d [m] is the distance along z beyond the end of this side. If `uniform`, this is
-        multiplied by the half size.
     """
     if kind in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_HFIELD):
         found = vertices.copy()
@@ -60,9 +64,12 @@ def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uni
 
 
 def look_up(towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the faces (n,) in these directions (n, 3), and the positions on the faces (n, 2).
+    """Return where rays from the centre of a texture's cube meet the cube: the faces, and the positions on them.
 
-    A position is a column and a row, both in [0, 1]. Row 0 is at the top.
+    Faces are numbered from 0 to 5 in MuJoCo's order R L U D F B. A position is a column and a row, both in [0, 1]. Row
+    0 is at the top. The arrays have the shapes (direction,) and (direction, 2).
+
+    towards: directions of the rays, (direction, 3)
     """
     axis = np.argmax(np.abs(towards), axis=1)
     face = 2 * axis + (np.take_along_axis(towards, axis[:, None], 1)[:, 0] < 0)
@@ -70,7 +77,9 @@ def look_up(towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def laid(triangles: Triangles, towards: np.ndarray, width: int, n_faces: int) -> Triangles:
-    """Return the triangles, cut along the seams, with texture coordinates in the padded image.
+    """Return the triangles with texture coordinates in the image that `padded` returns.
+
+    Triangles are cut along the seams between faces of the texture's cube, so that each lies on one face.
 
     towards: directions of the vertices, (n, 3)
     width: width of a face in texels
@@ -108,11 +117,13 @@ def _face_of(pieces: np.ndarray) -> np.ndarray:
 
 
 def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
-    """Return the triangles, cut into two or three if `side` changes its sign within a triangle.
+    """Return the triangles, each cut into two or three if a seam crosses it.
+
+    A seam is the border between two faces of the texture's cube, extended to a plane through the cube's centre.
 
     pieces: values at the corners of each triangle, (triangle, corner, value), interpolated where a triangle is cut
-    side: values at the corners, (triangle, corner), of a linear function that is 0 on the seam and changes its sign
-        there
+    side: for each corner, the value of a linear function of position that is positive on one side of the seam, negative
+        on the other and 0 on the seam, (triangle, corner)
     """
     side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
     crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)
@@ -133,9 +144,10 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 
 def _halved(pieces: np.ndarray) -> np.ndarray:
-    """Return triangles within which texture coordinates are nearly linear.
+    """Return the triangles, subdivided until texture coordinates are nearly linear within each.
 
-    Other triangles are bisected at the midpoint of their longest edge, repeatedly but at most _HALVINGS times.
+    A triangle in which they are not is bisected at the midpoint of its longest edge. This is repeated at most _HALVINGS
+    times.
     """
     done = []
     for _ in range(_HALVINGS):
@@ -153,7 +165,12 @@ def _halved(pieces: np.ndarray) -> np.ndarray:
 
 
 def _bend(pieces: np.ndarray) -> np.ndarray:
-    """Return the approximate error of linear texture coordinates, as a fraction of a face, per triangle."""
+    """Return the approximate error of interpolating the texture coordinates linearly in each triangle, (triangle,).
+
+    The coordinates are the position on a face of the cube that surrounds the object. The position is found by dividing
+    a direction by its component towards the face, so it is not a linear function of the point on the triangle. The
+    error is in units of the width of a face.
+    """
     face = _face_of(pieces)
     major = np.take_along_axis(pieces[..., 3:6], _MAJOR[face][:, None, None], 2)[..., 0] * _MAJOR_SIGN[face][:, None]
     at = _on_face(pieces[..., 3:6].reshape(-1, 3), np.repeat(face, 3)).reshape(-1, 3, 2)

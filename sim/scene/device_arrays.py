@@ -37,7 +37,7 @@ class SharedBuffer:
 
     @property
     def array(self) -> Array:
-        """The same values on the device."""
+        """The buffer's `values` as an array that kernels read: the same memory with LLVM, a new copy on a GPU."""
         return self._array if dr.backend_v(self._kind) == dr.JitBackend.LLVM else self._kind(self.values)
 
 
@@ -45,9 +45,10 @@ class SharedBuffer:
 class Divisor:
     """A whole number from 1 to 2³² - 1 by which a kernel divides; all fields are arrays of one element.
 
-    Processors have no instruction that divides several whole numbers at once. A kernel would divide lane by lane, which
-    takes a seventh of the time in which it renders a built-in world. `quotient` therefore multiplies and shifts (fig.
-    4.1 in Granlund and Montgomery 1994). The number is an input of kernels, so one kernel serves all numbers.
+    Processors have no instruction that divides several whole numbers at once. If a kernel divided one number after
+    another, divisions would take a seventh of its time when it renders a built-in world. `quotient` therefore
+    multiplies and shifts (fig. 4.1 in Granlund and Montgomery 1994). The divisor is an input of kernels, so one kernel
+    serves all divisors.
 
     number: the divisor
     factor, first_shift, second_shift: numbers from which quotients are computed
@@ -60,7 +61,7 @@ class Divisor:
 
     @classmethod
     def from_number(cls, number: int) -> Divisor:
-        """Return the divisor `number`, on the device."""
+        """Return a divisor whose value is `number`, a whole number from 1 to 2³² - 1, as arrays on the device."""
         bits = (number - 1).bit_length()
         factor = (2**bits - number) * 2**32 // number + 1
         return cls(*map(one_number, (number, factor, min(bits, 1), max(bits - 1, 0))))
@@ -101,11 +102,12 @@ def as_whole_numbers(values: Any) -> np.ndarray:
 
 
 def counted(n: int) -> Array:
-    """Return 0 ... n - 1 in separate memory; a frozen kernel that reads this array lane by lane has n lanes.
+    """Return the indices 0 ... n - 1 of a kernel's lanes as a stored array, which sets the number of lanes.
 
-    If a kernel reads only tables, Dr.Jit 1.5 derives the number of lanes from one of them. Which table it uses depends
-    on the state of the process. In one case, Dr.Jit replayed 126 of 128 lanes, and left the last receptors dark without
-    a message. tests/test_parameters.py repeats each training run and detects this error.
+    A lane computes one element of a kernel's output. A frozen kernel in which each lane reads its element of this array
+    has n lanes. If a kernel reads only tables, Dr.Jit 1.5 derives the number of lanes from one of them. Which table it
+    uses depends on the state of the process. In one case, Dr.Jit replayed 126 of 128 lanes, and left the last receptors
+    dark without a message. tests/test_parameters.py repeats each training run and detects this error.
     """
     found = dr.arange(mi.UInt32, n)
     dr.eval(found)

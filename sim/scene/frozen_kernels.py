@@ -53,7 +53,7 @@ def _names(kind: Any) -> tuple[str, ...]:
 
 
 def _arrays_of(inputs: Any) -> list[Array]:
-    """Return all arrays in dataclasses and lists of them, in order."""
+    """Return all arrays that `inputs`, an array, a dataclass or a list of these, contains at any depth, in order."""
     if names := _names(inputs.__class__):
         return [array for name in names for array in _arrays_of(getattr(inputs, name))]
     if isinstance(inputs, list):
@@ -62,7 +62,7 @@ def _arrays_of(inputs: Any) -> list[Array]:
 
 
 def _with_arrays(inputs: Any, arrays: Iterator[Array]) -> Any:
-    """Return the same dataclasses and lists with these arrays in them."""
+    """Return a copy of `inputs` in which each array is replaced by the next of `arrays` (order: `_arrays_of`)."""
     if names := _names(inputs.__class__):
         return type(inputs)(*(_with_arrays(getattr(inputs, name), arrays) for name in names))
     if isinstance(inputs, list):

@@ -25,8 +25,8 @@ _NAMED = 4  # largest number of elements of one kind that a message names; it on
 def left_out(model: mujoco.MjModel, geoms: Sequence[int], groups: Sequence[int]) -> list[str]:
     """Return messages about features of a model that have no counterpart in its Mitsuba scene.
 
-    The features of visible geoms, of their materials, and of other elements that MuJoCo draws in these groups are
-    considered.
+    geoms: ids of the visible geoms. They and their materials are considered
+    groups: groups of elements that MuJoCo draws. Elements in them that are not geoms are also considered
     """
     materials = sorted({int(model.geom_matid[g]) for g in geoms if model.geom_matid[g] >= 0})
     return [*_geoms(model, geoms), *_textures(model, materials), *_sky(model, geoms), *_others(model, groups)]

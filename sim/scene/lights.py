@@ -1,12 +1,13 @@
 """MuJoCo's lights as Mitsuba emitters with the spectrum of daylight, or with measured spectra.
 
 Units: a light of diffuse 1 gives the irradiance π · daylight(λ) on a surface that faces it. A white Lambertian surface
-there has radiance daylight(λ): D65, 1 at 560 nm. Mitsuba's own `d65` is scaled differently (1.0101 at 560 nm), and its
-`rgb` emitters inherit this scale. This module therefore uses the tables of `optics`.
+there has the radiance daylight(λ), which is the spectrum D65, scaled to 1 at 560 nm. Mitsuba's own `d65` is scaled
+differently (1.0101 at 560 nm), and its `rgb` emitters inherit this scale. This module therefore uses the tables of
+`optics`.
 
 A light has a single colour: its diffuse colour also makes the highlights, and its specular colour is ignored. Light
 from a point decreases with the square of the distance. If a light of the model has another attenuation, its irradiance
-is the same as in MuJoCo only at the distance of the model's centre.
+is the same as in MuJoCo only at the initial distance between the light and the model's centre.
 """
 
 from __future__ import annotations
@@ -52,12 +53,12 @@ class Emitter:
 
     @property
     def described(self) -> Description:
-        """Description of the light for a scene of the active variant; without shadows if the light casts none."""
+        """Mitsuba's description of the light, for Mitsuba's active variant; without shadows if the light casts none."""
         return self.description if self.casts_shadow else shadowless(self.description)
 
     @property
     def parameters(self) -> str:
-        """Name of the light among the parameters of a scene."""
+        """Name under which the parameters of a Mitsuba scene (`mi.traverse`) list the light."""
         return self.name if self.casts_shadow else f"{self.name}.{INNER}"
 
 
@@ -101,7 +102,10 @@ def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: S
 
 
 def white() -> float:
-    """Return the radiance of white under a light of diffuse 1, relative to that of Mitsuba's `d65`."""
+    """Return the factor by which the radiance of Mitsuba's `d65` is multiplied to give that of a white surface.
+
+    The surface faces a MuJoCo light whose `diffuse` is 1.
+    """
     return float(daylight(np.array([560e-9]))[0]) / float(_evaluate(mi.load_dict({"type": "d65"}), 560.0)[0])
 
 
@@ -199,7 +203,7 @@ def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: S
 
 
 def _profile(cutoff_deg: float, exponent: float) -> Description:
-    """Return the image that a spot projects over its cone: cos(θ)**exponent at the angle θ to its axis.
+    """Return the image that a spotlight projects: it has the value cos(θ)**exponent at the angle θ to the cone's axis.
 
     cutoff_deg: angle between the cone's axis and its side [degrees]
     """

@@ -1,9 +1,10 @@
-"""Textures whose values are linear light.
+"""Textures whose values are proportional to light (linear light), unlike display colours.
 
-MuJoCo displays the values of all textures alike, so they are display colours (IEC 61966-2-1), as its other colours are.
-A texture contains linear light only if its source requests it by `colorspace="linear"`. The compiler resolves "auto" to
-linear for image files without a colour chunk, so a compiled model does not show whether linear light was requested.
-`compiled` therefore marks requests in the model, in a tuple whose name ends with "linear_textures". A user who compiles
+MuJoCo displays the values of all textures in the same way. These values are therefore interpreted as display colours
+(IEC 61966-2-1), as MuJoCo's other colours are. A texture contains linear light only if its source requests it by
+`colorspace="linear"`. The compiler resolves "auto" to linear for image files without a colour chunk, so a compiled
+model does not show whether linear light was requested. The function `compiled` therefore adds to the model a custom
+tuple that lists the textures with this request. The name of the tuple ends with "linear_textures". A user who compiles
 a model can add such a tuple to its MJCF:
 
     <custom><tuple name="linear_textures"><element objtype="texture" objname="NAME"/></tuple></custom>
@@ -22,7 +23,11 @@ _ROLES = (int(mujoco.mjtTextureRole.mjTEXROLE_RGB), int(mujoco.mjtTextureRole.mj
 
 
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Return the model of a specification, in which textures with `colorspace="linear"` are marked."""
+    """Compile a specification, and return a model that shows which textures request `colorspace="linear"`.
+
+    The model lists them in a custom tuple, unless `is_linear` recognises them without it. The name of the tuple ends
+    with "linear_textures".
+    """
     model = spec.compile()
     requested = [k for k, texture in enumerate(spec.textures) if texture.colorspace == _LINEAR]
     unmarked = [k for k in requested if not is_linear(model, k)]
@@ -43,8 +48,9 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 def is_linear(model: mujoco.MjModel, texture: int) -> bool:
     """Return whether a texture contains linear light.
 
-    This is the case if the texture is marked. It is also the case if the model declares the texture as linear, and it
-    is a 2-D texture that was not read from a file. (The compiler resolves "auto" to linear only for files.)
+    A texture does so if a mark lists it. (A mark is a custom tuple of the model; the name of the tuple ends with
+    "linear_textures".) A 2-D texture that was not read from a file also does so if the model declares it as linear.
+    (For files, this declaration proves nothing, because the compiler may have resolved "auto" to linear.)
 
     Raises:
         ValueError: a mark lists an object that is not a texture.
@@ -63,7 +69,7 @@ def resolved(model: mujoco.MjModel) -> list[int]:
 
 
 def request(spec: mujoco.MjSpec, textures: Iterable[int]) -> mujoco.MjSpec:
-    """Return a copy of a specification that requests linear light for the textures with these indices."""
+    """Return a copy of a specification; the copy requests linear light for the textures with these indices."""
     found = spec.copy()
     for k in textures:
         found.textures[k].colorspace = _LINEAR
@@ -72,6 +78,8 @@ def request(spec: mujoco.MjSpec, textures: Iterable[int]) -> mujoco.MjSpec:
 
 def _marked(model: mujoco.MjModel) -> set[int]:
     """Return the indices of the textures that are marked as linear.
+
+    A mark is a custom tuple of the model that lists textures. The name of the tuple ends with "linear_textures".
 
     Raises:
         ValueError: a mark lists an object that is not a texture.

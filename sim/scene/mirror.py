@@ -44,7 +44,7 @@ def mirror(
     """Return the mirror of a MuJoCo model: a Mitsuba scene that follows the model's data.
 
     model: an MjModel, or a source that compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, or MJCF text.
-        Textures of linear light must be marked in an MjModel, see `sim.scene.linear_textures`
+        An MjModel must list the textures that contain linear light in a tuple, see `sim.scene.linear_textures`
     data: initial poses; None: the model's reference pose
     bodies: names of the bodies whose geoms are included ("world" is the static body); None: all bodies
     groups: visible geom groups; a geom with alpha 0 is never visible
@@ -156,7 +156,7 @@ class Mirror:
     ) -> np.ndarray:
         """Return the spectral radiance at `wavelengths` [m], (band, y, x) float32, averaged over each pixel's square.
 
-        Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
+        Units: a white Lambertian surface that faces a light of `diffuse` 1 has radiance D65(λ), scaled to 1 at 560 nm.
 
         camera: name or id of a camera of the model, or a Viewpoint
         width, height: size of the image [pixels], whole numbers from 1 to 65,536
@@ -167,9 +167,9 @@ class Mirror:
         sampler: "independent", or "multijitter", whose images have less noise
 
         Raises:
-            ValueError: the camera is unknown or no plain perspective, the integrator or the sampler is unknown, a
-                number is not whole or out of range, a wavelength is outside 300 to 780 nm, or Mitsuba would apply an
-                argument incorrectly.
+            ValueError: the camera is unknown, or is not a perspective camera defined by `fovy`; the integrator or the
+                sampler is unknown, a number is not whole or out of range, a wavelength is outside 300 to 780 nm, or
+                Mitsuba would apply an argument incorrectly.
         """
         view = self.viewpoint(camera)
         width, height = rays.checked_size(width, height)

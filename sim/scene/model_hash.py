@@ -1,4 +1,4 @@
-"""Hash of a MuJoCo model, the key under which values that follow from a model are kept.
+"""Hash of a MuJoCo model. It is the key under which values that were computed from the model are stored.
 
 The animals of a search are evaluated in equal worlds. Values that depend only on the world are computed for the first
 animal and kept for all others.

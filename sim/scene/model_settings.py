@@ -16,7 +16,7 @@ _STRUCTS = ("opt", "stat")
 
 
 class ModelSettings:
-    """Current settings of one model: the values of the fields that the module's docstring describes."""
+    """Current settings of a MuJoCo model: the values of its fields, except names, texts and large fields (meshes)."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         fields = [("", model), *((f"{name}.", getattr(model, name)) for name in _STRUCTS)]

@@ -1,4 +1,4 @@
-"""Snapshot of a renderer's model, which refuses worlds that differ in ways that the renderer cannot show."""
+"""Snapshot of a renderer's model. It refuses worlds that differ from the model in ways the renderer cannot show."""
 
 from __future__ import annotations
 
@@ -27,10 +27,11 @@ class ModelSnapshot:
 
     geoms: ids of the visible geoms
     hidden: ids of the geoms that are invisible only because their alpha is 0
-    moving: ids of the geoms that the renderer can show in any pose
-    resizable: ids of the geoms whose sizes may differ
-    varied: ids of the geoms that may differ, with the ids of the materials that each may have
-        (`appearances.varied_geoms`)
+    moving: ids of the geoms that may move; all other geoms must remain in the model's pose
+    resizable: ids of the geoms whose sizes in a rendered world may differ from those in the model
+    varied: ids of the geoms whose appearance in a rendered world may differ from that in the model, each with the ids
+        of the materials that it may have. If the list of materials is empty, only the geom's colour may differ (see
+        `appearances.varied_geoms`)
     """
 
     def __init__(
@@ -58,7 +59,12 @@ class ModelSnapshot:
         self._counts = self._that_count()
 
     def _that_count(self) -> dict[str, list[int]]:
-        """Return the ids of the elements that are compared, by field."""
+        """Return the ids of the materials, lights and height fields that must not differ between a world and the model.
+
+        The result is a dictionary. A key is the name of a field of `Poses`, for example "mat_rgba". The entry lists
+        the ids of the elements for which this field must have the same value in every rendered world as in the model.
+        Elements that do not affect images are omitted, for example materials that no geom has.
+        """
         model, either = self._model, [*self._geoms, *self._hidden]
         more = {material for materials in self._drawn.values() for material in materials}
         unset = [g for g in either if np.array_equal(model.geom_rgba[g], surfaces.UNSET_RGBA)]
@@ -106,7 +112,11 @@ class ModelSnapshot:
         return f"{kind} {getattr(self._model, kind)(index).name or str(index)!r}"
 
     def _differing(self, poses: Poses, name: str) -> list[int]:
-        """Return the ids of the elements whose field `name` of `Poses` differs from the model's in any world."""
+        """Return the ids of the elements (such as geoms) for which a field in some world differs from the model.
+
+        poses: state of the rendered worlds
+        name: the field of `poses` that is compared, such as "geom_size"
+        """
         own, here = self._own[name], getattr(poses, name)
         if here is None:
             return []

@@ -1,4 +1,7 @@
-"""Poses of models in which only a few bodies move. Arrays with all elements are built only when they are read."""
+"""Poses of models in which only a few bodies move.
+
+Arrays that contain all bodies, geoms, sites or cameras of the model are built only when they are read.
+"""
 
 from __future__ import annotations
 
@@ -39,10 +42,11 @@ class ReferencePose:
         return self._local[kind, index]
 
     def slots(self, geoms: Sequence[int] | np.ndarray) -> slice | list[int] | None:
-        """Return the indices in `bodies` of the bodies whose frames these geoms share.
+        """Return the index of the body of each of these geoms, in the list `bodies` of moving bodies.
 
-        The result is a slice if the indices are adjacent, because a slice copies nothing. Return None if a geom has
-        another frame. Most geoms share their body's frame.
+        With these indices, the frames of the geoms can be taken from those of the bodies. This requires that each geom
+        has the same frame as its body, as most geoms do. Return None if a geom has a frame of its own, or if its body
+        does not move. The result is a slice if the indices are adjacent, because a slice copies nothing.
         """
         key = tuple(geoms)
         if key not in self._slots:
@@ -74,8 +78,10 @@ class MovedBodies(Poses):
 
     reference: the model in its reference pose, and the ids of the moved bodies
     positions: positions of the moved bodies [m], (world, body, 3)
-    rotations: rotations of the bodies that may turn, which are the first ones, (world, turning body, 3, 3)
-    models: models of all worlds, if their sizes, colours or materials differ; None: as in the renderer's model
+    rotations: rotations of those moved bodies that may turn, (world, turning body, 3, 3). They precede the others in
+        the list of moved bodies
+    models: model of each world, if sizes, colours or materials of geoms differ between worlds; None: they are the same
+        as in the renderer's model
     """
 
     reference: ReferencePose
@@ -93,7 +99,7 @@ class MovedBodies(Poses):
         vars(self).update(reference=reference, positions=positions, rotations=rotations, **own)
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """Build an array of `Poses` when it is first read."""
+        """Build an array, one of the attributes that `Poses` defines, when the attribute is first read."""
         if name not in Poses.__dataclass_fields__:
             raise AttributeError(name)
         vars(self)[name] = built = self._built(name)

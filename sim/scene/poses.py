@@ -113,7 +113,7 @@ class Poses:
 
     @classmethod
     def joined(cls, *parts: Poses) -> Poses:
-        """Return the poses of all worlds of one or more parts, in order. The worlds belong to one model."""
+        """Return one object with the worlds of all `parts`, one after the other. All worlds belong to one model."""
         found: dict[str, list[Any]] = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
         joined: dict[str, Any] = {n: None if each[0] is None else np.concatenate(each) for n, each in found.items()}
         return cls(**joined)

@@ -1,4 +1,4 @@
-"""Primitive geoms, which rays intersect in closed form."""
+"""Primitive geoms. Their intersections with rays are computed in closed form."""
 
 from __future__ import annotations
 

@@ -80,8 +80,8 @@ class Camera:
         It is the mean over `spp` random positions in each pixel.
 
         sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel, so that images have
-            less noise. Multijitter is not available in scalar variants, or if it would round the number of samples in a
-            pass (large images need several passes).
+            less noise. "multijitter" is refused in scalar variants, and also if it would round the number of samples
+            that a pass takes in a pixel (large images need several passes).
 
         Raises:
             ValueError: the integrator or the sampler is unknown, Mitsuba would apply one of them incorrectly, or `spp`
@@ -132,7 +132,7 @@ class Camera:
         return si.shape.id(), np.array(ray(si.t), dtype=float)
 
     def _first_visible(self, ray: Array) -> Array:
-        """Return the first visible intersection of the ray, and move the ray's origin past invisible inner faces."""
+        """Return the first visible hit, and move the ray's origin past invisible inner sides of one-sided shapes."""
         si = self.scene.ray_intersect(ray)
         for _ in range(NESTED):
             inner = self._is_inner(si, ray)

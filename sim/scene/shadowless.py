@@ -22,17 +22,26 @@ _CLOSE = 1e-5
 
 
 def shadowless(light: Description) -> Description:
-    """Return the emitter that shines like a directional light, point or spot, but through all obstacles."""
+    """Return an emitter with the light of `light` (a directional, point or spot emitter) that casts no shadows."""
     _register(str(mi.variant()))
     return {"type": "shadowless", INNER: light}
 
 
 @cache
 def _register(variant: str) -> None:
-    """Register the emitter with the active variant. Mitsuba's classes exist only after a variant is set."""
+    """Register the emitter "shadowless" in Mitsuba's active variant.
+
+    Mitsuba has no classes until a variant is set.
+
+    variant: name of the active variant
+    """
 
     class Shadowless(mi.Emitter):
-        """An emitter that delegates to another one, and moves the sampled point."""
+        """An emitter that has the light of another emitter, but casts no shadow.
+
+        The point that an integrator samples on the emitter is moved to right above the illuminated surface, so that
+        nothing can be in between.
+        """
 
         def __init__(self, props: Any) -> None:
             super().__init__(props)

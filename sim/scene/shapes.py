@@ -1,9 +1,9 @@
 """Geoms as Mitsuba shapes.
 
-Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle, sphere, cylinder, disk). Geoms
-for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated, and so are spheres with cube textures, and
-long planes. Ellipsoids are tessellated, too, because Mitsuba intersects its own ellipsoids in float32, with wrong hit
-points on small, flat or distant ellipsoids.
+Planes and spheres are exact Mitsuba shapes, and so are capsules and cylinders if they have no texture. (The shapes are
+Mitsuba's rectangle, sphere, cylinder and disk.) Geoms for which Mitsuba's texture coordinates differ from MuJoCo's are
+tessellated, and so are spheres with cube textures, and long planes. Ellipsoids are tessellated, too, because Mitsuba
+intersects its own ellipsoids in float32, with wrong hit points on small, flat or distant ellipsoids.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ LONG = 30
 
 @dataclass(frozen=True)
 class Part:
-    """One Mitsuba shape of a geom: a plugin with the pose `local` (4, 4) in the geom's frame, or triangles.
+    """One Mitsuba shape of a geom: a Mitsuba plugin with the pose `local` (4, 4) in the geom's frame, or triangles.
 
-    mirrors: True if a mirror reflection of the geom applies to this part
+    mirrors: True if this part reflects like a mirror when the geom's material does. A box does so on its top only
     """
 
     plugin: str = ""
@@ -61,12 +61,12 @@ class Part:
         return {"to_world": mi.Transform4f((pose @ self.local).tolist())}
 
     def vertices(self, pose: np.ndarray) -> np.ndarray:
-        """Return the vertices in the world [m] at a geom's pose (4, 4), flat float32."""
+        """Return the vertices in world coordinates [m], if the geom has this pose (4, 4), as a flat float32 array."""
         assert self.triangles is not None
         return as_floats(self.triangles.vertices @ pose[:3, :3].T + pose[:3, 3])
 
     def normals(self, pose: np.ndarray) -> np.ndarray:
-        """Return the vertex normals in the world at a geom's pose (4, 4), flat float32."""
+        """Return the vertex normals in world coordinates, if the geom has this pose (4, 4), as a flat float32 array."""
         assert self.triangles is not None
         assert self.triangles.normals is not None
         return as_floats(self.triangles.normals @ pose[:3, :3].T)
@@ -81,9 +81,10 @@ def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
 
 
 def has_shape(model: mujoco.MjModel, geom: int) -> bool:
-    """Return whether a geom's kind can be mirrored, and its asset exists if it needs one.
+    """Return whether a geom can be converted to a Mitsuba shape.
 
-    (A user-defined SDF has no mesh.)
+    Geoms of all primitive kinds can be converted. Meshes, SDFs and height fields can be converted if the model contains
+    the asset (mesh or height field) that defines them. A user-defined SDF cannot be converted, because it has no mesh.
     """
     kind = surfaces.geom_type(model, geom)
     return kind in _PRIMITIVES or (kind in _ASSETS and model.geom_dataid[geom] >= 0)
@@ -149,7 +150,7 @@ def parts(model: mujoco.MjModel, geom: int, lift: float = 0.0) -> list[Part]:
 
 
 def lifted_size(kind: mujoco.mjtGeom, lift: float) -> np.ndarray:
-    """Return the increase of MuJoCo's sizes of a primitive (3,) if its surface is moved outwards by `lift` [m]."""
+    """Return the increase of a primitive's `geom_size` if its surface moves outwards by `lift` [m], (3,)."""
     return lift * np.array([1, kind != _TYPES.mjGEOM_CAPSULE, 1])
 
 

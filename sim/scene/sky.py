@@ -1,8 +1,9 @@
 """MuJoCo's skybox as light from infinity.
 
-MuJoCo draws a skybox behind everything. Here it also illuminates the scene, as a sky does. White in the skybox has the
-radiance of a white Lambertian surface that faces a light of diffuse 1, between 360 and 780 nm. MuJoCo looks up the
-direction (x, y, z) at (x, z, -y): faces R/L are visible towards +x/-x, U/D towards +z/-z, F/B towards -y/+y.
+MuJoCo draws a skybox behind everything. Here it also illuminates the scene, as a sky does. Between 360 and 780 nm,
+white in the skybox has the same radiance as a white Lambertian surface that faces a light whose `diffuse` is 1. For the
+direction (x, y, z) in the world, MuJoCo reads the cube texture at (x, z, -y): faces R and L are visible towards +x and
+-x, U and D towards +z and -z, F and B towards -y and +y.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ MAX_ROWS = 1024  # limit for the rows of the panorama
 
 
 def texture(model: mujoco.MjModel) -> int:
-    """Return the index of the skybox that MuJoCo draws, which is the first; -1 for none."""
+    """Return the index of the model's first skybox texture, the one that MuJoCo draws, or -1 if there is none."""
     found = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     return int(found[0]) if len(found) else -1
 
@@ -26,7 +27,7 @@ def texture(model: mujoco.MjModel) -> int:
 def description(model: mujoco.MjModel, white: float) -> Description | None:
     """Return Mitsuba's `envmap` of the model's skybox; None without a skybox, or with a black one.
 
-    white: radiance of white relative to Mitsuba's `d65`, which `envmap` uses as the light of a panorama
+    white: radiance of white, as a multiple of Mitsuba's spectrum `d65`. (An `envmap` multiplies its image by `d65`.)
     """
     skybox = texture(model)
     if skybox < 0:
@@ -48,8 +49,8 @@ def description(model: mujoco.MjModel, white: float) -> Description | None:
 def _panorama(image: np.ndarray) -> np.ndarray:
     """Return the latitude-longitude image (rows, 2 rows, 3) of a padded cube image.
 
-    Columns start at -z of Mitsuba's frame, and continue over +x, with centres at half texels. Rows run from
-    +y to -y, with the first and last row on the poles.
+    The left edge of the image is at the direction -z of Mitsuba's frame, and the columns continue towards +x. Rows run
+    from +y to -y. The centres of the first and the last row are on the poles.
     """
     pitch = image.shape[1]
     rows = min(MAX_ROWS, 2 * (pitch - 2 * cube.BORDER))

@@ -43,7 +43,7 @@ def specification(source: mujoco.MjSpec | str | Path) -> mujoco.MjSpec:
 
 
 def is_compiled(source: Source) -> bool:
-    """Return whether a source is an MjModel or the path of an MJB file, which have no specification."""
+    """Return whether a source is an MjModel or the path of an MJB file, both of which cannot be compiled again."""
     return isinstance(source, mujoco.MjModel) or (isinstance(source, str | Path) and Path(source).suffix == ".mjb")
 
 
@@ -54,7 +54,7 @@ def with_compiled_color_spaces(source: Source) -> Source:
     without such textures is returned unchanged.
 
     Raises:
-        ValueError: the source has such textures but is a compiled model, or it does not give a model.
+        ValueError: the source is a compiled model with such textures, or no model can be made from the source.
     """
     model = load(source)
     if not (resolved := linear_textures.resolved(model)):
@@ -66,7 +66,9 @@ def with_compiled_color_spaces(source: Source) -> Source:
 
 
 def _specification(source: mujoco.MjSpec | str | Path) -> tuple[Callable[[], mujoco.MjSpec], str]:
-    """Return a function that reads a specification, and the source's name in messages.
+    """Return a function that reads the specification (MjSpec) of a model, and the name of `source` in messages.
+
+    source: an MjSpec, MJCF text, or the path of a file
 
     Raises:
         ValueError: the source has another type, or the file does not exist, or the text or file is too large.

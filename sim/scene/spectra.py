@@ -61,7 +61,7 @@ def of_geom(model: mujoco.MjModel, geom: int, spectra: Spectra) -> Spectrum | No
 
 
 def in_daylight(reflectance: Spectrum) -> Spectrum:
-    """Return the emission of a surface with this reflectance in unit daylight.
+    """Return the spectrum that a surface with this reflectance reflects in daylight (D65, scaled to 1 at 560 nm).
 
     It is tabulated every 5 nm from 300 to 780 nm, and at the wavelengths of the reflectance's table in this range.
     """

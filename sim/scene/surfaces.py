@@ -1,7 +1,7 @@
 """Colours and textures of geoms.
 
-MuJoCo's colours and textures are display-referred. They are linearised here, except for textures of linear light (see
-`linear_textures`). Jakob and Hanika's (2019) method assigns a spectrum to each RGB reflectance.
+MuJoCo's colours and textures are display-referred. They are linearised here, except for textures that contain linear
+light already (see `linear_textures`). Jakob and Hanika's (2019) method assigns a spectrum to each RGB reflectance.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ _ROLES = mujoco.mjtTextureRole
 def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
     """Return a geom's kind as a member of the enum.
 
-    NumPy's integer is converted, because comparing it with the enum's members works in one order only.
+    The model stores a NumPy integer. It is converted, because the result of comparing it with a member of the enum
+    depends on which of the two is on the left.
     """
     return mujoco.mjtGeom(int(model.geom_type[geom]))
 
@@ -161,7 +162,8 @@ def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
 def is_mirrored(model: mujoco.MjModel, geom: int, texture: int) -> bool:
     """Return whether a texture is visible on a geom.
 
-    Cube textures are not visible on planes: a point of a cube texture is selected by a direction, and directions within
-    a plane select no image.
+    All textures are visible, except cube textures on planes. A cube texture is looked up in the direction from the
+    geom's centre to a point. For points of a plane, these directions lie in the plane itself, so they meet the cube
+    only along a line and not in an image.
     """
     return not (faces_of(model, texture) and geom_type(model, geom) == mujoco.mjtGeom.mjGEOM_PLANE)

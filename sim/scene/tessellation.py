@@ -1,8 +1,8 @@
 """Geoms as triangles with MuJoCo's texture coordinates, in the geom's frame.
 
 In MuJoCo's coordinates u points to the right and v downwards, and (0, 0) is the outer corner of the image's first
-texel. These conventions were measured with the renderer of MuJoCo 4.0.0, with which tests/sim/scene/test_textures.py
-compares the results.
+texel. These conventions were measured in images of MuJoCo 4.0.0's renderer. The test tests/sim/scene/test_textures.py
+compares textured geoms with such images.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ class Triangles:
         return self if self.uv is None else replace(self, uv=self.uv * repeat)
 
     def lifted(self, distance: float) -> Triangles:
-        """Return the same triangles with all faces moved outwards by about `distance` or more, without gaps."""
+        """Return the same triangles, with each face moved outwards by at least about `distance` [m].
+
+        Faces that met before still meet.
+        """
         if distance == 0:
             return self
         _, place = np.unique(self.vertices, axis=0, return_inverse=True)
@@ -89,8 +92,9 @@ _QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 def box(half_size: np.ndarray) -> Triangles:
     """Return a box around the origin.
 
-    Faces ±x have (u, v) = (y, -z), faces ±y (x, -z), faces ±z (x, -y), each over [0, 1]. Opposite faces show mirror
-    images of each other.
+    On the faces ±x, u increases with y and v decreases with z. On the faces ±y, u increases with x and v decreases with
+    z. On the faces ±z, u increases with x and v decreases with y. On each face, u and v cover [0, 1]. Opposite faces
+    show mirror images of each other.
 
     half_size: half the lengths [m] along x, y and z, (3,)
     """
@@ -163,8 +167,8 @@ def cylinder(radius: float, half_length: float) -> Triangles:
 def capsule(radius: float, half_length: float) -> Triangles:
     """Return a capsule.
 
-    Its side has the texture coordinates of a cylinder's side. On each cap, v runs from 0 to 1: from the pole to the
-    side at the top, and from the side to the pole at the bottom.
+    Its side has the texture coordinates of a cylinder's side. On the upper cap, v increases from 0 at the pole to 1 at
+    the side. On the lower cap, v increases from 0 at the side to 1 at the pole.
 
     radius, half_length: radius [m], and half of the length of the cylindrical side along z [m]
     """

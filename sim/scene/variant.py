@@ -52,7 +52,7 @@ def variant(name: str | None = None) -> Iterator[None]:
 
     Mitsuba's own `mi.variant_context` fails if no variant was set before.
 
-    name: the variant; None: that of the device
+    name: the variant; None: the spectral variant for the requested device (CPU or GPU)
 
     Raises:
         optics.BackendError: LLVM is requested and cannot run, or `name` is None and the device is not available.

@@ -69,11 +69,12 @@ class Variation:
                 raise ValueError(f"vary: {name} = {given!r}: must be (low, high), low first")
 
     def draw(self, random: np.random.Generator) -> dict[str, Drawn]:
-        """Draw values for one episode, by name.
+        """Draw values for one episode, by the names of the ranges.
 
-        Factors are distributed uniformly in their logarithm. Temperatures are distributed uniformly in their reciprocal
-        (mired), in which equal steps look equally large. Colours and places are uniform between their corners. All
-        materials have the same probability.
+        Factors of light and of sizes are distributed uniformly in their logarithm. Temperatures are distributed
+        uniformly in their reciprocal (mired), in which equal steps look equally large. Each component of a colour or a
+        starting place is distributed uniformly between its low and its high limit. All materials have the same
+        probability.
         """
         found: dict[str, Drawn] = {}
         for name, given in self.ranges.items():
@@ -93,22 +94,27 @@ class Variation:
         return found
 
     def blank(self, n: int) -> dict[str, np.ndarray]:
-        """Return arrays for the drawn values of n worlds, by name: numbers (n,) or (n, 3), or names (n,)."""
+        """Return arrays for the drawn values of n worlds, by the names of the ranges.
+
+        An array contains numbers, (n,) or (n, 3), or names of materials, (n,).
+        """
         return {
             name: np.array(given)[np.zeros(n, int)] if kind_of(name) == MATERIAL else np.ones((n, *np.shape(given[0])))
             for name, given in self.ranges.items()
         }
 
     def of_things(self, what: str) -> dict[str, str]:
-        """Return the names of the ranges of one quantity, by the names of the objects.
+        """Return the keys of `ranges` that belong to one quantity, by the names of the objects that have it.
 
-        what: "size", "color", "material" or "start"
+        For "size", an example is {"ball": "ball.size"}.
+
+        what: the quantity: "size", "color", "material" or "start"
         """
         return {name.rpartition(".")[0]: name for name in self.ranges if kind_of(name) == what}
 
     @property
     def of_light(self) -> tuple[str, ...]:
-        """Names of the ranges that concern light."""
+        """Names of those entries of `ranges` that concern light: "light", "color_temperature", both or none."""
         return tuple(name for name in self.ranges if name in (LIGHT, TEMPERATURE))
 
     @property
@@ -133,10 +139,15 @@ class Variation:
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Return the lights' factors at all combinations of the ends of their ranges, (combination, band).
+        """Return the factors by which the lights are multiplied, at all combinations of range limits.
 
-        They are 1 if light does not vary. They include the largest factor over all bands. In a single band, values
-        inside the ranges may give a larger factor, which is up to a third larger for ranges from warm to cold light.
+        Only the ranges "light" and "color_temperature" are used, each at its low and its high limit. All factors are 1
+        if light does not vary. The maximum over the whole array is the largest factor that the ranges permit. The
+        maximum of a single band may be too small: a temperature inside its range may give a larger factor in this band
+        than both limits. If the range extends from warm to cold light, the factor may be larger by up to a third. The
+        array has the shape (combination, band).
+
+        wavelengths: centres of the bands [m], (band,)
         """
         names = self.of_light
         ends = [self.ranges[name] for name in names]

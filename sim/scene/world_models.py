@@ -1,8 +1,9 @@
 """A model for each world, if quantities of objects differ between worlds or a task changes the model.
 
-MuJoCo's compiler applies sizes and computes mass, inertia and all derived quantities. The mass of an object with a
-density therefore scales with its volume, and an object with a given mass keeps this mass. A world's MjModel and MjData
-remain the same Python objects.
+If sizes differ, MuJoCo's compiler computes the mass, the inertia and all other quantities that depend on the sizes of a
+world's geoms. The mass of an object with a density therefore scales with its volume, and an object with a given mass
+keeps this mass. A new episode changes the contents of a world's MjModel and MjData, but does not replace these Python
+objects.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class WorldModels:
     variation: ranges of the quantities that differ between worlds; None: nothing differs
     models: models of the worlds; a single one for all, unless `own` is True
     own: True if each world has its own model, because sizes, colours or materials differ between worlds, or because
-        a task changes the model (`separate`). Each episode then starts from the compiled model.
+        a task changes the model (`separate`). If it is True, each episode starts from the compiled model.
     varied: names of the geoms whose size, colour or material differs, each with the materials that episodes may choose
 
     Raises:
@@ -83,11 +84,11 @@ class WorldModels:
         return not self.own and self.get_state(0) != self._compiled
 
     def noted(self) -> bytes:
-        """Return the current settings of the model that several worlds share; empty if each has its own."""
+        """Return the current settings (`ModelSettings`) of the worlds' shared model; empty if they have their own."""
         return b"" if self.own else self.get_state(0)
 
     def require_unchanged(self, before: bytes, whose: str) -> None:
-        """Compare the shared model with the settings that `noted` returned.
+        """Require that the worlds' shared model still has the settings `before`, which `noted` returned earlier.
 
         If there is only one world, a changed model is accepted and becomes the world's own model.
 
@@ -106,7 +107,9 @@ class WorldModels:
             )
 
     def start_episode(self, world: int, drawn: Drawn) -> None:
-        """Set a world's sizes, colours and materials, and reset all other fields of its own model to compiled values.
+        """Set the sizes, colours and materials in a world's model to the values drawn for an episode.
+
+        If each world has its own model, the settings of this model are first reset to those of the compiled model.
 
         Raises:
             ValueError: a material in `drawn` is not one of the materials that `variation` lists for the geom.
@@ -124,7 +127,7 @@ class WorldModels:
             mine.geom_matid[geom] = candidates[material]
 
     def place(self, data: mujoco.MjData, drawn: Drawn) -> None:
-        """Put objects at their drawn starting places."""
+        """Put objects at the starting places that were drawn at random, by setting their positions in `data`."""
         for name, (where, address) in self._starts.items():
             getattr(data, where)[address] = drawn[name]
 
@@ -132,7 +135,8 @@ class WorldModels:
         """Return the ids of the materials that episodes may choose for a geom, by the names of the materials.
 
         Raises:
-            ValueError: the geom's colour is also varied or replaces that of its materials, or a material is unknown.
+            ValueError: `variation` contains both materials and colours for the geom, the geom has a colour of its own,
+                which would replace the colours of the materials, or a material is unknown.
         """
         assert variation is not None
         if geom in self._colors:
@@ -181,11 +185,14 @@ def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
 
 
 def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
-    """Return the field of mjData that contains an object's place, and the indices in this field.
+    """Return the field of mjData that contains an object's place, and the indices of the place in this field.
+
+    thing: name of the object, which is a joint or a body
+    name: name of the range of the object's initial places, a key of `variation.ranges`
 
     Raises:
-        ValueError: the object is not a hinge or slide joint (for a range of numbers), nor a mocap body or a body with
-            a free joint (for a range of points).
+        ValueError: the range consists of numbers, but the object is not a hinge or slide joint; or the range consists
+            of points, but the object is neither a mocap body nor a body with a free joint.
     """
     assert variation is not None
     spatial = np.ndim(variation.ranges[name][0]) == 1
@@ -209,10 +216,10 @@ def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | 
 
 
 def _specification(given: Any) -> mujoco.MjSpec:
-    """Return a specification that can be compiled again.
+    """Return a specification of the model `given`; it can be compiled again.
 
     Raises:
-        ValueError: the source is a compiled model.
+        ValueError: `given` is a compiled model, or it does not give a specification.
     """
     if source.is_compiled(given):
         kind = "an MjModel" if isinstance(given, mujoco.MjModel) else "a compiled file"

@@ -50,8 +50,8 @@ class Agent:
 class BatchTask(TaskSettings):
     """A task whose methods receive all worlds at once.
 
-    A subclass must define `model`, `mounts`, and `rewards` or `judge`. The settings are those of `sim.Task` without
-    `others`, together with those listed below. Arrays have one row for each world. The argument `worlds` of the methods
+    A subclass must define `model`, `mounts`, and `rewards` or `judge`. It has all settings of `sim.Task` except
+    `others`, and the settings listed below. Arrays have one row for each world. The argument `worlds` of the methods
     is the object that `physics` returns. The default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays
     (`worlds.qpos`, `worlds.xpos` ...) over worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task`
     tests whether a task follows this description.
@@ -66,8 +66,8 @@ class BatchTask(TaskSettings):
         not listed has no limits
     ramped: terms of the reward whose weight `evolve` reduces at the beginning of training if the setting
         `learning.contact_ramp` is above 0
-    counted: titles by reward term. For each of these terms, reports show the number of actions in an episode in which
-        the term is not 0, in a row with this title
+    counted: terms of the reward that reports count, each with the title of its row in a table. The row shows in how
+        many actions of an episode the term was not 0
     compared_light: level of light (see `Fidelity`) with which `evolve` compares eyes, for example "direct"; None: the
         level in `fidelity`
     """
@@ -238,7 +238,9 @@ class BatchTask(TaskSettings):
         return broken
 
     def all_proprioception(self, worlds: Any, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
-        """Return the proprioception of every agent in the chosen worlds, as arrays (k, value) by name for each agent.
+        """Return the proprioception of every agent in the chosen worlds.
+
+        The list has one entry for each agent: a mapping from names to arrays (chosen world, value).
 
         Raises:
             ValueError: `proprioception` did not return one row of finite numbers for each world.

@@ -40,8 +40,8 @@ class AgentEvents:
     """Events during one action, per world.
 
     progress: progress as the task defines it [m], (n,)
-    goal: True if a goal was reached and counts, (n,) bool
-    adversary: True if an adversary was reached and counts, (n,) bool; in training, only the first object counts
+    goal: True if a goal was reached, (n,) bool; in training, False if an adversary was reached before it
+    adversary: True if an adversary was reached, (n,) bool; in training, False unless it was reached before any goal
     adversary_first: True if an adversary was reached before any goal, (n,) bool
     reached: True for objects that were reached, (n, k) bool
     terminated: True if the task ends the episode, (n,) bool
@@ -75,9 +75,10 @@ class AgentTask(BatchTask):
     """A task in one of the built-in worlds, in which an agent slides over the floor between walls.
 
     world: the compiled world
-    mode: "training", "evaluation" or "test", which selects the weights of the reward and the ends of episodes, see
-        `sim.tasks.reward`
-    eyes: eyes on the agent's equator, or a dictionary of several kinds of eyes by name; None: no eyes
+    mode: "training", "evaluation" or "test". The mode determines the weights of the reward, and which events end an
+        episode, see `sim.tasks.reward`
+    eyes: eyes on the agent's equator (the horizontal circle around its body), or a dictionary of several kinds of
+        eyes by name; None: no eyes
     fidelity: fidelity of the eyes, or "auto"
     """
 
@@ -112,7 +113,7 @@ class AgentTask(BatchTask):
         return MODES[self.mode]
 
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Return 2. The numbers are the forward speed and the change of heading."""
+        """Return 2, because an action consists of two values: the forward speed and the change of heading."""
         return 2
 
     def commands(self) -> tuple[Command, ...]:
@@ -143,7 +144,10 @@ class AgentTask(BatchTask):
         return (replace(agent, first_action=np.array(STANDING, np.float32)),)
 
     def act(self, worlds: SlidingAgents, actions: np.ndarray) -> None:
-        """Apply actions (n, 2) in [-1, 1], the forward speed and the change of heading, and move the objects."""
+        """Steer the agents by these actions, and move the objects.
+
+        actions: forward speed and change of heading, each in [-1, 1], (n, 2)
+        """
         worlds.steer(actions)
         worlds.move_objects(*self.moved(worlds))
 
@@ -208,5 +212,5 @@ class AgentTask(BatchTask):
 
 
 def mounts_of_agent(eyes: Eyes) -> tuple[Mount, ...]:
-    """Return the mounts of these eyes on the agent's equator."""
+    """Return the mounts of these eyes on the agent's equator, the horizontal circle around its body."""
     return ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))

@@ -26,10 +26,12 @@ SHARED = ("substeps", "episode_steps")  # settings of the world that must be equ
 
 @dataclass(frozen=True, eq=False)
 class Frozen:
-    """An animal that does not learn. The task of a learning animal in the same world lists it in `others`.
+    """An animal that does not learn, in the world of an animal that learns.
 
-    task: task that defines the animal's eyes and actions, and the condition on which the animal ends an episode; the
-        rewards and the `others` of this task are not used
+    The task of the learning animal has an attribute `others`, which lists all animals that do not learn.
+
+    task: task of the animal that does not learn. It defines the animal's eyes and actions, and the condition on which
+        the animal ends an episode; the rewards and the `others` of this task are not used
     policy: an object with the method `predict` of stable-baselines3 (a learner, or the return value of
         `evolve.load_policy`), or a function. The function receives the observations of all worlds, as in
         `make_vec_env`, and returns the actions (world, value). None: the actions are zeros, and the animal's eyes are
@@ -88,7 +90,7 @@ class Encounter:
 
     Raises:
         ValueError: there are no animals, two animals have the same name, two tasks have different models or settings
-            of the world, an animal has its own `others`, or an argument is not a sim.Task.
+            of the world, a task lists further animals in its attribute `others`, or an argument is not a sim.Task.
     """
 
     def __init__(self, *animals: Task) -> None:

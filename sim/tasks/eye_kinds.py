@@ -24,10 +24,10 @@ TAKEN = ("previous_action", "feels", *AUXILIARY)  # names that are reserved for 
 class EyeKind:
     """Eyes of an animal that have the same optics and retina.
 
-    name: name of their signals in an observation
+    name: name of the eyes' signals in an observation
     eye: optics and retina, or a compound eye
     mounts: places of the eyes
-    fidelity: fidelity of the eyes, or "auto"
+    fidelity: accuracy with which the eyes' views are rendered; "auto": it is chosen automatically
     """
 
     name: str
@@ -108,10 +108,14 @@ def auxiliary_of(names: Iterable[str], where: str) -> tuple[str, ...]:
 
 
 def _by_name(where: str, said: Any, names: Mapping[str, Any] | Sequence[str]) -> Mapping[str, Any]:
-    """Return a setting for each kind of eyes; a single value applies to all `names`.
+    """Return the value of a setting for each kind of eyes, by the kind's name.
+
+    where: beginning of the error message
+    said: the setting: a mapping from the names of kinds to values, or a single value for all kinds
+    names: names of the kinds to which a single value applies; empty: a single value is not allowed
 
     Raises:
-        ValueError: the setting has no entries, or is a single value although there are no names.
+        ValueError: the setting is an empty mapping, or a single value although `names` is empty.
     """
     if isinstance(said, Mapping) and said:
         return said

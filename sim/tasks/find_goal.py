@@ -21,10 +21,10 @@ __all__ = ["FindGoal"]
 class FindGoal(AgentTask):
     """Task in which the agent reaches the goal and avoids the adversaries.
 
-    Progress is the decrease of the distance to the nearest goal. The agent reaches an object if the distance between
-    their centres is below 1 m at the end of any substep. In training, the first object that is reached ends the
-    episode, and only this object counts. In evaluation, a reached object respawns and the episode continues. In
-    tracking, the objects move.
+    The progress, a term of the reward, is the decrease of the distance to the nearest goal. The agent reaches an object
+    if the distance between their centres is below 1 m at the end of any substep. In training, the first object that is
+    reached ends the episode, and only this object counts. In evaluation and test, a reached object respawns and the
+    episode continues. In the task "tracking", the objects move.
     """
 
     @cached_property

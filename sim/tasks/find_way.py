@@ -20,8 +20,10 @@ HEADING_SPREAD = math.radians(20)  # [rad] largest deviation of an initial headi
 class FindWay(AgentTask):
     """Task in which the agent moves away from the start and reaches the goal region.
 
-    Progress is the increase of the distance from the start. Reaching the goal region ends the episode. This is also the
-    case in evaluation, because these tasks have no objects that could respawn.
+    It is the task of the worlds "navigation" and "maze". The progress, a term of the reward, is the increase of the
+    distance from the start. Reaching the goal region ends the episode, in training as well as in evaluation and test.
+    (In the other tasks, goals are objects. In evaluation and test, a reached object respawns and the episode continues.
+    Here, there are no objects.)
     """
 
     def reset(self, worlds: SlidingAgents, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:

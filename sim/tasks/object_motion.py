@@ -60,6 +60,7 @@ def _nearest(to_x: np.ndarray, to_y: np.ndarray, x: np.ndarray, y: np.ndarray) -
 def _but_itself(k: int) -> np.ndarray:
     """Return an array (k, 2k, 1) that is added to squared distances from k objects to 2k positions.
 
-    It is infinite for the two positions of the object itself, and 0 for all others.
+    The 2k positions are the present and the next positions of all k objects. The array is infinite where an object is
+    compared with its own present or next position, and 0 elsewhere.
     """
     return np.tile(np.diag(np.full(k, np.inf)), 2)[..., None]

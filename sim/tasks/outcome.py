@@ -17,11 +17,11 @@ NOWHERE = np.empty(0, int)
 
 
 class RewardTerms:
-    """The named terms of the reward for each learning agent in each world (a "row").
+    """The named terms of the reward, with one value of each term per row. A row is one learning agent in one world.
 
     If one agent learns, the rows are the worlds. If several agents learn, the rows of the first agent in all worlds
-    come first, then those of the second agent. Terms are stored in one array (term, row). `of_rows`, where rows may
-    have different terms, also stores a dictionary for each row.
+    come first, then those of the second agent. The values are stored in one array (term, row). If rows have terms of
+    different names, use the constructor `of_rows`, which stores a dictionary for each row besides the array.
 
     names: names of the terms
     terms: values of the terms, (term, row)
@@ -42,7 +42,9 @@ class RewardTerms:
 
     @classmethod
     def of_rows(cls, rows: Sequence[Mapping[str, float]]) -> RewardTerms:
-        """Return the terms of one or more rows, whose terms may have different names.
+        """Return the terms of one or more rows. The names of the terms may differ between rows.
+
+        A row is one learning agent in one world.
 
         rows: terms by name, for each row; a term that a row lacks is 0 in `terms`
 
@@ -84,7 +86,10 @@ class RewardTerms:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one action in all worlds, which a task returns. Rows are those of `RewardTerms`.
+    """The outcome of one action in all worlds. The method `judge` of a task returns it.
+
+    A row is one learning agent in one world. The rows of the first agent in all worlds come first, then those of the
+    second agent.
 
     The environment raises a ValueError if an array has another shape than stated here, if a term is not finite, or if
     an index does not belong to a world.
@@ -93,8 +98,8 @@ class Outcome:
     terminated: True if the task ends the episode, (row,) bool
     success: True if the task is accomplished, (row,) bool
     failure: the worlds that could not continue, by index, each with the reason; their episodes end
-    over: True if a world's episode ends even if no row is terminated, for example because the task ends it for an
-        animal that does not learn and thus has no row, (world,) bool; None: False in all worlds
+    over: True if the task ends a world's episode without terminating a row, (world,) bool. An example is an end for an
+        animal that does not learn, and thus has no row. None: False in all worlds
     changed: indices of the worlds in which the task moved bodies after the action, (k,) int
     info: additional entries of each row's `info`; None: no additions
     proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, value);
@@ -141,7 +146,7 @@ class Step:
 
     @property
     def reward_terms(self) -> dict[str, np.ndarray]:
-        """Terms of the reward by name, (row,) each."""
+        """Terms of the reward by name, each an array (row,). A row is one learning agent in one world."""
         return {name: self.terms[name] for name in self.terms.names}
 
     @property

@@ -1,4 +1,4 @@
-"""A batch task that wraps tasks of one world at a time, and calls their plain Python methods world by world."""
+"""A batch task that wraps tasks of one world at a time, and calls the methods of these tasks world by world."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ class _OfWorld:
 
 
 class PerWorld(BatchTask):
-    """Batch task for all animals of a `sim.Encounter`, or for the animal of a `sim.Task` and the task's `others`.
+    """Task for many worlds at once, which calls the methods of a `sim.Task` or `sim.Encounter` world by world.
+
+    It has all animals of the encounter or, for a task, the task's own animal and its `others`.
 
     task: the task or the encounter
     learners: tasks of the learning animals

@@ -10,7 +10,7 @@ TRIES = 100  # in the field of the detection task, the first try succeeded in al
 
 
 class SpawnPoints:
-    """Possible starting positions: centres of cells for agents (a, 2) and for objects (m, 2) [m]."""
+    """Possible starting positions: centres of the world's square cells, for agents (a, 2) and objects (m, 2) [m]."""
 
     def __init__(self, agents: np.ndarray, objects: np.ndarray) -> None:
         self._agents, self._objects = agents, objects

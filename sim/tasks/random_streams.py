@@ -52,8 +52,9 @@ class StreamsByPurpose:
 
     seed: a seed for all worlds, None for a random seed, or a tuple with a seed for each world
     n: number of worlds
-    kinds: number of kinds of eyes of the agent, as the only entry
-    motion: attribute, random numbers for objects that move at random
+    kinds: number of kinds of eyes of each agent; the sequence has one number, because built-in tasks have one agent
+
+    Attribute `motion`: random numbers for objects that move at random.
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
@@ -73,7 +74,7 @@ class StreamsByPurpose:
 
     @cached_property
     def variation(self) -> list[np.random.Generator]:
-        """Generators of the quantities that vary between episodes, mainly light, one for each world."""
+        """One generator for each world, for the quantities that vary between episodes, such as the light."""
         return [np.random.Generator(np.random.PCG64(child)) for child in self._of_variation]
 
     def get_state(self) -> dict[str, np.ndarray]:
@@ -88,7 +89,7 @@ class StreamsByPurpose:
 class StreamsByWorld:
     """One generator for each world, for all random numbers of the world's episodes except the receptors' noise.
 
-    User tasks use this scheme. The noise follows from `noise_keys`.
+    User tasks use this scheme. The attribute `noise_keys` determines the receptors' noise.
 
     seed, n: see `StreamsByPurpose`
     kinds: number of kinds of eyes of each agent
@@ -146,8 +147,11 @@ class MotionNoise:
     def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
         """Restore the state of these worlds from the return value of `get_state`.
 
+        All worlds draw numbers for 64 actions in advance, and use them at the same pace.
+
         Raises:
-            ValueError: only some worlds are restored, and they have fewer or more numbers left than the other worlds.
+            ValueError: only some worlds are restored, and the number of further actions for which random numbers have
+                been drawn differs between the restored state and the other worlds.
         """
         _set_states(self._generators, state["motion"], worlds)
         ahead = np.asarray(state["motion_ahead"])
@@ -163,10 +167,14 @@ class MotionNoise:
 
 
 def _roots(seed: Any, n: int) -> tuple[Any, list[tuple[Any, int]]]:
-    """Return the entropy of all streams, and for each world the entropy and the index from which its streams derive.
+    """Return the entropy of the whole batch, and an entropy and an index for each world.
 
-    seed: one seed, from which the worlds derive different streams by their indices; or a tuple with a seed for each
-        world. In the second case, a world has the same streams as the first world of a batch with this world's seed
+    A world's random streams are seeded with its entropy and its index (the first number of a SeedSequence's spawn key).
+
+    seed: one seed, or a tuple with a seed for each world. With one seed, all worlds have the same entropy, and their
+        indices differ. With a tuple, each world has its own seed as entropy and the index 0. A world with the seed s in
+        a tuple therefore has the streams of the first world of a batch with the single seed s.
+    n: number of worlds
     """
     if isinstance(seed, tuple):
         return seed, [(own, 0) for own in seed]

@@ -22,7 +22,7 @@ def distance_to_nearest(state: WorldState, goals: int) -> np.ndarray:
 
 
 def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray) -> np.ndarray:
-    """Return the index of the first substep at whose end the agent is within 1 m of each object, (n, k).
+    """Return, for each object, the index of the first substep at whose end the agent is within 1 m of it, (n, k).
 
     For an object that the agent does not reach, the result is the number of substeps.
 

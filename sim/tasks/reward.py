@@ -3,8 +3,8 @@
     reward_t = λ progress_t + w_g goal_t + w_a adversary_t + w_c contact_t
 
     progress   change of a distance in metres; x_t is the agent's position after action t:
-               |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; x_goal is the position of the
-                                                     nearest goal at time t-1 or t
+               |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; in each term, x_goal is the
+                                                     goal that is nearest at the time of that term
                |x_t - x_start| - |x_(t-1) - x_start| navigation, maze; straight-line distances
     goal       1 when the goal, or the goal region of a course or maze, is reached
     adversary  1 when an adversary is reached
@@ -17,10 +17,11 @@
 
 Terms and weights follow the text of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
 Evolution". The fitness is the mean, over all evaluation episodes, of the sum of an episode's rewards. In training, the
-code published with the paper gives a metre of progress the same weight as an action in contact; rhabdom uses the
-weights of the text. Foraging is not in the paper and has the reward of detection. A training run may begin with a w_c
-closer to 0 (setting `learning.contact_ramp` of `evolve`). At the end of training, and in the fitness, the weights are
-those above. `sim.tasks.find_goal` and `sim.tasks.find_way` find the events of an action.
+code published with the paper gives a metre of progress the same weight as an action during which the agent touches a
+wall; rhabdom uses the weights of the text. Foraging is not in the paper and has the reward of detection. A training run
+may begin with a w_c closer to 0 (setting `learning.contact_ramp` of `evolve`). At the end of training, and in the
+fitness, the weights are those above. `sim.tasks.find_goal` and `sim.tasks.find_way` compute the progress, and find out
+whether a goal or an adversary is reached.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ TERMS = ("progress", "goal", "adversary", "contact")
 
 @dataclass(frozen=True)
 class RewardWeights:
-    """Weights of the terms.
+    """Weights of the four terms of the reward: progress, goal, adversary and contact.
 
     Progress is weighted per metre. The other terms are weighted per action in which a goal or the goal region is
     reached, an adversary is reached, or a wall is touched.
@@ -71,9 +72,9 @@ def check_mode(mode: str) -> None:
 def reward_terms(
     weights: RewardWeights, progress: np.ndarray, goal: np.ndarray, adversary: np.ndarray, contact: np.ndarray
 ) -> np.ndarray:
-    """Return the terms of the reward, (term, n), from the progress [m] and the events, in the order of the arguments.
+    """Return the weighted terms of the reward: progress, goal, adversary and contact, in this order, (term, n).
 
-    progress, goal, adversary, contact: amounts by which the weights are multiplied, (n,)
+    progress, goal, adversary, contact: amounts by which the weights are multiplied, (n,); progress in metres
     """
     terms = np.array([progress, goal, adversary, contact])
     terms *= weights.column

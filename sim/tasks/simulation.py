@@ -1,4 +1,4 @@
-"""Simulation of a task without rendering: actions lead to rewards and ends of episodes. Environments add the eyes."""
+"""Simulation of a task without rendering: movements, rewards and ends of episodes. Environments add the eyes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Simulation:
     felt: the last proprioception of each agent, as arrays (n, k) float32 by name
 
     Raises:
-        ValueError: `n` is below 1, or `least_return` is not below 0 or is given although the mode is not training.
+        ValueError: `n` is below 1, or `least_return` is 0 or more, or it is given in a mode other than training.
         RuntimeError: a method of a `sim.Task` fails in the first episode, which the constructor starts.
     """
 
@@ -78,7 +78,7 @@ class Simulation:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Start an episode in one world to find the shapes of proprioception and whether the task changes the model."""
+        """Start an episode in one world to find the size of proprioception, and whether the task changes the model."""
         first = np.zeros(1, int)
         self._start(first)
         while self.physics.adopt_changed_model():
@@ -179,7 +179,10 @@ class Simulation:
         )
 
     def _any_learner(self, rows: np.ndarray) -> np.ndarray:
-        """Return whether a condition (learners · n,), learners first, holds for any learner in a world, (n,) bool."""
+        """Return for each world whether a condition holds for any of its learners, (n,) bool.
+
+        rows: True where it holds: for the first learner in all worlds, then for the next learner, (learners · n,) bool
+        """
         return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 
     def poses(self) -> Poses:
@@ -260,10 +263,9 @@ class Simulation:
                     known[name][self._everyone[worlds][fresh]] = array[fresh]
 
     def _felt_keys(self) -> list[tuple[str, int, str]]:
-        """Return three values for each entry of the agents' proprioception.
+        """Return for each entry of proprioception: its key in `get_state`, the agent's index, and the entry's name.
 
-        They are its name in the stored state, the index of the agent, and its name in the proprioception. An agent
-        without proprioception has one entry with the name "".
+        An agent without proprioception has one entry with the name "".
         """
         found = []
         for k, (agent, known) in enumerate(zip(self.agents, self.felt, strict=True)):
@@ -274,10 +276,9 @@ class Simulation:
 
 
 def check_least_return(least_return: float | None, mode: str) -> None:
-    """Check that `least_return` is None, or is negative and used in training.
+    """Check the sum of rewards at which an episode is truncated: None or, in training only, a negative number.
 
-    With a value of 0 or more, an episode could end at its first action. In evaluation, the truncation would change the
-    fitness.
+    With 0 or more, an episode could end at its first action. In evaluation, truncated episodes would alter the fitness.
 
     Raises:
         ValueError: `least_return` is not negative, or the mode is not training.

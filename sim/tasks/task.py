@@ -36,7 +36,7 @@ class Task(TaskSettings):
 
     Methods are called for one world at a time, with its mjData after mj_forward. One task object is used for
     all worlds. Variables of an episode must therefore be stored in mjData (for example in `userdata`), not in the task.
-    A `sim.BatchTask` has the same methods for arrays of all worlds, which is faster.
+    A `sim.BatchTask` has the same methods, but one call handles all worlds at once. It is therefore faster.
     """
 
     others: Sequence[Frozen] = ()

@@ -1,6 +1,6 @@
 """Rendering fidelity of the eyes in a task.
 
-The task sets it, or it is chosen automatically from a few moments of the task's episodes.
+The task sets it. With the setting "auto", it is chosen by trial renderings of a few moments of the task's episodes.
 """
 
 from __future__ import annotations
@@ -31,9 +31,10 @@ WORLDS, LATER = 6, 12
 
 
 def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
-    """Return the fidelity of each kind of the first agent's eyes, by the name of the kind.
+    """Return the accuracy with which the first agent's eyes are rendered: a fidelity for each kind of eyes, by name.
 
-    If the task's setting is "auto", `sim.choose_model_fidelity` chooses the fidelity. The result is reproducible.
+    It is the task's setting `fidelity`. If this is "auto", `sim.choose_model_fidelity` chooses a fidelity. The result
+    is reproducible.
 
     Raises:
         ValueError: `fidelity` is neither a `sim.Fidelity` nor "auto", or the task's model or eyes are invalid.
@@ -73,7 +74,10 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
 
 
 def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
-    """Return the fidelities of one agent's eyes; "auto" is resolved in scenes that contain the other agents.
+    """Return the accuracy with which one agent's eyes are rendered: a fidelity for each kind of eyes, by name.
+
+    If the agent's task has the setting fidelity = "auto", the fidelity is chosen from scenes that contain the other
+    agents.
 
     number: index of the agent
 
@@ -88,9 +92,11 @@ def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
 
 
 def resolve_other_fidelities(task: Task) -> Task:
-    """Return a copy of the task whose `others` with a policy have definite fidelities of eyes instead of "auto".
+    """Return a copy of the task in which the eyes of other animals have a chosen fidelity instead of "auto".
 
-    Environments then need not choose these fidelities again. They do not render the eyes of animals without a policy.
+    A fidelity is the accuracy with which eyes are rendered. The other animals are those that do not learn, in the
+    task's attribute `others`. Environments then need not choose fidelities for these eyes again. Animals without a
+    policy are unchanged, because environments do not render their eyes.
 
     Raises:
         ValueError: see `fidelities_of`.
@@ -107,9 +113,10 @@ def resolve_other_fidelities(task: Task) -> Task:
 
 
 def _in_brightest(variation: Variation, eye: WorldEye) -> float:
-    """Return the allowed error of a signal, divided by the largest factor of the lights if this factor is above 1.
+    """Return the allowed error of a signal in the model, reduced if episodes may have more light than the model.
 
-    Errors are proportional to the light, and some episodes have more light than the model.
+    The error is divided by the largest factor by which an episode may multiply the lights, if this factor is above 1,
+    because errors are proportional to the light.
     """
     most = variation.extremes(np.asarray(eye.spectral_bands.wavelengths)).max()
     return allowed_error(eye, None) / max(float(most), 1.0)

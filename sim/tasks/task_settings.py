@@ -37,34 +37,38 @@ class TaskSettings:
         dictionaries, such as {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of
         "eyes".
     fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
-        from a few scenes of the task's episodes. Several kinds of eyes have one fidelity or a dictionary.
+        from a few scenes of the task's episodes. If an animal has several kinds of eyes, give one fidelity for all of
+        them, or a dictionary with a fidelity for each kind.
     substeps: physics steps per action, 1 to 10⁹
     episode_steps: number of actions after which an episode is truncated, 1 to 10⁹
-    spectra: spectra of materials and lights, by name, which replace their colours
+    spectra: spectra that replace the colours of materials and lights, by the name of the material or light
     medium: water or air between surfaces and eyes, see `sim.build_world`
-    vary: ranges (low, high) of quantities, by name. Values are drawn for each episode and world before `reset`:
+    vary: quantities that vary between episodes: the range (low, high) of each quantity, by the quantity's name. Values
+        are drawn for each episode and world before `reset`:
         "light": factor of all lights, with a uniformly distributed logarithm.
         "color_temperature": colour temperature of white [K], with a uniformly distributed reciprocal.
         "GEOM.size": factor of a geom's size, with a uniformly distributed logarithm. MuJoCo's compiler recomputes mass
         and inertia, so `model` must not be an MjModel or an MJB file.
-        "GEOM.color": colour of a geom. Red, green and blue are each drawn between their values in two colours. The
-        colour multiplies a texture.
+        "GEOM.color": colour of a geom, between the colours low and high. Red, green and blue are each drawn between
+        their values in these two colours. The colour multiplies a texture.
         "GEOM.material": names of materials of the model. The geom gets the texture, colour and emission of one of
         them. The geom must not have an rgba of its own.
         "JOINT.start": initial position of a hinge [rad] or a slide [m].
         "BODY.start": initial position between two points (x, y, z) [m], of a mocap body or a body with a free joint.
-        Except for "light" and "color_temperature", values are set in the world's data or in `data.model`, of which each
-        world then has a copy. Each world also has a copy of the model if the first `reset` changes `data.model`.
-        Otherwise all worlds share one model.
-    auxiliary: any of "depth", "ids" and "flow", which an observation then contains for each receptor in addition to its
-        signal. They describe the surface seen at the centre of the receptor: its depth along the eye's axis [m], the id
-        of its geom, and its motion on the retina since the last observation [receptors]; see docs/tasks.md. Evolving
-        eyes have no auxiliary entries.
+        Starting positions are set in the world's data. Sizes, colours and materials are set in `data.model`, and each
+        world then has its own copy of the model. Each world also has a copy of the model if the first `reset` changes
+        `data.model`. Otherwise all worlds share one model.
+    auxiliary: additional entries of an observation, with values for each receptor: any of "depth", "ids" and "flow".
+        They describe the surface seen at the centre of the receptor: its depth along the eye's axis [m], the id of its
+        geom, and its motion on the retina since the last observation [receptors]; see docs/tasks.md. Runs of `evolve`,
+        in which eyes evolve, have no auxiliary entries.
     camera: name of the camera for images of the task; None: a camera that shows the whole model
     actuators: names of the actuators that an action drives; None: all actuators
-    name: name of the animal, if there are several; None: the name of the class
-    failure_reward: reward of a step in which the world fails, as the term "failure". If rewards are negative costs, the
-        default of 0 is better than any normal episode. In this case, set a value below the return of an episode.
+    name: name of the animal, if a world contains several animals; None: the name of the class
+    failure_reward: reward for the last step of an episode that ends because the world cannot continue, for example
+        because a method of the task fails. It is the term "failure" among the terms of the reward. If rewards are
+        negative costs, the default of 0 is better than any normal episode. In this case, set a value below the return
+        of an episode.
     mode: "training", "evaluation" or "test" (an evaluation for final results). The environment sets it, and methods may
         read it; a class must not define it
     """

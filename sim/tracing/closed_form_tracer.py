@@ -1,11 +1,11 @@
 """A ray tracer in closed form for worlds of upright walls, a floor and spheres.
 
-A few walls are intersected one by one. If there are more, a ray walks through a grid in which each wall fills whole
-cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Light is traced in
-components. In a medium and for compound eyes, the components are the bands. Otherwise, there are fewer components if
-all lights share one spectrum and the materials' spectra are linear combinations of a few spectra. Each of these few
-spectra is then a component. After two reflections, the spectrum of light is a product of two materials' spectra, so all
-bands are traced, unless all materials are grey and all lights share one spectrum.
+If there are only a few walls, they are intersected one by one. Otherwise, a ray walks through a grid in which each wall
+fills whole cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Light is
+traced in components. In a medium and for compound eyes, the components are the bands. Otherwise, there are fewer
+components if all lights share one spectrum and the materials' spectra are linear combinations of a few spectra. Each of
+these few spectra is then a component. After two reflections, the spectrum of light is a product of two materials'
+spectra, so all bands are traced, unless all materials are grey and all lights share one spectrum.
 """
 
 from __future__ import annotations
@@ -69,9 +69,9 @@ class ClosedFormTables:
 
 @dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """Spheres and tables for one lane of the kernel.
+    """Surfaces that the rays of one world can hit: its spheres, and the walls and floor that all worlds share.
 
-    centres: centres of the visible spheres in the lane's world (Point3f)
+    centres, tables: centres of visible spheres (Point3f), and arrays that are the same in all worlds
     """
 
     centres: list[Array]
@@ -83,16 +83,17 @@ class ClosedForm:
 
     scene, wavelengths: the scene, and the centres of the eye's bands [m]
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: level of light: "direct", "bounce" or "all"
-    basis: (component, band): contribution of each component to each band
-    world, walls, lights, footprints, components: scene, walls, lights, method of intersecting walls, light's components
+    light: how often light is reflected: "direct" (once), "bounce" (up to twice) or "all" (any number of times)
+    basis: contribution of each component of the light to each band, (component, band)
+    world, walls, lights: the scene, its walls and its lights
+    footprints, components: method of intersecting walls, and spectra (bands or fixed ones) in which light is traced
     medium: water or air between surfaces and eyes; None: clear air
     faces: textures of walls and floor, see `face_rows`
     sphere_textures: for each sphere that rays can hit, the map from texture coordinates to texels, and the place of its
-        texture in the atlas
+        texture in the table of all texels
 
     Raises:
-        NoClosedForm: there are many walls, and they lie on no grid or overlap. There are further reasons if light is
+        NoClosedForm: there are many walls, and some overlap or do not fit a grid. There are further reasons if light is
             reflected more than once: walls have several heights or are lower than a body, a body may change its height,
             or the body that carries the eyes has a texture.
     """
@@ -133,17 +134,20 @@ class ClosedForm:
         return SphereRows(self.world.spheres, n_envs)
 
     def around(self, scenes: None, rows: Array, tables: ClosedFormTables, world: Array) -> ClosedFormSurroundings:
-        """Return the surfaces that rays of each Dr.Jit lane can hit: visible spheres of its world, walls and floor."""
+        """Return the surfaces that a Dr.Jit lane's rays can hit: walls, floor, and visible spheres of its world."""
         return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), tables)
 
     def all_bodies(self, centres: list[Array], stand: Array) -> list[Array]:
-        """Return the centres of the visible spheres and of the eyes' own body at `stand`, if this body is a sphere."""
+        """Return the centres of the visible spheres and, if the body that carries the eyes is a sphere, its centre.
+
+        centres, stand: centres of the visible spheres, and position of the body that carries the eyes
+        """
         if not self.world.has_own:
             return centres
         return [*centres, mi.Point3f(stand.x, stand.y, float(self.world.heights[-1]))]
 
     def radiance(self, seen: EyeRay, there: ClosedFormSurroundings, samples: Array) -> tuple[list[Array], Array]:
-        """Return the light along each ray, one array per component, and the distance to the visible surface [m]."""
+        """Return each ray's light, one array per component (band or fixed spectrum), and distance to a surface [m]."""
         centres, tables = there.centres, there.tables
         bodies = self.all_bodies(centres, seen.body)
         hit = self._hit(seen.ray, centres, tables)
@@ -157,10 +161,9 @@ class ClosedForm:
         return sent if self.medium is None else self.medium.through(sent, hit.t), hit.t
 
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
-        """Return the light that walls and floor reflect towards the origin of each ray, per component.
+        """Return the light that walls and floor reflect to the rays' origins, per component (band or fixed spectrum).
 
-        Walls and floor receive direct light, which the sphere at `shade` may block, and the additional irradiance
-        `more`, if given.
+        They receive direct light, which the sphere at `shade` may block, and the irradiance `more`, if given.
         """
         hit = self._hit(ray, [], self.inputs)
         light = self._irradiance(hit, [shade], self.inputs, [radius])
@@ -169,7 +172,10 @@ class ClosedForm:
         return [dr.select(hit.is_lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
 
     def _hit(self, ray: Array, centres: list[Array], tables: ClosedFormTables) -> _Hit:
-        """Return the first hits of rays with walls, floor or the first bodies, as many as there are `centres`."""
+        """Return the hit of each ray with the nearest surface: a wall, the floor or a sphere.
+
+        centres: centres of the scene's spheres; if there are fewer centres than spheres, rays ignore the last spheres
+        """
         t, face, normal = self.footprints.hit(ray, tables.cells)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
@@ -201,7 +207,7 @@ class ClosedForm:
     def _irradiance(
         self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos(angle of incidence) over unobstructed lights.
+        """Return the irradiance at hits due to unobstructed lights, per component of light (band or fixed spectrum).
 
         radii: radii of the bodies that cast shadows [m]; None: those of the scene
         """
@@ -220,10 +226,7 @@ class ClosedForm:
         return total
 
     def _face_texel(self, face: Array, point: Array, tables: ClosedFormTables) -> tuple[Array, ...]:
-        """Return the texture of a face, and the place of a point in it.
-
-        The five results are the texture's first texel, its numbers of columns and rows, and the point's column and row.
-        """
+        """Return a face's texture (first texel, number of columns, number of rows), and a point's column and row."""
         columns = dr.gather(mi.Vector4f, tables.faces, face * 3)
         place = dr.gather(mi.Vector4f, tables.faces, face * 3 + 2)
         x = _affine(columns, point)
@@ -243,7 +246,7 @@ class ClosedForm:
     def _interpolate(
         self, offset: Array, columns: Array, rows: Array, x: Array, y: Array, tables: ClosedFormTables
     ) -> list[Array]:
-        """Return the reflectance per component, interpolated bilinearly in a texture that repeats."""
+        """Return bilinearly interpolated reflectance of a repeating texture, per component (band or fixed spectrum)."""
         x0, x1, fx = _neighbours(x, columns)
         n = self.components.reflectance.shape[1]
         taps = [(offset, x0, 1 - fx), (offset, x1, fx)]
@@ -255,10 +258,7 @@ class ClosedForm:
 
 
 def _check_tops(scene: UprightScene) -> None:
-    """Refuse scenes whose reflected light has no closed form, for one of three reasons.
-
-    A ray from a wall or body could hit a wall's top, a body may change its height, or the eyes' body has a texture.
-    """
+    """Refuse scenes if light may hit a wall's top, a body may change its height, or the eyes' body has a texture."""
     for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
         if not settled:
             raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")

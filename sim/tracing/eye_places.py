@@ -124,7 +124,7 @@ class EyePlaces:
         return int({"site": model.site_bodyid, "camera": model.cam_bodyid}[kind][index]) if kind != "body" else index
 
     def _in_body(self, number: int, body: int, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
-        """Return an eye's pupil [m], (3,), and its frame, (3, 3), in the body's frame."""
+        """Return an eye's position (that of its pupil) [m], (3,), and its frame, (3, 3), in the body's frame."""
         (kind, index), (offset, turn) = self._things[number], self._locals[number]
         if kind == "body":
             return offset, turn

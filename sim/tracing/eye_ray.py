@@ -1,4 +1,4 @@
-"""A ray that leaves an eye, inside a kernel."""
+"""A ray from an eye into the scene, and data about its eye, which functions of the renderer pass to each other."""
 
 from __future__ import annotations
 

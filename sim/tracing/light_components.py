@@ -13,9 +13,10 @@ GREY = 1e-4
 
 @dataclass(frozen=True)
 class Components:
-    """Factors of the radiance in band b: sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
+    """Components of light, which are traced like spectral bands, and the contribution of each component to each band.
 
-    The index k counts components, and l counts lights with the angle of incidence θ_l.
+    The radiance in band b is sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l. The index k counts components,
+    and l counts lights with the angle of incidence θ_l.
 
     reflectance: (texel, component)
     levels: levels of the lights, (light, component)
@@ -28,10 +29,14 @@ class Components:
 
 
 def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components that describe reflectances `texels` (texel, band) under `irradiance` (light, band).
+    """Return components for light that is reflected only once.
 
-    They are fewer than the bands if all lights share one spectrum and the reflectances have a smaller rank. Otherwise
-    they are the bands.
+    Components are fixed spectra. The light that any surface reflects is a weighted sum of them. There are fewer
+    components than bands if all lights share one spectrum and the reflectances are linear combinations of fewer spectra
+    than there are bands. Otherwise, each component is one band.
+
+    texels: reflectances of the surfaces, (texel, band)
+    irradiance: irradiance of each light, (light, band)
     """
     n_bands = texels.shape[1]
     brightest = irradiance[np.argmax(irradiance.sum(axis=1))]
@@ -45,7 +50,11 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 
 
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components for which a reflection multiplies each component of the light by the texel's component.
+    """Return components for light that is reflected several times.
+
+    Components are fixed spectra, and light is a weighted sum of them. The components are chosen so that each reflection
+    multiplies the weight of each component by one number, the surface's reflectance for this component. One component
+    is enough if all surfaces are grey and all lights share one spectrum. Otherwise, each component is one band.
 
     texels, irradiance: see `components_of`
     """
@@ -59,7 +68,9 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 
 
 def components_in_bands(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components that are the bands, for light that passes a medium or several reflections.
+    """Return components of light that are the spectral bands themselves.
+
+    Light that crosses a medium or is reflected several times generally needs all bands.
 
     texels, irradiance: see `components_of`
     """

@@ -46,10 +46,11 @@ def spectra(wavelengths: np.ndarray) -> list[Array]:
 
 
 def spawn_bounce_ray(point: Array, normal: Array, bounce_sample: Array, clearance: float = 1) -> Array:
-    """Return a ray that leaves a surface in the direction to which a sample (2,) on the unit square is mapped.
+    """Return a ray that leaves a surface in a direction that depends on a sample, a point on the unit square, (2,).
 
-    The directions of uniform samples are distributed as Lambert's cosine. If light of radiance L arrives along the ray,
-    the radiance that the surface reflects is the mean of ρ L over the samples, with the surface's reflectance ρ.
+    If samples are uniform on the square, the density of directions is proportional to the cosine of the angle with the
+    normal (Lambert's law). If light of radiance L arrives along the ray, the radiance that the surface reflects is the
+    mean of ρ L over the samples, with the surface's reflectance ρ.
 
     clearance: see `clear_of`
     """

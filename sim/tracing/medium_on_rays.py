@@ -1,4 +1,4 @@
-"""Absorption and veiling light of water or air between a surface and an eye, inside kernels."""
+"""Absorption and veiling light of water or air between a surface and an eye, for code in Dr.Jit kernels."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ LEAST = 1e-6  # [1/m] smallest coefficient; a path of length FARTHEST is then op
 
 @dataclass(frozen=True)
 class MediumOnRays:
-    """A medium in the components of a tracer, each of which is one band.
+    """A medium, such as water or hazy air, that attenuates light and adds veiling light on the way to an eye.
 
-    A surface of radiance L appears at the distance d with the radiance L exp(-c d) + V (1 - exp(-c d)).
+    A surface of radiance L appears at the distance d with the radiance L exp(-c d) + V (1 - exp(-c d)). The tracer's
+    components of light are spectral bands, and each band has its own c and V.
 
     attenuation: coefficient c of each component [1/m]
-    veil: veiling light V, the radiance of a path of infinite length, per component
+    veil: veiling light V of each component, the radiance of a path of infinite length
     """
 
     attenuation: tuple[float, ...]
@@ -31,22 +32,30 @@ class MediumOnRays:
 
     @classmethod
     def from_bands(cls, medium: BandMedium, basis: np.ndarray) -> MediumOnRays:
-        """Return the medium for a tracer whose `basis` (component, band) is diagonal: components are scaled bands."""
+        """Return the medium for a tracer in which each component of light is one spectral band times a factor.
+
+        basis: matrix with these factors on its diagonal and 0 elsewhere, (component, band)
+        """
         veil = medium.veil / np.diag(basis)
         return cls(tuple(map(float, np.maximum(medium.attenuation, LEAST))), tuple(map(float, veil)))
 
     def through(self, radiance: Sequence[Array], distance: Array) -> list[Array]:
-        """Return the radiance that arrives from surfaces of this radiance at these distances [m], per component.
+        """Return the radiance that arrives at the eye from surfaces of a given radiance, one array per spectral band.
 
-        A ray that hits no surface has an infinite distance, and the result is V.
+        For a ray that hits no surface, the result is the veiling light.
+
+        distance: distances of the surfaces [m]; infinite for rays that hit no surface
         """
         return [v + more for v, more in zip(self.veil, self.contrasts(radiance, [distance]), strict=True)]
 
     def contrasts(self, radiance: Sequence[Array], distances: Sequence[Array], share: Array | float = 1) -> list[Array]:
-        """Return share · (L - V) exp(-c d), the contrast of surfaces with the veiling light, per component.
+        """Return a surface's contrast with the veiling light, as it arrives at the eye, one array per spectral band.
 
-        radiance: share · L, where L is the radiance of the surface
-        distances: distances d [m], over which exp(-c d) is averaged
+        The contrast is share · (L - V) exp(-c d), with the surface's radiance L and distance d, the veiling light V and
+        the medium's attenuation coefficient c.
+
+        radiance: share · L
+        distances: values of d [m]; the mean of exp(-c d) over them is used
         share: fraction of an area that the surface fills
         """
         near = [dr.minimum(d, FARTHEST) for d in distances]
@@ -59,9 +68,14 @@ class MediumOnRays:
     def reflected_contrasts(
         self, reflectance: Sequence[Array], light: Sequence[Array], distances: Sequence[Array]
     ) -> tuple[list[Array], list[Array]]:
-        """Return the contrasts of a surface that reflects this light, and 1 for each component.
+        """Return two factors for each spectral band: a surface's contrast with the veiling light, and 1.
 
-        The contrasts already include the reflectances, which callers replace by these factors of 1.
+        The contrast is (reflectance · light - veiling light) · transmission of the medium. Without a medium, a caller
+        multiplies the light on the surface by the reflectance. With a medium, the same code multiplies the two factors:
+        the contrast in place of the light, and 1 in place of the reflectance.
+
+        light: light on the surface, one array per spectral band
+        distances: distances from the eye [m], over which the transmission is averaged
         """
         sent = [r * e for r, e in zip(reflectance, light, strict=True)]
         return self.contrasts(sent, distances), [mi.Float(1)] * len(sent)

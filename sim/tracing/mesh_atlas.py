@@ -26,7 +26,9 @@ PITCH, BALL = 2.5, 1.1
 
 @dataclass(frozen=True)
 class MeshAtlas:
-    """Moving meshes in one scene.
+    """Moving meshes in one scene, each in a separate cube of space, its cell.
+
+    Each mesh is scaled so that it just fits into a ball of radius 1 in its cell.
 
     cells: centre of each mesh's cell, (mesh, 3)
     scene: Mitsuba's scene of all meshes; None without meshes
@@ -39,8 +41,10 @@ class MeshAtlas:
     def from_parts(parts: Sequence[Sequence[Part]], reach: np.ndarray, bsdf: MitsubaObject) -> MeshAtlas:
         """Return the atlas of meshes with these parts.
 
+        parts: parts of each mesh
         reach: largest distance of each mesh's surface from its origin [m], (mesh,)
-        bsdf: BSDF of the shapes in the atlas. It has no effect, because light is computed with the movers' own BSDFs
+        bsdf: BSDF of the shapes in the atlas. It has no effect, because the atlas only finds hits. Light is
+            computed with the BSDFs of the moving bodies themselves
         """
         if not len(parts):
             return MeshAtlas(np.zeros((0, 3)), None)
@@ -58,7 +62,7 @@ class MeshAtlas:
         """Return the distance [m] from the point o to a mesh in the direction d; infinite for a miss.
 
         o, d: origin [m] and direction (a unit vector) of the ray, in the mesh's frame
-        cell: centre of the mesh's cell
+        cell: centre of the mesh's cell, a cube that contains only this mesh in the scene of all meshes, see `cells`
         reach: largest distance of the mesh's surface from its origin [m]
         """
         ray, start = _within(o, d, cell, reach)
@@ -67,7 +71,7 @@ class MeshAtlas:
         return dr.select(found.is_valid(), (start + found.t) * reach, dr.inf)
 
     def surface(self, o: Array, d: Array, cell: Array, reach: Array, active: Array) -> tuple[Array, Array]:
-        """Return the normal in the mesh's frame, and the texture coordinates, at the hits of `hit`.
+        """Return the normal in the mesh's frame, and the texture coordinates, at the points where rays hit the mesh.
 
         o, d, cell, reach: see `hit`
         active: True for rays that hit a mesh
@@ -79,7 +83,13 @@ class MeshAtlas:
 
 
 def _within(o: Array, d: Array, cell: Array, reach: Array) -> tuple[Array, Array]:
-    """Return the part of a ray inside the ball of a cell, and the distance to its start, in radii of the mesh."""
+    """Return the part of a ray that lies inside the ball around one mesh, and the distance to the start of this part.
+
+    The returned ray is in the coordinates of the scene of all meshes (`MeshAtlas`). In this scene, the mesh is scaled
+    to the radius 1, and the ball has the radius 1.1. The distance is in radii of the mesh.
+
+    o, d, cell, reach: see `MeshAtlas.hit`
+    """
     centre = o / reach
     nearest = -dr.dot(centre, d)
     aside = dr.fma(d, nearest, centre)

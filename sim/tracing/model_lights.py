@@ -1,6 +1,7 @@
 """Lights of any model, which may move: directional lights, points, spots, and the headlight of each eye.
 
-Mitsuba's emitters (`sim.scene.lights`) determine their emission, so that the renderer agrees with `sim.mirror`.
+The spectrum and strength of each light are read from its emitter in Mitsuba (`sim.scene.lights`), so that the renderer
+agrees with the Mitsuba scenes of `sim.mirror`, which contain these emitters.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class ModelLight:
 
     light: id in the model; -1: the headlight of the observing eye
     kind: "directional", "point" or "spot"
-    level: irradiance per band (band,) on a surface that faces the light, at a distance of 1 m from points and spots
+    level: irradiance of a surface that faces the light, (band,); for "point" and "spot", at a distance of 1 m
     cutoff, exponent: for a spot, the cosine of its half angle, and the exponent of its falloff to the side
     direction: unit vector (3,) towards a directional light in the model's reference pose; None for other lights
     casts_shadow: True if obstacles block the light
@@ -110,12 +111,14 @@ class Lights:
         return rows.reshape(poses.n, len(self), -1)
 
     def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
-        """Return the unit vector from a point to a light, the distance [m], and a factor of the light's level.
+        """Return the unit vector from a point to a light, the distance [m], and the light's relative strength there.
 
-        The level times this factor is the irradiance of a surface at the point that faces the light.
+        The relative strength, times the light's `level`, is the irradiance of a surface that is at the point and faces
+        the light. The distance to a directional light or a headlight is a large constant.
 
-        k, there: index of the light, and the lights' rows in the lane's world
+        k: index of the light
         axis: axis of the observing eye
+        there: positions and directions of all lights in the world of the ray, see `rows`
         """
         light = self.found[k]
         if light.light < 0:

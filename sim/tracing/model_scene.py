@@ -39,26 +39,28 @@ _HERE = Path(__file__).parents[1]
 
 
 class ModelScene:
-    """The parts of a model that tracers need. Mitsuba's scenes are built on first use.
+    """The parts of a model that tracers of rays need. Mitsuba's scenes are built on first use.
 
     model: the MuJoCo model
     eye: determines the spectral bands
     groups: visible geom groups
-    medium: water or air; the attribute is the medium in the eye's bands; None: clear air
+    medium: water or air between surfaces and eye; None: clear air. The attribute `medium` contains the
+        medium's optical properties in the eye's bands
     variant: Mitsuba's variant
     geoms: ids of all visible geoms
     looks: appearances of these geoms; a geom that may have several materials has one for each of them
-    moving: appearances that glow, or of geoms that may change their place, size, colour or material
+    moving: appearances of all "movers". These are the geoms that glow, and the geoms that may change their place, size,
+        colour or material
     bsdfs: the BSDF of every appearance; equal surfaces share one object. They are stored here, because a BSDFPtr does
         not keep its objects alive
     lights: all lights
     spectra: measured spectra of materials and lights, by name
-    has_sky: True if rays without a hit reach a sky
-    glows: BSDFs whose reflectance is the radiance of a glowing geom, by appearance; such geoms count as movers
+    has_sky: True if rays that hit nothing reach a sky
+    glows: for each appearance of a geom that glows, a BSDF whose reflectance is the radiance that the geom emits
     varied: geoms whose size, colour or material differs between worlds, with the ids of the materials that each may
-        have; they count as movers, although they may be static
+        have. They are movers, even if they always stay in the same place
     coincidences: geoms in the same place in the model's reference pose
-    as_built: snapshot of the model, with which worlds are compared
+    as_built: snapshot of the model, with which the models of worlds are compared
 
     Raises:
         ValueError: the model has no visible geoms, or lacks an element that `spectra` or `varied` names.
@@ -106,10 +108,14 @@ class ModelScene:
         return _moves(self.model, look.geom) or look.geom in self.varied or look in self.glows
 
     def warn_of_missing(self, light: str = DIRECT) -> None:
-        """Warn (`sim.MirrorWarning`) of features that are not rendered with this level of light.
+        """Warn (`sim.MirrorWarning`) of features of the model that are not rendered, such as gloss and mirrors.
 
-        Also warn of measured lights for which the eye has too few bands, and of geoms of different groups in the same
-        place.
+        Also warn of geoms of different groups in the same place, and of lights with a measured spectrum that the eye's
+        bands represent inaccurately, because there are too few bands.
+
+        light: how often the rendered light may be reflected on its way to the eye: "direct": once, "bounce": once or
+            twice, "all": any number of times. With "direct", surfaces are not lit by the sky or by glowing materials,
+            and the warning says so
         """
         model = self.model
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
@@ -121,7 +127,7 @@ class ModelScene:
 
     @cached_property
     def as_built(self) -> ModelSnapshot:
-        """Snapshot of the model, with which worlds are compared."""
+        """Snapshot of the model, with which the models of worlds are compared."""
         model, groups = self.model, self._groups
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
         hidden = [g for g in reachable if g not in self._visible]
@@ -131,7 +137,7 @@ class ModelScene:
 
     @cached_property
     def movers(self) -> Movers:
-        """The moving geoms."""
+        """The moving geoms, and the geoms that glow or whose size, colour or material may change."""
         with in_variant(self.variant):
             return Movers(self.model, self.moving, self.coincidences.lifts, next(iter(self.bsdfs.values())))
 
@@ -172,8 +178,10 @@ class ModelScene:
     def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
         """Return a BSDF whose reflectance is the radiance of a glowing geom; None if the geom does not glow.
 
-        The kernel evaluates it like other BSDFs. If it is white, the kernel multiplies it by the colour in the lane's
-        world.
+        The renderer's kernel evaluates this BSDF like other BSDFs.
+
+        white: True if the geom's colour differs between worlds. The geom is then treated as white, and the kernel
+            multiplies the radiance by the colour in the rendered world
         """
         to_uv, geom = shapes.uv_transform(look.model, look.geom), look.geom
         model = in_white(look.model, geom) if white else look.model

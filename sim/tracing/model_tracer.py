@@ -2,8 +2,7 @@
 
 Direct light comes from lamps only. With bounced light (`sim.tracing.lighting`), a bounce ray leaves every visible
 surface. It collects light that a second surface reflects or emits, or light of the sky. If there is a sky or a glowing
-geom, another ray leaves the second surface and collects the light of sky and glowing geoms. This includes all light
-after at most two reflections.
+geom, another ray leaves the second surface and collects their light. Light is thus reflected at most twice.
 """
 
 from __future__ import annotations
@@ -39,10 +38,11 @@ class Scenes:
 
 @dataclass(frozen=True)
 class Tables:
-    """Arrays that are the same in all worlds.
+    """Arrays that are the same in all worlds. A moving geom is one "mover" for each material that it may have.
 
-    bsdfs, painted, ends: BSDF and index in `Paint` of each mover, and index of the first mover of each kind
-    sky, glows: the sky's emitter, and the BSDFs of glowing geoms; None if there are none
+    bsdfs, painted: each mover's BSDF, and its geom's index among geoms whose colour differs between worlds (`Paint`)
+    ends: index of the first mover of each kind of geom, such as spheres, followed by the number of movers
+    sky, glows: emitter for the sky (None: no sky); BSDFs whose reflectance is a glowing geom's radiance (None: no glow)
     glowing: for each mover, its index in `glows`, or len(glows) if it does not glow; None if no geom glows
     """
 
@@ -56,7 +56,7 @@ class Tables:
 
 @dataclass(frozen=True)
 class Rows:
-    """Arrays that differ between worlds, for all worlds: places of movers and lights, and colours."""
+    """Arrays with the poses of moving geoms, the poses of lights, and the colours of geoms, in all worlds."""
 
     movers: Array
     lights: Array
@@ -65,7 +65,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Scenes, rows and tables for the world of one lane."""
+    """All that a ray can meet in its world. Static geoms (`still`) and `tables` are the same in all worlds."""
 
     still: MitsubaObject
     movers: MoverRows
@@ -75,7 +75,7 @@ class Surroundings:
 
 
 class RowBuffers:
-    """Buffers for the rows of `n_envs` worlds, which kernels read."""
+    """Buffers from which kernels read poses of moving geoms and lights, and colours of geoms, in `n_envs` worlds."""
 
     def __init__(self, scene: ModelScene, n_envs: int) -> None:
         self._scene = scene
@@ -84,7 +84,7 @@ class RowBuffers:
         self._movers, self._lights, self._paint = (shared.values.reshape(n_envs, -1) for shared in self._shared)
 
     def fill(self, poses: Poses) -> None:
-        """Write the rows of these worlds."""
+        """Write the poses of moving geoms and lights, and the colours of geoms, in all worlds into the buffers."""
         scene = self._scene
         self._movers[:] = scene.movers.rows(poses)
         if len(scene.paint):
@@ -94,7 +94,7 @@ class RowBuffers:
             self._lights[:] = scene.lights.rows(poses).reshape(poses.n, -1)
 
     def arrays(self) -> Rows:
-        """Return the rows as arrays on the device."""
+        """Return the buffers as arrays on the device."""
         return Rows(*(shared.array for shared in self._shared))
 
 
@@ -102,10 +102,10 @@ class RowBuffers:
 class _SurfaceHit:
     """First hits of rays.
 
-    si: interaction for the BSDF
-    colors, glow: factors of reflectance and emission, one spectrum for every 4 bands
-    which: index of the mover, or the number of movers if the ray hits none of them
-    seen, active: True for rays that hit a surface, and for rays that are traced
+    bsdf, si: BSDF of the hit surface; its argument, which is Mitsuba's description of the hit
+    colors, glow: factors that multiply the surface's reflectance and its emission, as spectra of 4 bands each
+    which: index of the hit moving geom in `Movers`, or len(Movers) if the ray hits no moving geom
+    seen, active: seen is True for rays that hit a surface, active is True for rays that are traced
     point, normal, t, direction: hit point, normal towards the ray's origin, distance [m], and direction of the ray
     """
 
@@ -127,7 +127,7 @@ class ModelTracer:
 
     name, why: name of the tracer, and the reason for its choice, for reports
     light: level of light, "direct" or "bounce"; ValueError for "all"
-    basis: (component, band): contribution of each component to each band; each component is one band
+    basis: identity matrix (component, band), because each component of the light is one band
     """
 
     name = "mitsuba"
@@ -155,11 +155,11 @@ class ModelTracer:
         return whole_numbers([*of_movers, len(number)]), mi.BSDFPtr(list(scene.glows.values()))
 
     def buffers(self, n_envs: int) -> RowBuffers:
-        """Return buffers for the rows of `n_envs` worlds."""
+        """Return buffers for the poses of moving geoms and lights, and the colours of geoms, in `n_envs` worlds."""
         return RowBuffers(self._scene, n_envs)
 
     def around(self, scenes: Scenes, rows: Rows, tables: Tables, world: Array) -> Surroundings:
-        """Return the surroundings of a lane in this world."""
+        """Return all that rays can meet in the worlds with these indices, one index for each ray."""
         sizes = self._scene.movers.n_rows, max(len(self._scene.lights), 1) * LIGHT_ROWS, self._scene.paint.n_rows
         movers, lights, paint = (world * n for n in sizes)
         return Surroundings(
@@ -182,7 +182,7 @@ class ModelTracer:
         return sent if self._medium is None else self._medium.through(sent, hit.t), hit.t
 
     def _returned(self, hit: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
-        """Return the light that a bounce ray collects for each visible surface, see the module's docstring."""
+        """Return the light that each visible surface receives from one direction, which is sampled at random."""
         bounce_ray = lighting.spawn_bounce_ray(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
         second = self._first_hits(bounce_ray, there, hit.seen)
         arrives = self._irradiance(second, axis, there)
@@ -229,9 +229,9 @@ class ModelTracer:
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return a number for the surface that each ray hits first, if `still` is `ModelScene.one_shape_per_geom`.
+        """Return what a ray hits first: a moving geom's index in `Movers`, or len(Movers) plus a static shape's id.
 
-        It is a mover's index, or the number of movers plus the Mitsuba id of a static shape (0 for none).
+        The id is 0 without a hit. `there.still` must be the scene that `ModelScene.one_shape_per_geom` contains.
         """
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()

@@ -35,10 +35,10 @@ MESH = "mesh"
 
 @dataclass(frozen=True)
 class Hit:
-    """First hit of a ray.
+    """First hit of a ray. Without a hit, `t` is `farthest` (see `Movers.nearest`), and `which` is len(Movers).
 
-    t, which: distance [m] and index of the mover; without a hit, the argument `farthest` and the number of movers
-    normal, uv: unit vector in the world's frame, and texture coordinates of meshes and planes
+    t, which: distance of the hit from the ray's origin [m], and index of the mover that is hit in `Movers`
+    normal, uv: normal (a unit vector in the world's frame), and texture coordinates (only for meshes and planes)
     """
 
     t: Array
@@ -49,10 +49,10 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """A mover's frame.
+    """Frame and size of one moving geom. For a mesh, `size` is its position in the `MeshAtlas` instead.
 
-    axes, origin: axes (three Vector3f) and origin (Vector3f) of the frame in the world
-    size, reach: half sizes (mesh: centre of its cell in the atlas); largest distance of the surface from the origin
+    axes, origin: the frame's three axes (Vector3f each) and its origin (Vector3f), in the world's frame
+    size, reach: half of the size along each axis, and largest distance from the origin to the geom's surface [m]
     """
 
     axes: tuple[Array, Array, Array]
@@ -61,28 +61,28 @@ class _Frame:
     reach: Array
 
     def to_mover(self, v: Array) -> Array:
-        """Convert a direction from the world's frame to the mover's frame."""
+        """Convert a direction from the world's frame to the frame of the moving geom."""
         return mi.Vector3f(*(dr.dot(axis, v) for axis in self.axes))
 
     def to_world(self, v: Array) -> Array:
-        """Convert a direction from the mover's frame to the world's frame."""
+        """Convert a direction from the frame of the moving geom to the world's frame."""
         return self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
 
 
 @dataclass(frozen=True)
 class MoverRows(WorldRows):
-    """Rows of one world: one for a sphere around all movers, then 4 per mover (`ends`: first mover of each kind)."""
+    """Places and sizes of moving geoms in one world. Geoms of kind i have the indices ends[i] to ends[i + 1] - 1."""
 
     ends: Array
 
 
 class Movers:
-    """The moving geoms of a model ("movers", one for each material a geom may have): primitives by kind, then meshes.
+    """The "movers": each moving geom once for each material that it may have. They are sorted by kind, meshes last.
 
     looks, geoms: appearance and geom id of each mover
-    atlas: the movers that are meshes
-    lifts, bsdf: distances by which surfaces are moved outwards [m], by geom; any BSDF, for the atlas
-    ends: index of the first mover of each kind, for the kernel
+    atlas, bsdf: Mitsuba's scene of the moving meshes; a BSDF that this scene needs, and that has no effect on light
+    lifts: for geoms that coincide with others, by geom id: distance [m] by which the surface is moved outwards
+    ends: index of the first mover of each kind, followed by the number of movers; an array for the kernel
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class Movers:
         self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
 
     def _of_kind(self, kind: str) -> slice:
-        """Return the indices of the movers of a kind."""
+        """Return the indices in `Movers` of the geoms of one kind."""
         i = [*PRIMITIVES, MESH].index(kind)
         return slice(int(self._ends[i]), int(self._ends[i + 1]))
 
@@ -119,16 +119,16 @@ class Movers:
 
     @property
     def apart(self) -> bool:
-        """True if movers are intersected in a separate kernel, which cannot be inside a branch (see `computed`)."""
+        """True if a separate kernel intersects rays with moving geoms. It does so on a GPU if any of them is a mesh."""
         return self.atlas.scene is not None and on_gpu()
 
     @property
     def n_rows(self) -> int:
-        """Number of rows of four floats in one world."""
+        """Number of rows of four floats that describe the moving geoms of one world."""
         return 1 + ROWS * len(self)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return rows of 4 floats: one for a sphere around all movers, then 4 per mover, (world, 4 n_rows) float32."""
+        """Return a sphere around all moving geoms, then each mover's frame and size, as float32 (world, 4 n_rows)."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
             places, (sizes, reach) = poses.geom_places(self.geoms), self._extents(poses)
@@ -148,7 +148,7 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return a mask of appearances that a world does not show, (world or 1, mover); None if each geom has one."""
+        """Return where a geom lacks its mover's material, (world or 1, mover); None if no geom's material varies."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -156,7 +156,7 @@ class Movers:
         return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-        """Return the half sizes (world or 1, mover, 3) and reaches (world or 1, mover) of movers [m], see `_Frame`."""
+        """Return half sizes (world or 1, mover, 3) and bounding radii (world or 1, mover) of moving geoms [m]."""
         if poses.geom_size is None:
             sizes = self._sizes[None].copy()
         else:
@@ -228,7 +228,7 @@ class Movers:
         return blocked
 
     def _kinds(self) -> list[tuple[int, Callable[..., Array]]]:
-        """Return the index and the intersection function of each kind of mover that occurs."""
+        """Return the index and the intersection function of each kind of geom that is among the moving geoms."""
         hits = [*(_of_primitive(primitive) for primitive in PRIMITIVES.values()), self._mesh_hit]
         return [(i, hit) for i, hit in enumerate(hits) if self._ends[i] < self._ends[i + 1]]
 
@@ -265,7 +265,7 @@ def _of_primitive(primitive: Primitive) -> Callable[..., Array]:
 
 
 def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
-    """Return the distance to mover k along a ray [m]; infinite for a miss, and for absent movers (origin NaN)."""
+    """Return the distance along a ray to moving geom k [m]; infinite for a miss, or if the geom's origin is NaN."""
 
     # A branch skips the intersection for rays that miss the sphere around the mover, as most rays do.
     def within() -> Array:
@@ -277,7 +277,7 @@ def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Arr
 
 
 def _frame(there: MoverRows, k: Array) -> _Frame:
-    """Return the frame of a mover."""
+    """Return the frame and the size of moving geom k."""
     x, y, z, reach = there.four(1 + k * ROWS)
     fours = [list(there.four(1 + k * ROWS + i)) for i in range(1, ROWS)]
     a, b, c = (mi.Vector3f(*four[:3]) for four in fours)
@@ -285,7 +285,7 @@ def _frame(there: MoverRows, k: Array) -> _Frame:
 
 
 def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
-    """Return whether a ray hits the sphere of this row."""
+    """Return whether a ray hits the sphere that a row contains, around one moving geom or around all (row 0)."""
     x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)

@@ -1,9 +1,9 @@
 """Colours that differ between worlds ("paint"), as reflectances of geoms in the eye's bands.
 
-The BSDF of a painted geom is white, times its texture if it has one. The kernel multiplies its reflectance by the
-colour in the lane's world, as MuJoCo multiplies a texture by a colour. As in all scenes, Mitsuba converts colours to
-spectra (Jakob and Hanika 2019). A glowing geom emits light of this colour, with the spectrum of
-`sim.scene.lights.emission`.
+The BSDF of a painted geom contains the geom's texture, or is white without a texture. When the kernel (the program that
+traces rays) renders a world, it multiplies the BSDF's reflectance by the geom's colour in this world, as MuJoCo
+multiplies a texture by a colour. As in all scenes, Mitsuba converts colours to spectra (Jakob and Hanika 2019). The
+emission of a glowing geom, see `sim.scene.lights.emission`, is multiplied by the geom's colour in the same way.
 """
 
 from __future__ import annotations
@@ -26,22 +26,25 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class PaintRows(WorldRows):
-    """Rows of one world: reflectances of the painted geoms.
+    """Reflectances of geoms whose colour differs between worlds ("painted" geoms), in the world of a ray.
 
-    painted: see `Paint`
+    The reflectances are stored in rows of four floats.
+
+    painted: for each entry of `Movers`, the index of its geom among the painted geoms, see `Paint`
     """
 
     painted: Array
 
 
 class Paint:
-    """Colours of the painted geoms. The scene's Mitsuba variant must be active.
+    """Colours of the "painted" geoms, whose colours differ between worlds. The scene's Mitsuba variant must be active.
 
     geoms: ids of the painted geoms
-    movers: geom id of each mover
+    movers: geom id of each "mover". Each moving or painted geom is one mover for each material that it may have
     wavelengths: centres of the bands [m], (band,)
     glow: True if any of the painted geoms glows
-    painted: index in `geoms` of each mover's geom, or len(geoms) for geoms without paint, for the kernel
+    painted: for each mover, the index of its geom in `geoms`, or len(geoms) if this geom is not painted; an array for
+        the kernel. A last entry, len(geoms), is for rays that hit no mover
     """
 
     def __init__(
@@ -61,7 +64,7 @@ class Paint:
 
     @property
     def n_rows(self) -> int:
-        """Number of rows of four floats in one world, at least 1."""
+        """Number of rows of four floats that contain the colours of one world, at least 1."""
         return max(len(self) * len(self._spectra) * (1 + self.glow), 1)
 
     def rows(self, poses: Poses) -> np.ndarray:
@@ -88,9 +91,12 @@ class Paint:
         return np.where(unset, self._own, here[..., :3])
 
     def factors(self, which: Array, there: PaintRows, seen: Array, *, glow: bool = False) -> list[Array]:
-        """Return the factors of a mover's reflectance or (if `glow`) emission, as spectra; 1 for geoms without paint.
+        """Return the factors by which reflectance or, if `glow`, emission is multiplied, as spectra of 4 bands each.
 
-        which: index of the mover
+        The factors are 1 for geoms that have the same colour in all worlds.
+
+        which: index of the moving geom ("mover") that a ray hits, or the number of movers if it hits none
+        there: the colours in the ray's world
         seen: True for rays that hit a surface
         """
         k = dr.gather(mi.UInt32, there.painted, which, seen)
@@ -105,8 +111,8 @@ class Paint:
     def _spectrum(self, rgb: tuple[float, ...], emitted: bool) -> np.ndarray:
         """Return the reflectance (band,) of a display-referred colour.
 
-        emitted: True to return instead the factor by which an emission is multiplied. It is the reflectance of the
-            brightest colour with the same hue and saturation, times the largest linear component of the colour
+        emitted: True to return instead the factor by which an emission is multiplied. This factor is the reflectance of
+            the brightest colour with the same hue and saturation, times the largest linear component of the colour
         """
         if (rgb, emitted) not in self._known:
             if len(self._known) > 10_000:

@@ -2,8 +2,8 @@
 
 Moving a shape of a Mitsuba scene rebuilds its acceleration structure. For a few spheres per world, closed forms are
 cheaper. Mitsuba and MuJoCo have the same texture coordinates on a sphere: u = azimuth / 2π, v = polar angle / π from
-+z, both in the sphere's own frame. The closed-form tracer uses this module, in which a ray may start inside a sphere.
-The tracer for all other models uses `sim.tracing.primitives`, whose shapes are hit only from outside.
++z, both in the sphere's own frame. The closed-form tracer uses this module. Here, a ray may start inside a sphere. The
+tracer for all other models uses `sim.tracing.primitives`, whose shapes are hit only from outside.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class SphereRows:
         """Write the centres of the spheres in these worlds.
 
         Raises:
-            ValueError: a sphere with a texture has turned.
+            ValueError: the orientation of a sphere with a texture differs from the one in `Spheres.frames`.
         """
         if len(self._spheres):
             self._rows[..., :3] = poses.geom_places(self._spheres.geoms)
@@ -84,7 +84,11 @@ class SphereRows:
 
 
 def centres_in(rows: Array, n: int, world: Array) -> list[Array]:
-    """Return the centres of n spheres in a lane's world."""
+    """Return the centres of n spheres in the world of each ray.
+
+    rows: the result of `SphereRows.arrays`
+    world: index of each ray's world
+    """
     first = world * n
     return [mi.Point3f(three(rows, first + k)) for k in range(n)]
 
@@ -143,6 +147,6 @@ def _to_local(spheres: Spheres, k: int) -> Array:
 
 
 def _quadratic(ray: Array, centre: Array, radius: float) -> tuple[Array, Array]:
-    """Return half the linear and the constant coefficient of |ray(t) - centre|² = radius² as an equation for t."""
+    """Return b and c of the equation t² + 2 b t + c = 0 for the distances t at which a ray crosses a sphere."""
     from_centre = ray.o - centre
     return dr.dot(from_centre, ray.d), dr.squared_norm(from_centre) - radius * radius

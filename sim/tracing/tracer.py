@@ -1,4 +1,4 @@
-"""The protocol of tracers that kernels use, and the choice of one for a scene."""
+"""The interface of tracers, through which kernels use them, and the choice of a tracer for a scene."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Buffers(Protocol):
     """Buffers that kernels read, for all values that differ between worlds."""
 
     def fill(self, poses: Poses) -> None:
-        """Write the rows of these worlds."""
+        """Write the values of all worlds into the buffers, for these poses of geoms and lights."""
 
     def arrays(self) -> Any:
-        """Return the rows as arrays on the device."""
+        """Return the buffers as arrays on the device."""
 
 
 class Tracer(Protocol):
@@ -50,30 +50,41 @@ class Tracer(Protocol):
 
     @property
     def scene(self) -> Any:
-        """Mitsuba's scenes, which are a separate argument of the kernel; None without scenes."""
+        """Mitsuba's scenes, a separate argument of the kernel that traces rays; None if the tracer uses no scenes."""
 
     @property
     def inputs(self) -> Any:
         """Arrays that the kernel reads."""
 
     def buffers(self, n_envs: int) -> Buffers:
-        """Return buffers for the rows of `n_envs` worlds."""
+        """Return buffers for all values that differ between `n_envs` worlds, such as places of moving geoms."""
 
     def around(self, scenes: Any, rows: Any, inputs: Any, world: Array) -> Any:
-        """Return the surroundings of a lane in this world, from the scenes, rows and inputs."""
+        """Return the surfaces, lights and whatever else each ray can meet in its world.
+
+        scenes, inputs: `scene` and `inputs` of this tracer, passed as arguments of the kernel
+        rows: the result of `Buffers.arrays`, which contains the values of all worlds
+        world: index of each ray's world
+        """
 
     def radiance(self, seen: EyeRay, there: Any, samples: Array) -> tuple[list[Array], Array]:
-        """Return the light along each ray, one array per component, and the distance to the visible surface [m].
+        """Return the light along each ray, and the distance to the visible surface [m].
+
+        The light is a list with one array for each spectral component, see `basis`.
 
         samples: four numbers on the unit interval for each ray, for light that bounces (`lighting.spawn_bounce_ray`)
         """
 
 
 class Tracers:
-    """The tracers of a scene by level of light (`lighting.LEVELS`), for rays and for areas.
+    """The tracers of a scene.
+
+    Some compute the light along single rays, others its average over areas, which are rectangles of the visual field.
+    Each tracer is for one level of light (`lighting.LEVELS`). The level limits how often light is reflected.
 
     scene, places: the scene, and the positions of the eyes in it
-    name: "closed_form", "mitsuba", or "auto": the closed form if the scene has one, otherwise Mitsuba
+    name: "closed_form" (formulas for upright walls, a floor and spheres), "mitsuba" (any scene), or "auto": the closed
+        form if the scene has one, otherwise Mitsuba
     stand: the body that the eyes are fixed to; None: derived from their mounts
 
     Raises:
@@ -91,7 +102,7 @@ class Tracers:
 
     @cached_property
     def upright(self) -> UprightScene | NoClosedForm:
-        """The closed form of the scene, or the reason why there is none."""
+        """The scene as upright walls, a floor and spheres, or the reason why it cannot be represented by them."""
         try:
             return upright_scene(self._scene, self._places.stand() if self._stand is None else self._stand)
         except NoClosedForm as reason:
@@ -105,7 +116,9 @@ class Tracers:
         return self.tracer_for(lighting.DIRECT).name == ClosedForm.name
 
     def tracer_for(self, light: str) -> Tracer:
-        """Return the tracer for this level of light, one of `lighting.LEVELS`.
+        """Return the tracer of rays for a level of light, which limits how often light is reflected.
+
+        light: one of `lighting.LEVELS`
 
         Raises:
             ValueError: the level is "all", or the tracer is "closed_form" and the scene has no closed form for this
@@ -137,7 +150,8 @@ class Tracers:
         """Return the tracer that uses area sampling.
 
         Raises:
-            ValueError: the world has no closed forms for areas, or the tracer is "mitsuba", which traces only rays.
+            ValueError: closed-form formulas cannot represent the world, or the tracer is "mitsuba", which traces only
+                rays.
         """
         if self._name == ModelTracer.name:
             raise ValueError(f"samples = 'areas': tracer = {self._name!r} traces rays only")

@@ -1,4 +1,4 @@
-"""A model as upright walls, a floor and moving spheres, for eyes that stay upright.
+"""Conversion of a model to upright walls, a floor and moving spheres, for eyes that move and turn horizontally only.
 
 If a model cannot be represented in this form, `NoClosedForm` states the reason in one line, if possible with the name
 of the geom, light or body.
@@ -30,7 +30,7 @@ _KEEP_THEIR_WAY = (int(mujoco.mjtCamLight.mjCAMLIGHT_FIXED), int(mujoco.mjtCamLi
 
 @dataclass(frozen=True)
 class UprightScene:
-    """A model as walls, a floor and spheres, whose intersections with a ray have a closed form.
+    """A model as upright walls, a floor and spheres. Formulas in closed form give their intersections with a ray.
 
     stand: the body that the eyes are fixed to
     walls: all walls and the floor
@@ -43,7 +43,8 @@ class UprightScene:
     variant: Mitsuba's variant
     bsdfs: BSDF of each geom, by id; geoms of equal appearance share one object
     medium: water or air in the eye's bands; None: clear air
-    in_bands: True if light is traced in the eye's bands, because the medium or the rays of ommatidia weight them
+    in_bands: True if light is traced separately in each of the eye's bands. This is necessary if a medium weakens the
+        bands differently, or if the eye has ommatidia, whose rays have a weight for each band
     """
 
     model: mujoco.MjModel
@@ -66,10 +67,10 @@ class UprightScene:
 
 
 def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
-    """Return the closed form of a model.
+    """Return a model as upright walls, a floor and spheres, for eyes that stay upright.
 
     Raises:
-        NoClosedForm: the model has another form; the message states the reason.
+        NoClosedForm: the model cannot be represented in this way; the message states the reason.
     """
     _refuse_what_shines(scene)
     model = scene.model
@@ -149,8 +150,8 @@ def _refuse_what_eyes_would_see(
 ) -> None:
     """Refuse eyes that would see their own body.
 
-    A body without visible geoms passes. Otherwise, it must be one sphere on the body's vertical axis. The eyes must lie
-    on or outside its surface, and look straight away from its centre.
+    A body without visible geoms passes. Otherwise, its only visible geom must be a sphere on the body's vertical axis.
+    The eyes must lie on or outside the sphere's surface, and look straight away from the sphere's centre.
 
     own: ids of the body's visible geoms
 

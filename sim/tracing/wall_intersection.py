@@ -26,7 +26,8 @@ class CellTables:
 
     wall: index of the wall that fills the cell; 0 for an empty cell
     top: height of this wall's top [m]; -inf for an empty cell
-    stop: height [m] below which a ray stops in the cell
+    stop: height [m] below which a ray is followed no further. It equals `top`, except that it is infinite in a ring of
+        cells around the walls, where all rays stop
     """
 
     wall: Array
@@ -35,10 +36,11 @@ class CellTables:
 
 
 class Footprints(Protocol):
-    """A method of intersecting rays with walls.
+    """A method of intersecting rays with upright walls.
 
-    how: description for reports
-    tables: the grid's cells, for the kernel; None: walls are tested one by one
+    how: description of the method, for reports
+    tables: cells of the grid through which the method follows rays, as arrays for the kernel; None: there is no grid,
+        and walls are tested one by one
     """
 
     how: str
@@ -166,7 +168,11 @@ class Cells:
         return _finished(dr.select(hit, t, math.inf), face, through_x, dx, dy)
 
     def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
-        """See Footprints. A shadow ray rises above all walls after a few cells, so the walk is unrolled."""
+        """See Footprints.
+
+        The loop over the grid's cells is unrolled, because a ray towards the light crosses only a few cells until it is
+        above all walls.
+        """
         assert cells is not None
         dx, dy, dz = map(float, direction)
         x, y = self._place(start)
@@ -196,7 +202,7 @@ class Cells:
         return (column >= 0) & (column < self._columns) & (row >= 0) & (row < self._rows)
 
     def _place(self, point: Array) -> tuple[Array, Array]:
-        """Return x and y of a point relative to the grid's lower corner, in sides of a cell."""
+        """Return x and y of a point relative to the grid's lower corner, in units of a cell's side."""
         return tuple((point[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
 
 

@@ -1,8 +1,9 @@
 """The static part of a world in closed form: upright walls on a floor.
 
 Walls are axis-aligned boxes that reach from the floor to above the eyes. Their tops and bottoms are not visible from
-the eyes. A ray therefore hits a wall where it enters the wall's footprint, if it is below the wall's top there. Texture
-coordinates are affine on every face, and follow from the triangles of the Mitsuba scene (`sim.mirror`).
+the eyes. A ray therefore hits a wall where the ray enters the wall's footprint, unless the ray is above the wall's top
+at this point. Texture coordinates are affine on every face, and follow from the triangles of the Mitsuba scene
+(`sim.mirror`).
 """
 
 from __future__ import annotations
@@ -26,7 +27,10 @@ _KEPT = KeptValues(MOST_MODELS)
 
 
 class NoClosedForm(ValueError):
-    """A world has no closed form. The message states the reason."""
+    """A world cannot be rendered by formulas in closed form, which exist for upright walls, a floor and spheres.
+
+    The message states the reason.
+    """
 
 
 @dataclass(frozen=True)
@@ -153,9 +157,12 @@ def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndar
 
 
 def _affine(points: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Return the map (2, 4) from (x, y, z, 1) to uv on the plane of points (n, 3).
+    """Return the affine map (2, 4) from (x, y, z, 1) to texture coordinates on a plane.
 
-    It is constant along the plane's normal.
+    The map is constant along the plane's normal.
+
+    points: points of the plane, (n, 3)
+    uv: texture coordinates at these points, (n, 2)
     """
     along = points[1:] - points[0]
     linear = np.linalg.lstsq(along, uv[1:] - uv[0], rcond=None)[0].T

@@ -1,4 +1,4 @@
-"""Rows of four floats that kernels read, for all values that differ between worlds."""
+"""Values that differ between worlds, such as positions and colours, stored in rows of four floats for kernels."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from sim.scene.device_arrays import three
 
 @dataclass(frozen=True)
 class WorldRows:
-    """Rows of one lane's world.
+    """Values that differ between worlds, such as positions and colours of geoms, in rows of four floats.
 
-    fours: rows of all worlds, flat
-    first: index of the first row of this world
+    A kernel traces rays of many worlds at once. Each ray belongs to one world and reads the rows of this world.
+
+    fours: the rows of all worlds, one after another, in a flat array of floats
+    first: index of the first row of the ray's world
     """
 
     fours: Array
     first: Array
 
     def point(self, row: Array | int) -> Array:
-        """Return the first three floats of one of the world's rows."""
+        """Return the first three floats of a row (Vector3f), such as a position."""
         return three(self.fours, self.first + row)
 
     def four(self, row: Array | int) -> Array:

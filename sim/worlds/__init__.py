@@ -2,10 +2,10 @@
 
 catalog      TASKS: the name of each task and the aim of its agent
 world        build_world; World: a compiled world
-detection    an open field with a goal and adversaries, also for tracking
+detection    an open field with a goal and adversaries, for the tasks detection and tracking
 foraging     the field of the task detection, with objects that differ in ultraviolet reflectance only
 navigation   the built-in courses between walls
-course       Course: a course on which the distance from the start hardly has to decrease
+course       Course: paths between walls that lead back towards their start by at most 1.5 m
 maze         random mazes
 random_course  random courses
 layout_family  LayoutFamily: random mazes or courses in disjoint sets for training, selection and test

@@ -30,9 +30,12 @@ class AgentModel:
 
     @classmethod
     def from_spec(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentModel:
-        """Extract the body "agent" of a spec that has been compiled into `whole`.
+        """Extract the body "agent" from a spec.
 
-        Equal models share the result, so do not change it. Removing hundreds of walls from a spec takes half a second.
+        whole: the model that has been compiled from this spec
+
+        The result is kept, and calls with an equal `whole` return the same model, so do not change it. It is kept
+        because extraction is slow: removing hundreds of walls from a copy of the spec takes half a second.
         """
         whole_hash = model_hash(whole)
         return cls(_KEPT.get(whole_hash, lambda: _alone(spec.copy())), whole_hash)

@@ -1,8 +1,8 @@
-"""A course: a path through a grid of cells on which an agent's distance from the start hardly has to decrease.
+"""Courses: paths between walls that lead back towards their start by at most 1.5 m.
 
 Navigation rewards an increase of the distance from the start. If the path leads back towards the start, this reward
-has a local optimum that no agent ever leaves (docs/concepts/physics.md). On a course the distance never has to
-decrease by more than MOST_FALL, 1.5 m.
+has a local optimum that no agent ever leaves (docs/concepts/physics.md). On the way through a course, the straight
+distance from the start never has to fall more than 1.5 m (MOST_FALL) below a value that it had before.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Course:
     Raises:
         ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
             "S"; a start lies in the goal or has no suitable path to it; or an argument has a wrong type or range. On a
-            suitable path, the distance from the start never decreases by more than 1.5 m.
+            suitable path, the straight distance from the start never falls more than 1.5 m below an earlier value.
     """
 
     drawing: str
@@ -82,7 +82,7 @@ class Course:
 
     @cached_property
     def signs(self) -> np.ndarray:
-        """Characters of the drawing, (row, column), row 0 in the south."""
+        """Characters of `drawing`, (row, column). Row 0 is in the south, which is the last line of the drawing."""
         return read_only(np.array([list(line) for line in reversed(self.drawing.split())]))
 
     @cached_property
@@ -133,24 +133,26 @@ class Course:
         return float(np.arctan2(ahead[0] - cell[0], ahead[1] - cell[1]))
 
     def fall(self, start: Cell) -> tuple[float, Cell]:
-        """Return the largest necessary decrease of the distance from a start [m], and the cell before this decrease.
+        """Return how much the distance from a start must decrease on the way to the goal [m], and from which cell on.
 
-        The method considers the cells of all paths on which every step from the start shortens the remaining path. From
-        each of these cells, the agent takes the path to the goal on which the distance from the start decreases least.
-        The result is the largest of these decreases.
+        The method considers all cells that an agent can reach if each of its steps, from the start on, brings it closer
+        to the goal along the shortest path (`way`). From each of these cells, the agent takes the path to the goal that
+        stays as far away from the start as possible. The decrease is the difference between two distances from the
+        start: that of the cell, and the smallest one on this path. The result is the largest decrease, and its cell.
         """
         ease = self._ease(start)
         return max((_apart(start, cell) - float(ease[cell]), cell) for cell in self._ahead(start))
 
     def _apart_from(self, start: Cell) -> np.ndarray:
-        """Return the distance of every cell from a start [m], (row, column)."""
+        """Return an array (row, column) of the distances of all cells from a start [m]."""
         rows, columns = np.indices(self.walls.shape)
         return np.asarray(CELL * np.hypot(rows - start[0], columns - start[1]))
 
     def _ease(self, start: Cell) -> np.ndarray:
-        """Return the smallest distance from the start on the best path from each cell to the goal [m], (row, column).
+        """Return how close to the start an agent must come on the way from each cell to the goal [m].
 
-        The best path is the one on which this smallest distance is largest.
+        On each path from a cell to the goal, one cell is nearest to the start. The result is the distance of this cell
+        from the start, for the path on which this distance is largest; -1 if there is no path. Array (row, column).
         """
         ease, apart = np.full(self.walls.shape, -1.0), self._apart_from(start)
         queue = [(-float(apart[cell]), cell) for cell in _cells(self.goal)]
@@ -167,7 +169,10 @@ class Course:
         return ease
 
     def _ahead(self, start: Cell) -> set[Cell]:
-        """Return the cells of all paths on which every step from the start shortens the remaining path to the goal."""
+        """Return all cells that an agent can reach from the start if each step brings it closer to the goal.
+
+        Closeness is the length of the shortest path to the goal (`way`).
+        """
         seen, waiting = {start}, [start]
         while waiting:
             cell = waiting.pop()

@@ -1,4 +1,4 @@
-"""Detection: an open walled field with a goal and two adversaries, whose stripes have another orientation."""
+"""Detection: an open walled field with a goal, which has vertical stripes, and two adversaries with horizontal ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OBJECT_MARGIN = 2  # number of cells between the walls and the cells in which ob
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
-    """Add the field and the objects. Nothing is random, so `rng` is not used.
+    """Add a walled field with a goal and two adversaries. Nothing is random, so `rng` is not used.
 
     A goal has vertical stripes, which follow meridians. An adversary has horizontal stripes of about the same width,
     which follow parallels.
@@ -40,7 +40,7 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
 
 
 def furnished_field(spec: mujoco.MjSpec) -> Layout:
-    """Add the field, and the objects with the materials "goal" and "adversary".
+    """Add a walled field with a goal and two adversaries, made of the materials "goal" and "adversary".
 
     The agent starts in the outermost ring of cells. The objects are placed in the middle of the field.
     """

@@ -1,9 +1,10 @@
-"""Foraging: the field of the task detection. All objects have one pattern, and differ only in reflectance below 400 nm.
+"""Foraging: an open walled field with a goal and two adversaries, which differ only in reflectance below 400 nm.
 
-All objects are yellow, like many flowers. The goal also reflects ultraviolet, like many flowers that bees visit. The
-default RGB-like receptors absorb no light below 400 nm. To them, goal and adversary are identical under any light
-and for any number of spectral bands. (If the spectra also differed in the visible range, they could be metamers only
-for certain lights and numbers of bands.)
+The field is the same as in the task "detection". All objects have the same vertical stripes, and are yellow,
+like many flowers. The goal also reflects ultraviolet, like many flowers that bees visit. The default RGB-like receptors
+absorb no light below 400 nm. To them, goal and adversary are identical under any light and for any number of spectral
+bands. (If the spectra also differed in the visible range, they could be metamers only for certain lights and numbers of
+bands.)
 """
 
 from __future__ import annotations

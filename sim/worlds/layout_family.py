@@ -36,7 +36,8 @@ _WALLS, _STRIPES = 0, 1  # purposes of a layout's random numbers
 class LayoutFamily:
     """Random courses or mazes in three disjoint sets, for `sim.build_world` and `sim.make_vec_env`.
 
-    Courses fulfil the conditions of `sim.Course`: the distance from the start never has to fall by more than 1.5 m.
+    Courses fulfil the conditions of `sim.Course`: on the way to the goal, an agent never has to come back towards its
+    start by more than 1.5 m.
 
     seed: seed of all layouts and of the stripes on their walls, 0 to 2¹²⁸
     n_training, n_selection, n_test: number of layouts in each set, 1 to 100
@@ -81,7 +82,7 @@ class LayoutFamily:
 
     @property
     def test(self) -> LayoutSet:
-        """Layouts for final results. Nothing is selected by the results in these layouts."""
+        """Layouts for final results only. These layouts must not be used to select policies or animals."""
         return LayoutSet(self, "test")
 
     def number(self, name: str) -> int:
@@ -109,10 +110,10 @@ class LayoutFamily:
 
 @dataclass(frozen=True)
 class LayoutSet:
-    """One set of a family: an argument of `sim.build_world` and `sim.make_vec_env`.
+    """One of the three sets of layouts in a `sim.LayoutFamily`, for `sim.build_world` and `sim.make_vec_env`.
 
-    family: the family
-    name: "training", "selection" or "test"
+    family: the family of layouts that contains the set
+    name: name of the set: "training", "selection" or "test"
 
     Raises:
         ValueError: the family is no LayoutFamily, or there is no such set.
@@ -131,10 +132,10 @@ class LayoutSet:
 
     @property
     def mazes(self) -> tuple[np.ndarray, ...]:
-        """Walls of the mazes, boolean (row, column) each.
+        """Walls of the mazes in this set, boolean (row, column) each.
 
         Raises:
-            ValueError: two mazes of the family are equal.
+            ValueError: two mazes of `family`, in any of its sets, are equal.
         """
         return _drawn(self.family, "maze")[self.name]
 
@@ -143,12 +144,12 @@ class LayoutSet:
         """The courses of this set.
 
         Raises:
-            ValueError: two courses of the family are equal, or courses of this size could not be drawn.
+            ValueError: two courses of `family`, in any of its sets, are equal, or no course of this size was found.
         """
         return _drawn(self.family, "navigation")[self.name]
 
     def stripes(self) -> list[np.random.Generator]:
-        """Return a new random number generator for the stripes of each layout."""
+        """Return one new random number generator for each layout, for the stripes on the layout's walls."""
         return [self.family.random(self.name, index, _STRIPES) for index in range(len(self))]
 
 
@@ -166,7 +167,11 @@ TASKS_WITH_LAYOUTS = tuple(_DRAW)
 
 @lru_cache(maxsize=8)
 def _drawn(family: LayoutFamily, task: str) -> Mapping[str, tuple[Any, ...]]:
-    """Return the layouts of all sets by name, after checking that their walls differ."""
+    """Return the mazes or courses of a family, by the name of the set ("training", "selection" or "test").
+
+    Raises:
+        ValueError: two layouts have the same walls, or no course of this size was found.
+    """
     draw = _DRAW[task]
     found: dict[str, tuple[Any, ...]] = {}
     known: dict[bytes, str] = {}

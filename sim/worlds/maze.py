@@ -25,7 +25,7 @@ def add_layout(spec: mujoco.MjSpec, mazes: Sequence[np.ndarray], rngs: Sequence[
     An episode starts in any of the mazes, so that an agent learns a behaviour that works in all of them.
 
     mazes: walls of each maze, boolean (row, column)
-    rngs: generators of the stripes: one for all mazes, or one for each
+    rngs: random number generators that draw the stripes on the walls: one for all mazes, or one for each maze
     """
     walls = np.concatenate(mazes)
     shape = walls.shape

@@ -77,7 +77,7 @@ def add_layout(spec: mujoco.MjSpec, courses: Sequence[Course], rngs: Sequence[np
 
     An episode starts on any of the courses.
 
-    rngs: generators of the stripes: one for all courses, or one for each
+    rngs: random number generators that draw the stripes on the walls: one for all courses, or one for each course
     """
     walls = np.concatenate([course.walls for course in courses])
     rows, columns = walls.shape

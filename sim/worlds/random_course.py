@@ -1,4 +1,4 @@
-"""Random courses: paths that bend, split and join again, on which the distance from the start hardly falls."""
+"""Random courses: paths that bend, split and join again, and lead back towards their start by at most 1.5 m."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3
 def _center_line(row: int, shape: tuple[int, int], rng: np.random.Generator) -> list[Cell]:
     """Return the cells of a centre line from the west end of a row to the column before the east border.
 
-    From every cell of the line on, the distance from this cell never decreases by more than 1.5 m along the line.
+    Along the line, the distance from any earlier cell never falls more than 1.5 m below a value that it had before.
     """
     line, last = [(row, 1), (row, 2), (row, 3)], _EAST
     while line[-1][1] < shape[1] - 2:
@@ -63,13 +63,20 @@ def _center_line(row: int, shape: tuple[int, int], rng: np.random.Generator) -> 
 
 
 def _straight(cell: Cell, step: Cell, length: int, shape: tuple[int, int]) -> list[Cell]:
-    """Return up to `length` cells after `cell` in the direction `step`, within the rows and columns of centre lines."""
+    """Return up to `length` cells that follow `cell` in the direction `step`.
+
+    Cells in which a centre line must not lie are left out: the two northernmost and the two southernmost rows, and the
+    easternmost column.
+    """
     cells = [(cell[0] + k * step[0], cell[1] + k * step[1]) for k in range(1, length + 1)]
     return [(r, c) for r, c in cells if 2 <= r < shape[0] - 2 and c < shape[1] - 1]
 
 
 def _hardly_falls(line: list[Cell]) -> bool:
-    """Return whether, from each cell on, the distance from it never decreases by more than 1.5 m along the line."""
+    """Return whether a line hardly leads back towards any of its earlier cells.
+
+    Along the line, the distance from any earlier cell must never fall more than 1.5 m below a value that it had before.
+    """
     cells = np.array(line, float) * CELL
     apart = np.linalg.norm(cells[:, None] - cells[None], axis=-1)
     later = np.triu(apart)  # row: start, column: cell on the way

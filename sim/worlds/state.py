@@ -87,7 +87,7 @@ def wrap_angle(angle: np.ndarray) -> np.ndarray:
 
 
 def pose(data: mujoco.MjData, world: World, state: WorldState, index: int = 0) -> None:
-    """Set the agent's position and heading and the objects' positions in MuJoCo's data to those of one world.
+    """Copy the agent's position and heading, and the objects' positions, from one world's state to MuJoCo's data.
 
     index: index of this world in `state`
     """

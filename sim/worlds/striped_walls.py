@@ -22,8 +22,8 @@ def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rngs: Sequence[np.
     """Add the walls of a grid as boxes, each with a random stripe frequency.
 
     walls: cells that are walls, boolean (row, column)
-    rngs: random number generators. The rows of the grid are divided into one equal part for each generator, which draws
-        the stripes of this part
+    rngs: random number generators. The rows of the grid are divided into as many equal parts as there are generators,
+        and each generator draws the stripes of one part
     """
     materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
     for i, period in enumerate(STRIPE_PERIODS):
@@ -42,8 +42,8 @@ def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rngs: Sequence[np.
 def merge_walls(walls: np.ndarray, longest: int) -> list[tuple[int, int, int, int]]:
     """Return disjoint straight runs of at most `longest` cells that together cover all wall cells.
 
-    Each run is (row, column, number of rows, number of columns). The algorithm is greedy: in the first uncovered cell,
-    a run along the row and a run along the column could start, and the algorithm uses the longer one.
+    Each run is (row, column, number of rows, number of columns). The algorithm is greedy: from the first uncovered
+    cell, it compares a run along the row with a run along the column, and uses the longer one.
     """
     left = walls.copy()
     runs = []

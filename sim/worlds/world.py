@@ -59,8 +59,8 @@ class World(ReadOnlyArrays):
     object_spawn: possible positions of objects, at the centres of cells [m], (n, 2)
     goal_region: goal region in navigation and mazes, (x_min, y_min, x_max, y_max) [m]; None in other tasks
     spectra: measured spectra of materials and lights, by name. Renderers use them instead of the model's colours
-    alone: model of the agent without the rest of the world, with which agents near walls are simulated faster; None:
-        they are simulated in the whole model
+    alone: small model of the agent only, for a faster simulation of agents near walls; None: agents near walls are
+        simulated in the whole model
     training_starts: starting positions of the agent in training; None: `starts`
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     mazes: number of mazes or courses, which are arranged from south to north; 1 in other tasks
@@ -109,7 +109,8 @@ def build_world(
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
     layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
         episode starts in any of its layouts
-    wall_height: height of all walls [m], in [0.4, 100]; 0.5 in the published code
+    wall_height: height of all walls [m], in [0.4, 100]. In the code published by Tiwary, Young et al. (*Science
+        Advances* 11(51), 2025), it is 0.5
     eyes: eyes for which the agent gets cameras, with the names of `Eyes.names()`; None: no cameras
     spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the
         task defines, or replace them. Each is an `optics.Spectrum`, or a name that `optics.reflectance` or
@@ -121,8 +122,9 @@ def build_world(
     Raises:
         ValueError: an argument has the wrong type or is out of range; the task, the course, the medium or a spectrum is
             unknown; or `spectra` names neither a material nor a light, or has a reflectance above 1. Other causes are
-            that `mazes`, `course` or `layouts` is given for a task without it, that `layouts` is combined with `seed`,
-            `mazes` or `course`, or that two layouts of the family are equal or some cannot be drawn.
+            that `mazes`, `course` or `layouts` is given for a task that does not use it, that `layouts` is combined
+            with `seed`, `mazes` or `course`, that two layouts of the family are equal, or that no random course of the
+            family's size was found.
     """
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
@@ -175,7 +177,8 @@ def _layout(spec: mujoco.MjSpec, task: str, rng: np.random.Generator, mazes: int
 def _check_layouts(task: str, layouts: Any, alone: bool) -> None:
     """Check the type of `layouts`, and that the task has layouts.
 
-    alone: True if no other argument, such as `mazes`, defines the layouts; this is required
+    alone: True if `seed`, `mazes` and `course` have their default values. It must be True, because `layouts` replaces
+        these arguments
 
     Raises:
         ValueError: a check fails, or `alone` is False.

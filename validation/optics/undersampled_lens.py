@@ -4,20 +4,20 @@ What does the PSF of a lens look like if the pupil is sampled too coarsely? It i
 a bright centre. At f/2 with 51 samples, the first dark ring of the Airy pattern encloses 6.2e-06 of the light instead
 of 0.8278. This fraction becomes correct only when the pitch (the distance between samples) is below λ / (2 NA).
 
-**Method.** The simulation of the [published eyes](../results/paper.md) samples a pupil of a few mm with 51 or 101
-points per side. Here the lenses are f/2, f/8 and f/13.5, with a focal length of 4 mm. The wavelength is 550 nm, and the
-grid is 2 mm wide. At a pitch of λ / (2 NA), the phase at the rim of a lens changes by half a wave between neighbouring
-samples. With 51 samples, the pitch exceeds λ / (2 NA) by factors of 35, 9 and 5, respectively. Because of aliasing,
-such samples represent an array of many small lenses instead of one, and most of the light misses the Airy disk. The
-image does not show the mistake: it is finite and positive, and its power is conserved.
+**Method.** The simulation of eyes in [Tiwary, Young et al. (2025)](../results/paper.md) samples a pupil of a few mm
+with 51 or 101 points per side. Here the lenses are f/2, f/8 and f/13.5, with a focal length of 4 mm. The wavelength is
+550 nm, and the grid is 2 mm wide. At a pitch of λ / (2 NA), the phase at the rim of a lens changes by half a wave
+between neighbouring samples. With 51 samples, the pitch exceeds λ / (2 NA) by factors of 35, 9 and 5, respectively.
+Because of aliasing, such samples represent an array of many small lenses instead of one, and most of the light misses
+the Airy disk. The image does not show the mistake: it is finite and positive, and its power is conserved.
 
 In `optics.psf`, the user does not choose the sampling of the pupil: the function derives it from the slope of the
 phase, or uses a method that needs no grid. Its PSFs of the same pupils are accurate to the requested tolerance.
 
 **Table.** The table shows the energy inside the first dark ring of the Airy pattern, as a fraction of the light through
 the pupil. "pitch / needed" is the pitch divided by λ / (2 NA). "textbook" is the angular spectrum method on the grid of
-the pupil samples, with band-limited interpolation of the field. "exact" is the Rayleigh-Sommerfeld integral. The rows
-with f = 0.4 mm show the f/2 lens and its grid ten times smaller, with 16 to 512 samples.
+the pupil samples, with band-limited interpolation of the field. "exact" is the Rayleigh-Sommerfeld integral. In the
+rows with f = 0.4 mm, the f/2 lens and its grid are both ten times smaller, and the grid has 16 to 512 samples.
 
     python -m validation.optics.undersampled_lens [--out DIR] [--docs DIR]
 """

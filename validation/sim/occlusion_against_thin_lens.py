@@ -1,14 +1,14 @@
 """Occlusion in front of a lens, compared with Mitsuba's thin lens
 
 Does `Eye.see` hide the correct part of a far surface behind a near edge? Yes: signals differ from Mitsuba's thin lens
-by at most 0.023 of white, and by at most 0.0044 on average. Adding the light of both surfaces without occlusion is
-wrong by up to 0.26.
+by at most 0.023, and by at most 0.0044 on average, where the signal of a white surface is 1. Adding the light of both
+surfaces without occlusion is wrong by up to 0.26.
 
 **Method.** A dark plate at 0.2 m covers the left half of the field. Horizontal stripes with radiances of 0.7 and 1 fill
 a plane at 2 m. The lens has a radius of 1.2 mm. It is focused at the plate, at the stripes, in front of both, or
 halfway between both in inverse distance. The blur is up to five receptors wide. Diffraction blurs by less than a tenth
 of a receptor, so geometric optics holds. Mitsuba traces 10,000 rays per receptor through all parts of the lens.
-`Eye.see` receives an image with one distance per cell. This image contains no stripes behind the plate.
+`Eye.see` receives an image with one distance per pixel. This image contains no stripes behind the plate.
 
 **Table.** Errors are in units of the signal of white. In the column "no occlusion", the blurred light of both surfaces
 is added. If the lens is focused halfway between both distances, the blur of both surfaces is equally wide, and adding

@@ -23,7 +23,11 @@ def tasks(arguments: Namespace) -> int:
 
 
 def presets(arguments: Namespace) -> int:
-    """Print the presets with their task (if they set one), their scales and their purpose."""
+    """Print the presets, each with its task, its scales and its purpose.
+
+    A preset without a task can be used with any task. Scales, such as "laptop" and "paper", are alternative settings
+    for shorter and longer runs; some presets have none.
+    """
     found = [preset_about(name) for name in preset_names()]
     if arguments.json:
         say(json.dumps(found, indent=1))

@@ -41,7 +41,10 @@ class Products:
         return {"directory": str(run.path), "report": str(self.report), **replay, "exr": exr}
 
     def lines(self, run: Run) -> list[str]:
-        """Return lines with the run directory, the pages' paths, and the EXR files' number, folder and first name."""
+        """Return lines with the paths of the run directory and the pages, and a line about the EXR files.
+
+        The last line states the number of EXR files, their folder, and the name of the first file.
+        """
         return [
             f"run directory: {run.path}",
             f"report: {self.report}",

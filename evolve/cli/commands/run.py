@@ -78,7 +78,7 @@ def _refuse_without_run(arguments: Namespace) -> None:
 
 
 def _request(arguments: Namespace) -> RunRequest:
-    """Return the request for a run that the command line describes."""
+    """Return the choices on the command line from which the settings of a new run are assembled."""
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
     return RunRequest(
         arguments.task,
@@ -99,7 +99,10 @@ def _silence(text: str) -> None:
 
 
 def _show(plan: RunPlan, as_json: bool) -> int:
-    """Print the plan of a run, with the measured pace of this machine, without starting the run."""
+    """Measure how fast this machine trains, and print the plan of a run with the predicted time.
+
+    The run is not started.
+    """
     if not as_json:
         print("measuring this machine's pace ...", file=sys.stderr, flush=True)
     plan = plan.measured()

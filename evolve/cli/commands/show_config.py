@@ -34,7 +34,9 @@ def config(arguments: Namespace) -> int:
 
 
 def _refuse_for_schema(arguments: Namespace) -> None:
-    """Refuse options that determine values of settings, because the schema describes the settings of all runs.
+    """Refuse options that give settings a value, such as `--set`.
+
+    They would have no effect, because the schema is the same for all runs.
 
     Raises:
         ConfigError: such an option was given.

@@ -104,10 +104,10 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
 
 
 def standing(run: Run) -> dict[str, Any]:
-    """Return the state of a run, its best candidate and its generations as JSON values by name.
+    """Return, by name, a run's state, its best candidate, and a summary of each generation as JSON values.
 
-    The exception is "mishaps", a list of `EpisodeFailure`, whose fields are JSON values. The state is "running" if a
-    process holds the lock of the run, else "finished" or "interrupted".
+    Only the value of "mishaps" is not JSON: it is a list of `EpisodeFailure` objects, whose fields are JSON values. The
+    value of "state" is "running" if a process holds the lock of the run, else "finished" or "interrupted".
 
     Raises:
         OSError: the lock or config.toml cannot be read.
@@ -160,7 +160,10 @@ def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
 
 
 def standing_lines(now: dict[str, Any]) -> list[str]:
-    """Return the result of `standing` as lines of text."""
+    """Return the state of a run, its best candidate and its latest generations as lines of text.
+
+    now: result of the function `standing` for the run
+    """
     count, best = now["candidates"], now["best"]
     by = f" by process {now['process']}" if now["process"] else ""
     failed = f", {count['failed']} failed" if count["failed"] else ""

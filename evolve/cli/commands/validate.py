@@ -74,7 +74,12 @@ def validate(arguments: Namespace) -> int:
 
 
 def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
-    """Return the script with this name, old name or code. For an old name or a code, also print the current name.
+    """Return the validation script with this name. The name may be the current one, an old one, or an old code.
+
+    A code is the beginning of an old name, such as B0 in "B0_planner". If the name is not the current one, the current
+    name is printed.
+
+    proofs: scripts by current name
 
     Raises:
         ConfigError: the name is unknown.

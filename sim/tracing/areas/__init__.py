@@ -1,12 +1,12 @@
 """Area sampling: mean light in rectangles of the visual field, in closed form instead of from many rays.
 
 area_tracer         AreaTracer: the light in an area
-branches            branches of the kernel, for computations that few areas need
+branches            computations that are skipped for areas that do not need them
 illumination        light that falls on a patch
 patch               Area, and the Patch of a surface that is visible in an area
 illuminated_bodies  table of the light on moving bodies
 body_light          light on the visible part of a body
-half_planes         fractions of an area that straight lines cut off
+half_planes         fraction of an area on one side of a straight line
 distances           path lengths from an eye to surfaces in an area
 borders             borders between columns of areas
 columns             walls, floor and sky behind an area

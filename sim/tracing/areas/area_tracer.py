@@ -1,9 +1,8 @@
 """A renderer by area sampling for worlds of upright walls, a floor and spheres: in closed form, without noise.
 
-Each area is divided among floor, walls, sky and spheres. The part of a surface that is visible in an area is a patch.
-The surface's texture is averaged over the patch, and each light is multiplied by the fraction of the patch that it
-reaches. Colours and components are the same as in `sim.tracing.closed_form_tracer`, which traces rays through the same
-worlds.
+The parts of floor, walls, sky and spheres that are visible in an area are its patches. A surface's texture is averaged
+over its patch, and each light is multiplied by the fraction of the patch that it reaches. Spectra are sums of a few
+components. Components and colours are those of the ray tracer `sim.tracing.closed_form_tracer`.
 """
 
 from __future__ import annotations
@@ -39,17 +38,17 @@ STRETCHES = 2
 
 
 class AreaTracer:
-    """A tracer that uses area sampling.
+    """A tracer that averages light over areas, rectangles into which the visual field is divided.
 
-    rays: tracer of rays through the same world, for the same light
-
+    rays: tracer of single rays, which defines the world and the light
     name, why: name of the tracer, and the reason for its choice, for reports
     light: level of light, one of `lighting.LEVELS`
-    basis: (component, band): contribution of each component to each band
+    basis: (component, band): contribution of each component of the light's spectrum to each band
 
     Raises:
-        NoClosedForm: the walls have several heights or lie on no grid, a texture changes along two axes, a shadow is
-            longer than a cell, or light is reflected more than once and there are no walls or too many cells.
+        NoClosedForm: the walls have several heights, overlap or lie on no grid, a texture changes along two axes, or a
+            shadow is longer than a cell of the grid. If light is reflected more than once, there are two more reasons:
+            there are no walls, or there are too many cells between the walls.
     """
 
     name = "areas"
@@ -124,11 +123,11 @@ class AreaTracer:
         return [own + veil for own, veil in zip(found, self._medium.veil, strict=False)] + found[len(self.basis) :]
 
     def first_faces(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
-        """Return the index of the wall's face that a ray in a horizontal direction (Vector2f) hits."""
+        """Return the index of the first face of a wall that a ray hits; level: its horizontal direction (Vector2f)."""
         return self._columns.first_faces(origin, level, inputs.cells)
 
     def border_faces(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
-        """Return the indices of the faces at an area's left and right border."""
+        """Return the indices of the walls' faces that are visible at an area's left and right border."""
         left, right = (self.first_faces(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
 
@@ -137,7 +136,7 @@ class AreaTracer:
         return self.rays.buffers(n_envs)
 
     def bodies(self, rows: Array, world: Array, stand: Array) -> list[Array]:
-        """Return the centres of all bodies in each lane's `world`; stand: position of the eyes' own body."""
+        """Return the centres of all bodies in each `world`; stand: position of the body that carries the eyes."""
         return self.rays.all_bodies(centres_in(rows, len(self.rays.world.spheres), world), stand)
 
     @property
@@ -146,7 +145,7 @@ class AreaTracer:
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
-        """Return the rows `place` of a world's table (`IlluminatedBodies`); bodies: centres of the world's bodies."""
+        """Return the light at places on the bodies; place, bodies, result: see `IlluminatedBodies.table`."""
         assert self._reflected
         assert inputs.reflected
         reflected = partial(self._reflected.on_body, tables=inputs.reflected)
@@ -173,7 +172,7 @@ class AreaTracer:
         return _in_layers(depth, piece.inverse_distance_at(piece.middle), sent_on)
 
     def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers) -> list[Array]:
-        """Return the light of the floor, computed in horizontal bands that have equal heights in the area."""
+        """Return the floor's light in a rectangle of the visual field, from horizontal bands of equal height."""
         share = pieces[0].floor_share + pieces[1].floor_share
         a = sum(piece.middle * piece.floor_share for piece in pieces) / dr.maximum(share, LEAST_DIP)
 
@@ -198,7 +197,7 @@ class AreaTracer:
         return [sum_ * share / BANDS for sum_ in total]
 
     def _floor_patch(self, area: Area, a: Array, dip: Array, height: Array) -> Patch:
-        """Return the floor's patch in a band of the visual field; a, dip, height: see `distances_to_floor`."""
+        """Return the part of the floor seen in a horizontal band; a, dip, height: see `distances_to_floor`."""
         t = (area.origin.z - self._walls.floor) / dip
         level, across = area.level(a), area.level(a) * (t / dip * height)
         point = area.origin + mi.Vector3f(level.x, level.y, -dip) * t
@@ -216,9 +215,9 @@ class AreaTracer:
     ) -> list[Array]:
         """Return the fractions of the area in which a sphere hides walls and floor, followed by the sphere's light.
 
-        There are three fractions: for the left wall, the right wall and the floor. The light of the sphere, per
-        component, is multiplied by the fraction of the area that the sphere fills. Parts of the sphere that nearer
-        spheres hide are omitted.
+        There are three fractions: for the left wall, the right wall and the floor. The light has one array per
+        component of its spectrum, for each depth layer. It is multiplied by the fraction of the area that the sphere
+        fills. Parts of the sphere that nearer spheres hide are omitted.
         """
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
@@ -237,9 +236,9 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(self, area: Area, sphere: LitSphere, strip: Strip) -> list[Array]:
-        """Return the fraction of a strip of a sphere that no other sphere hides, and the strip's light per component.
+        """Return the fraction of a sphere's strip that nearer spheres do not hide, and the light of this fraction.
 
-        The light is multiplied by the fraction of the area that the strip fills.
+        The light has one array per component, for each depth layer, times the fraction of the area that it fills.
         """
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
         texture = self._sphere_textures[k]
@@ -264,7 +263,7 @@ class AreaTracer:
         return total
 
     def _not_hidden(self, area: Area, k: int, slice_: Slice, now: FrameState) -> Array:
-        """Return the fraction of a slice of sphere k that no nearer sphere hides, if hidden parts overlap at random."""
+        """Return the visible fraction of a slice of sphere k; the parts that nearer spheres hide overlap at random."""
         way = now.bodies[k] - area.origin
         bare = mi.Float(1)
         for j, other in enumerate(self._visible_bodies(now)):
@@ -286,9 +285,10 @@ def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) 
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
-    """Return eight numbers per face, flat, from which the kernel finds the texture at a point.
+    """Return eight numbers per face, in a flat array, from which the kernel finds the texture at a point (x, y, z).
 
-    They are the texel's column, affine in (x, y, z), the first texel, the number of columns and two zeros.
+    If the first four are p, q, r and s, the column of the texture at this point is p x + q y + r z + s. The others are
+    the index of the texture's first texel, its number of columns, and two zeros.
     """
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows

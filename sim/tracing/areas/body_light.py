@@ -24,9 +24,9 @@ class BodyLight:
 
     illumination: direct light
     visibility: fraction of each light that reaches the visible part
-    around: spherical harmonics of the reflected light around the body, in groups of four, per component; empty if
-        reflected light is neglected
-    change: change of the reflected light due to other bodies, per component
+    around: spherical harmonics of the reflected light around the body: for each component of the light's spectrum, a
+        list of groups of four harmonics; empty if reflected light is neglected
+    change: change of the reflected light due to other bodies, for each component of the light's spectrum
     """
 
     illumination: Illumination
@@ -46,7 +46,11 @@ class BodyLight:
         return cls(illumination, lit, around, [a - b for a, b in zip(left, free, strict=True)])
 
     def on(self, normal: Array) -> list[Array]:
-        """Return the light per component on a surface with this normal."""
+        """Return the irradiance where the body's surface has this normal, one array per component of the light.
+
+        All light in the world is a sum of the components. The components are either a few spectra that suffice to
+        represent all light, or the spectral bands of the eye.
+        """
         light = self.illumination.arriving(normal, self.visibility)
         if not self.around:
             return light
@@ -56,13 +60,15 @@ class BodyLight:
 
 @dataclass(frozen=True)
 class LitSphere:
-    """A sphere in an area.
+    """A sphere that is visible in an area, and the light on it.
+
+    An area is a rectangle of an eye's visual field over which light is averaged.
 
     number: index of the sphere among the bodies
     view: visible part of the sphere
     light: light on the sphere
     now: inputs of the current frame
-    depth: layers among which its light is divided
+    depth: distances for which the eye has a point spread function; the sphere's light is divided among them
     """
 
     number: int

@@ -1,4 +1,8 @@
-"""Borders between columns of areas: the wall at a border is found once for all areas of an eye that share it."""
+"""Left and right borders of areas, the rectangles of the visual field over which light is averaged.
+
+Areas of an eye that lie next to each other or above each other have borders in common. The wall that is visible at a
+border is found once for all these areas.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,12 @@ PARTS = 64  # borders closer to each other than an area's width / PARTS are merg
 
 @dataclass(frozen=True)
 class Borders:
-    """Left and right borders of areas.
+    """Left and right borders of areas, the rectangles of the visual field over which light is averaged.
 
-    x: positions of the borders on the tangent plane at distance 1, (border,)
-    sides: indices of each area's left and right border, (area, 2)
+    Borders at almost the same horizontal position count as one border, which several areas share.
+
+    x: horizontal positions of the borders on the eye's tangent plane at distance 1, (border,)
+    sides: indices in `x` of each area's left and right border, (area, left or right)
     """
 
     x: np.ndarray
@@ -29,10 +35,13 @@ class Borders:
 
     @property
     def shared(self) -> bool:
-        """True if there are fewer borders than areas, so that sharing saves work."""
+        """True if there are fewer borders than areas (rectangles of the visual field), because areas share borders.
+
+        In this case, it saves work to find the wall at each border once, for all areas that share the border.
+        """
         return len(self.x) < len(self.sides)
 
     @property
     def directions(self) -> np.ndarray:
-        """Horizontal directions to the borders in the eye's frame, (border, 3)."""
+        """Horizontal directions to the left and right borders of areas, in the eye's frame, (border, 3)."""
         return np.stack([self.x, np.zeros_like(self.x), np.ones_like(self.x)], axis=-1)

@@ -1,4 +1,7 @@
-"""Branches of the kernel for computations that few areas need."""
+"""Computations that the rendering program skips for areas of the visual field that do not need the results.
+
+For example, only an area in which a sphere may be visible needs the light from this sphere.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The grid of free cells in a world of walls, and the places of points in it."""
+"""The grid of square cells, free or filled by a wall, that divides a world, and a lookup of the cell around a point."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class CellGrid:
     """Cells of the grid in which the walls of a world stand. The grid ends at the outermost faces of the walls.
 
     side: side of a cell [m]
-    corner: lower corner of the grid [m], (2,)
+    corner: corner of the grid with the smallest x and y [m], (2,)
     free: True for cells without a wall, (row, column)
     """
 
@@ -38,12 +38,12 @@ class CellGrid:
 
     @property
     def numbers(self) -> np.ndarray:
-        """Indices of the free cells, counted row by row, (row, column); 0 for cells with a wall."""
+        """Index of each free cell among the free cells, row by row; 0 also for cells with a wall; (row, column)."""
         return np.where(self.free, np.cumsum(self.free).reshape(self.free.shape) - 1, 0)
 
     @property
     def corners(self) -> np.ndarray:
-        """Lower corners of the free cells [m], (cell, 2)."""
+        """Corner with the smallest x and y of each free cell [m], (cell, 2)."""
         row, column = np.nonzero(self.free)
         found: np.ndarray = self.corner + self.side * np.stack([column, row], axis=-1)
         return found

@@ -1,10 +1,15 @@
-"""The walls behind an area: the faces at its left and right borders, and the edge between them.
+"""The walls that are visible in an area, a small rectangle of an upright eye's visual field (`patch.Area`).
 
-The coordinate a runs across an area (`sim.tracing.areas.patch.Area`). An upright eye at the height z sees a wall in
-column a at the distance t. The unit of t is the length of the direction's horizontal part. The foot of the wall is
-visible at the slope (floor - z)/t, and its top at (top - z)/t. The inverse distance 1/t is linear in a, so the
-fractions of the area that floor, wall and sky fill have closed forms. If rays at the two borders of the area hit
-different walls, a corner or an edge lies between them. Its column is computed from the ends of the walls.
+At most two faces of walls are taken into account: the face that is visible at the area's left border, and the face at
+its right border. If these are different faces, a corner or an edge lies between them. The column in which the edge is
+visible is computed from the ends of the faces.
+
+A column is a vertical line in the area. Its position a runs from -1/2 at the left border to 1/2 at the right border.
+A ray of column a leaves the pupil with the horizontal direction `Area.level(a)` and hits a face at the distance t. This
+distance is measured along the eye's axis, so the horizontal position of the hit is p + t · `Area.level(a)`, where p is
+the horizontal position of the pupil. If the pupil is at the height z, the foot of the face is visible at the slope
+(floor - z)/t, and its top at the slope (top - z)/t. The inverse distance 1/t is linear in a, so there are closed forms
+for the fractions of the area that floor, wall and sky fill.
 """
 
 from __future__ import annotations
@@ -42,10 +47,14 @@ class Face:
 
 @dataclass(frozen=True)
 class Piece:
-    """A wall's face in columns start <= a <= end of an area.
+    """The part of a wall's face that is visible between two vertical lines in an area ("columns").
 
-    inverse_distance: inverse of the face's distance at a = 0, and its slope along a [1/m]
-    floor_share, wall_share, sky_share: fractions of the area that floor, wall and sky fill in these columns
+    An area is a rectangle of the visual field. The position a of a column runs from -1/2 at the area's left border to
+    1/2 at its right border.
+
+    start, end: positions a of the first and the last column
+    inverse_distance: inverse distance 1/t of the face in the column a = 0, and its change per unit of a [1/m]
+    floor_share, wall_share, sky_share: floor, wall and sky between the two columns, as fractions of the whole area
     """
 
     face: Face
@@ -58,19 +67,31 @@ class Piece:
 
     @property
     def middle(self) -> Array:
-        """Column in the middle of the piece."""
+        """Middle between the columns `start` and `end`, as a position in the area from -1/2 (left) to 1/2 (right)."""
         return (self.start + self.end) / 2
 
     def inverse_distance_at(self, a: Array) -> Array:
-        """Return the inverse distance 1/t of the face in column a [1/m]."""
+        """Return the inverse distance 1/t [1/m] of the wall's face in one column, a vertical line in the area.
+
+        An area is a rectangle of the visual field. The distance t is measured along the eye's axis. If p is the x and y
+        of the pupil, the x and y of the face in this column are p + t · `Area.level(a)`.
+
+        a: position of the column, from -1/2 (left border of the area) to 1/2 (right border)
+        """
         return dr.maximum(dr.fma(self.inverse_distance[1], a, self.inverse_distance[0]), LEAST_NEARNESS)
 
     def place(self, area: Area, a: Array) -> Array:
-        """Return the point of the wall that is visible in column a (Point2f)."""
+        """Return the point in plan (Point2f) where one column, a vertical line in the area, meets the wall's face.
+
+        a: position of the column, from -1/2 (left border of the area) to 1/2 (right border)
+        """
         return area.origin.xy + area.level(a) / self.inverse_distance_at(a)
 
     def patch(self, area: Area, floor: float, top: float) -> Patch:
-        """Return the visible patch of the wall; floor, top: heights of the floor and of the wall's top [m]."""
+        """Return the part of the wall's face that is visible in an area, a rectangle of the visual field.
+
+        floor, top: heights of the floor and of the wall's top [m]
+        """
         near = self.inverse_distance_at(self.middle)
         bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
         low = dr.maximum((floor - area.origin.z) * near, bottom)
@@ -90,10 +111,13 @@ class Piece:
 
 
 class Columns:
-    """Pieces of walls behind areas, in a world of walls of one height.
+    """Search for the parts of walls that are visible in areas, rectangles of the visual field.
+
+    All walls of the world have the same height.
 
     top: height of the walls' tops [m]
-    face_ends: ends of all faces, for the kernel
+
+    Attribute `face_ends`: x and y of the left and right ends of all faces, which is passed to the rendering program.
     """
 
     def __init__(self, walls: Walls, footprints: Footprints) -> None:
@@ -104,9 +128,13 @@ class Columns:
         self.face_ends = floats(_face_ends(walls))
 
     def pieces(self, area: Area, faces: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
-        """Return the left and the right piece. If both borders have the same face, the right piece is empty.
+        """Return the visible parts of the two faces that appear at the area's left and right borders.
 
-        faces: indices of the faces at the area's left and right border, see `first_faces`
+        An edge between the faces separates the parts. If the same face is visible at both borders, the right part is
+        empty.
+
+        faces: indices of the faces at the left and the right border, see `first_faces`
+        face_ends: the attribute `face_ends`, passed as an argument of the kernel
         """
         half = mi.Float(0.5)
         left, right = (self._face(index, face_ends) for index in faces)
@@ -116,7 +144,8 @@ class Columns:
     def first_faces(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
         """Return the index of the face that a ray in the horizontal direction `level` (Vector2f) hits first.
 
-        A ray that hits no wall hits a side of the floor's rim.
+        If the ray hits no wall, return the index of the side through which it leaves the rectangular floor. The four
+        sides of the floor have the indices after those of the faces.
 
         cells: see `Footprints`
         """
@@ -160,7 +189,12 @@ class Columns:
         return self.behind(area, piece, Rectangle(mi.Float(0), mi.Float(0), mi.Float(1), mi.Float(1)))
 
     def behind(self, area: Area, piece: Piece, part: Rectangle) -> Piece:
-        """Return the piece as it is visible in a part of the area."""
+        """Return the part of a piece of a wall's face that is visible in a smaller rectangle within the area.
+
+        The shares of floor, wall and sky are also those in the smaller rectangle, as fractions of the whole area.
+
+        part: the smaller rectangle, in units of the area's sides
+        """
         start, end = (dr.clip(part.a + sign * part.width / 2, piece.start, piece.end) for sign in (-1, 1))
         near = [piece.inverse_distance_at(a) for a in (start, end)]
         bottom, ceiling = (area.up + (part.b + sign * part.height / 2) * area.height for sign in (-1, 1))
@@ -173,14 +207,24 @@ class Columns:
 
 
 def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
-    """Return the inverse distance of a face's line at a = 0, and its slope along a [1/m]."""
+    """Return a wall face's inverse distance 1/t [1/m] in an area's middle column, and its change across the area.
+
+    An area is a rectangle of the visual field. The change is 1/t at the area's right border minus 1/t at its left
+    border. The face is extended to the left and right without end, so that 1/t exists everywhere in the area.
+    """
     side = face.right - face.left
     scale = dr.rcp(_cross(face.left - area.origin.xy, side))
     return _cross(area.ahead, side) * scale, _cross(area.right, side) * scale
 
 
 def _column_of(area: Area, point: Array, beyond: float) -> Array:
-    """Return the column a in which a point is visible, or `beyond` (±1, outside the area) if it is behind the eye."""
+    """Return the horizontal position a at which a point is visible in an area, a rectangle of the visual field.
+
+    The position runs from -1/2 at the area's left border to 1/2 at its right border.
+
+    point: x and y of the point (Point2f)
+    beyond: return value if the point is behind the eye: -1 or 1, outside the area
+    """
     way = point - area.origin.xy
     across = _cross(area.right, way)
     return dr.select(across > 0, -_cross(area.ahead, way) / dr.select(across > 0, across, 1), beyond)
@@ -191,10 +235,10 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _face_ends(walls: Walls) -> np.ndarray:
-    """Return the left and right end of each face, (face, 4).
+    """Return the x and y of the left end, and of the right end, of each face, (face, 4).
 
-    The faces of the walls, as seen from the front, are followed by the sides of the floor's rim, as seen from
-    inside.
+    Left and right are those of a viewer in front of the wall. After the walls' faces follow the four sides of the
+    rectangular floor, with left and right as for a viewer on the floor.
     """
     found = []
     for (x0, y0), (x1, y1) in zip(walls.lower, walls.upper, strict=True):

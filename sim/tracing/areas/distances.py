@@ -1,7 +1,8 @@
-"""Lengths of the paths from an eye to the parts of surfaces in an area, through water or air.
+"""Lengths of the light's paths through water or air, from surfaces in an area of the visual field to the eye.
 
-The transmission of a medium is averaged over an area by Gauss-Legendre quadrature with two nodes per wall and per band
-of the floor. Along the other axis of the area, the distance to its middle represents all distances.
+A medium's transmission is averaged over an area by Gauss-Legendre quadrature, with two nodes for each wall and for each
+horizontal band of the floor. The two nodes of a wall lie side by side, at the middle height of its visible part. The
+two nodes of a band lie one above the other, in its middle column.
 """
 
 from __future__ import annotations
@@ -20,7 +21,11 @@ LEAST_DIP = 1e-4  # smallest downward slope of directions that hit the floor
 
 
 def distances_to_wall(area: Area, piece: Piece, patch: Patch) -> list[Array]:
-    """Return the distances [m] to two columns of a wall's piece, at the middle height of its visible patch."""
+    """Return the distances [m] from the pupil to the two quadrature nodes on a wall, which lie side by side.
+
+    piece: part of the wall's face that is visible in the area
+    patch: this part, described as a parallelogram; both nodes are at the height of its middle
+    """
     found, height = [], patch.point.z - area.origin.z
     for node in NODES:
         across = piece.place(area, dr.fma(piece.end - piece.start, node, piece.middle)) - area.origin.xy
@@ -31,9 +36,11 @@ def distances_to_wall(area: Area, piece: Piece, patch: Patch) -> list[Array]:
 def distances_to_floor(area: Area, a: Array, dip: Array, height: Array, above: Array) -> list[Array]:
     """Return the distances [m] from the pupil to the floor at the two quadrature nodes of a band.
 
-    a: column of the band's middle, see `Area`
-    dip: downward slope of the direction to the band's middle, on the eye's tangent plane
-    height: height of the band, as a difference of slopes
+    The band is a horizontal strip of the area. The nodes lie one above the other.
+
+    a: horizontal position of the band's middle in the area, from -1/2 to 1/2, see `Area`
+    dip: distance of the band's middle below the horizon on the eye's tangent plane, which is at distance 1
+    height: height of the band on this plane
     above: height of the pupil above the floor [m]
     """
     level, found = area.level(a), []

@@ -1,4 +1,8 @@
-"""Two integrals for the fractions of an area that its parts fill, if straight lines bound the parts."""
+"""The fraction of a unit square that lies on one side of a straight line, for two descriptions of the line.
+
+The square stands for a rectangle of the visual field or for a patch of a surface. `share_above` takes the coefficients
+of the line's equation. `mean_clamped` takes the line's heights at the left and the right side of the square.
+"""
 
 from __future__ import annotations
 

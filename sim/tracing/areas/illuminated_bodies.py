@@ -28,11 +28,12 @@ Reflected = Callable[[Array, Array, Array], list[Array]]
 
 
 class IlluminatedBodies:
-    """Computation and lookup of the light on the moving bodies of all worlds.
+    """Computation and lookup of a table of the light on the moving bodies of all worlds.
 
-    A row of the table belongs to a place on a body. It contains the fraction of each light that reaches the place, in
-    groups of four ("fours"). The first four rows of a body also contain sixteen spherical harmonics of the reflected
-    light around the body: each row contains four harmonics per component.
+    Each row of the table describes one place on a body. For each light, it contains the fraction that reaches the
+    place. These numbers are stored in groups of four ("fours"). The first four rows of a body also contain sixteen
+    spherical harmonics of the reflected light around the body. Each of these rows contains four of the harmonics, for
+    each component of the light's spectrum.
 
     shadows: shadows of walls
     directions: directions towards the lights
@@ -45,20 +46,25 @@ class IlluminatedBodies:
 
     @property
     def nodes_per_body_set(self) -> int:
-        """Number of rows of a world's table."""
+        """Number of rows that one world has in the table of the light on bodies.
+
+        Each body has ten rows: one for each of nine places on its sides, and one for the body as a whole.
+        """
         return PLACES * len(self._radii)
 
     def table(self, place: Array, bodies: list[Array], walls_around: Array | None, reflected: Reflected) -> list[Array]:
-        """Return rows of the table: the fraction of each light that reaches a place on a body, then four harmonics.
+        """Return rows of the table of light on bodies. A row contains the light at one place on a body.
 
-        The fractions are in groups of four. There are four harmonics per component.
+        A row starts with one number per light: the fraction of this light that reaches the place. The numbers are
+        stored in groups of four. Then follow, for each component of the light's spectrum, four spherical harmonics of
+        the reflected light around the body.
 
-        Walls block the light at all places. Other bodies block it only at places on a side, not at the place that
-        represents the whole body.
+        A body has nine places on its sides, in a grid of three by three, and a tenth place that stands for the whole
+        body. Walls block the light at all ten places. Other bodies block it only at the nine places on the sides.
 
-        place: row of a world's table
+        place: index of the row among the rows of one world: 10 · (index of the body) + (index of the place on it)
         bodies: centres of the world's bodies
-        walls_around: for each cell of the grid, which of its neighbours are walls (`WallShadows.around`)
+        walls_around: for each cell of the walls' grid, which of its neighbours are walls (`WallShadows.around`)
         reflected: function that returns harmonics for a body's index, the index of a group of four, and the body's
             centre
         """
@@ -82,7 +88,7 @@ class IlluminatedBodies:
     def reflected_around(self, k: Array, world: Array, table: list[Array]) -> list[list[Array]]:
         """Return the harmonics of the reflected light around the k-th body of a world.
 
-        There is one list per component, with the harmonics in groups of four.
+        There is one list for each component of the light's spectrum, with the harmonics in groups of four.
         """
         first = (world * len(self._radii) + k) * PLACES
         return [[dr.gather(mi.Vector4f, rows, first + i) for i in range(FOURS)] for rows in table[self._fours :]]

@@ -1,6 +1,6 @@
 """The light that reaches a patch of a surface.
 
-Walls and bodies block parts of it, and reflect light towards the patch.
+Walls and bodies block a part of the light, and reflect other light towards the patch.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class AreaTables:
 
     faces: walls' faces, eight numbers each, see `area_tracer`
     face_ends: ends of all faces in the ground plan
-    cells: the grid in which walls stand; None: no grid, because walls are few
-    around: for each cell of the grid, which of its neighbours are walls; None without walls
+    cells: the grid of cells in which walls stand; None: there is no grid, and the few walls are tested one by one
+    around: for each cell of the grid, a number that states which of its neighbours are walls; None without walls
     stripes: textures
     reflected: light that walls and floor reflect to each other; None: reflected light is neglected
     """
@@ -69,11 +69,12 @@ class Illumination:
 
     rays: tracer of rays through the world
     radii: radii of the bodies [m], (body,)
-    around: attribute, table of the walls around each cell, see `WallShadows`
-    bodies: attribute, the light on bodies
+
+    Attribute `around`: for each cell of the grid in which walls stand, which of its neighbours are walls.
+    Attribute `bodies`: computation and lookup of the light on bodies.
 
     Raises:
-        NoClosedForm: WallShadows has no closed form for the shadows.
+        NoClosedForm: `WallShadows` has no closed form for the shadows.
     """
 
     def __init__(self, rays: ClosedForm, radii: np.ndarray) -> None:
@@ -86,7 +87,11 @@ class Illumination:
         self.bodies = IlluminatedBodies(self._shadows, self._directions, self._radii)
 
     def irradiance(self, patch: Patch, now: FrameState) -> list[Array]:
-        """Return the irradiance per component: the sum over lights of level · cos(angle of incidence) · visibility."""
+        """Return the irradiance of a patch by the lights, for each component of the light's spectrum.
+
+        It is the sum over lights of level · cos(angle of incidence) · visibility. The level is the light's strength in
+        the component, and the visibility is the fraction of the patch that the light reaches.
+        """
         return self.arriving(patch.normal, self.visibility(patch, now))
 
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
@@ -102,7 +107,10 @@ class Illumination:
         return self._for_bodies(past, self._shadows.visibility(patch, self._directions, now.inputs.around))
 
     def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
-        """Return the irradiance per component: the sum over lights of level · cos(angle of incidence) · fraction.
+        """Return the irradiance of a surface by the lights, for each component of the light's spectrum.
+
+        It is the sum over lights of level · cos(angle of incidence) · fraction, where the level is the light's strength
+        in the component.
 
         lit: fraction of each light that arrives
         """
@@ -168,9 +176,10 @@ class Illumination:
         return [factor * mine - dr.clip(dark, 0, all_) - shadow for mine, dark, all_, shadow in exchanged]
 
     def _shadow(self, k: Array, patch: Patch, now: FrameState) -> list[Array]:
-        """Return the light, per component, that a patch lacks because of the shadows of a body on the floor.
+        """Return the light that a patch of a surface lacks because a body casts shadows on the floor.
 
-        The shadows have the form factors of disks.
+        There is one array for each component of the light's spectrum. The light that would come from a shadowed part of
+        the floor is computed with the form factor of a disk.
         """
         centre, disk = select(k, now.bodies), math.pi * dr.square(select(k, self._radii))
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
@@ -185,15 +194,15 @@ class Illumination:
         return total
 
     def _sent(self, k: Array, towards: Array, nearness: Array, now: FrameState) -> list[Array]:
-        """Return the radiosity of a body as seen from a patch, per component.
+        """Return a body's radiosity as seen from a patch of a surface, for each component of the light's spectrum.
 
         The radiosity is the body's mean reflectance times the light on its visible side. This light is a weighted mean
         of two limits. From far away, the patch sees the whole side, whose light follows Lambert's phase function. From
         close by, the patch sees only the body's nearest point, with the irradiance there.
 
         towards: unit vector from the body to the patch
-        nearness: radius divided by distance. The weight is a fitted function of it (residual at most 0.05 of the
-            light).
+        nearness: the body's radius divided by its distance. A fitted function of the nearness gives the weight of the
+            near limit. The weighted mean deviates from the true light by at most 0.05 of the light.
         """
         near = nearness * (1.4 - 0.4 * nearness)
         lit = self.bodies.on_side(k, towards, now.world, now.body_light)

@@ -1,7 +1,7 @@
 """Computation of the tables of reflected light by brute force, with many rays from every node.
 
 The tables describe the static scene. They take moving bodies into account in one way only: a body's shadows on floor
-and walls reduce the light that these reflect back to the body.
+and walls reduce the light that floor and walls reflect back to the body.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LANES = 2**21  # rays traced at once
 
 
 class Baking:
-    """Computation of the tables of one world.
+    """Computation of the tables of reflected light on floor, walls and bodies of one world.
 
     tracer: tracer of rays through the world
     nodes: points of floor and walls at which the light is computed
@@ -62,12 +62,12 @@ class Baking:
         return {f"bounced_{name}_{k}": size for name, size in (sizes | bodies).items() for k in count}
 
     def tables(self) -> dict[str, np.ndarray]:
-        """Return the tables of floor, walls and each kind of body by name, float32, flat.
+        """Return tables of the reflected light on floor, walls and each kind of body, by name, float32, flat.
 
-        Each component has its own tables.
+        Each component of the light's spectrum has its own tables.
 
-        With light of any number of reflections (`lighting.ALL`), each iteration adds one reflection. The iterations end
-        when the tables change by at most 0.1 % of their largest value, at the latest after 16 reflections.
+        If the number of reflections is not limited (`lighting.ALL`), each iteration adds one reflection. The iterations
+        end when the tables change by at most 0.1 % of their largest value, at the latest after 16 reflections.
         """
         found = self._surfaces()
         for _ in range(self._orders - 1):
@@ -96,7 +96,11 @@ class Baking:
         }
 
     def _on_floor(self) -> np.ndarray:
-        """Return the light on the floor, (node, component), in order of cell, y and x."""
+        """Return the reflected light on the floor, at the points ("nodes") for which the table has entries.
+
+        The nodes are sorted by cell, then by y, then by x. The array has the shape (node, component of the light's
+        spectrum).
+        """
         places = _within(self._nodes.grid.side, self._nodes.across)
         y, x = (a.ravel() for a in np.meshgrid(places, places, indexing="ij"))
         points = self._nodes.grid.corners[:, None] + np.stack([x, y], axis=-1)
@@ -104,9 +108,10 @@ class Baking:
         return self._gathered(points, np.tile([0.0, 0, 1], (len(points), 1)), RAYS)
 
     def _on_walls(self) -> np.ndarray:
-        """Return the light on walls, (node, component), in the order of cell, side, z and place along the wall.
+        """Return the reflected light on walls, at the points ("nodes") for which the table has entries.
 
-        It is 0 if a side has no wall.
+        The light is 0 on sides of a cell without a wall. The nodes are sorted by cell, then by side of the cell, then
+        by z, then by the position along the wall. The array has the shape (node, component of the light's spectrum).
         """
         n, grid = self._nodes.across * self._nodes.up, self._nodes.grid
         light = np.zeros((len(grid.corners), len(SIDES), n, len(self._tracer.basis)))
@@ -130,9 +135,10 @@ class Baking:
         return light.reshape(-1, light.shape[-1])
 
     def _on_body(self, radius: float, height: float) -> np.ndarray:
-        """Return spherical harmonics of the light on a body's surface, (place, 16, component).
+        """Return spherical harmonics of the light on a body's surface, for many positions of the body.
 
-        The places of the body are in order of cell, y and x.
+        The positions form a grid in each free cell of the walls' grid. The result lists them in order of cell, y and
+        x. Its shape is (position, 16 harmonics, component).
 
         radius, height: radius of the body, and height of its centre [m]
         """
@@ -178,7 +184,10 @@ class Baking:
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
-    """Return positions of nodes along a length [m], (nodes,): even, but the outer ones 0.02 m away from the ends."""
+    """Return evenly spaced positions along a length [m], (nodes,).
+
+    The first and last would lie at the ends, but are moved inwards by 0.02 m.
+    """
     return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
 
 

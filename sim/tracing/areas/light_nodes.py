@@ -1,7 +1,7 @@
 """Nodes at which the light that walls and floor reflect to each other is computed, and interpolation between them.
 
-Every free cell of the walls' grid has nodes on its floor and on its four sides, where walls may stand. It also has
-positions of a body's centre, for which the light on the body is computed.
+Every free cell of the walls' grid has nodes on its floor and on its four sides, where walls may stand. For every free
+cell, the light on a moving body is computed as well, with the body's centre at several positions in the cell.
 """
 
 from __future__ import annotations
@@ -63,10 +63,11 @@ class LightNodes:
         return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
 
     def body_margin(self, radius: float) -> float:
-        """Return the smallest distance [m] between a cell's borders and the tabulated positions of a body's centre.
+        """Return the smallest distance [m] from a cell's border at which the light on a body is computed in advance.
 
-        It is the radius, because walls may stand at the borders, and a body's centre cannot be closer to a wall. The
-        upper limit for large bodies is a quarter of the side of the cell.
+        The cells are the squares of the walls' grid. The distance is that of the body's centre. It is the body's
+        radius, because walls may stand at the borders, and a body's centre cannot be closer to a wall. For large
+        bodies, the distance is a quarter of the cell's side instead.
 
         radius: radius of the body [m]
         """
@@ -74,16 +75,20 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Index of each cell among the free cells, float32, flat, for the kernel; see `CellGrid.numbers`."""
+        """Numbers, from 0, of the cells of the walls' grid that contain no wall, and 0 for cells with a wall.
+
+        The numbers are a flat float32 array for the kernel, row by row (`CellGrid.numbers`).
+        """
         return self.grid.numbers.astype(np.float32).ravel()
 
 
 @dataclass(frozen=True)
 class NodeTables:
-    """Reflected light at the nodes.
+    """Tables of the reflected light at the nodes, the points of floor and walls for which it was computed in advance.
 
-    cells: see `CellGrid.numbers`
-    floor, walls: light at their nodes, one array per component
+    cells: numbers, from 0, of the cells of the walls' grid that contain no wall, see `CellGrid.numbers`
+    floor, walls: irradiance at the nodes of the floor and of the walls, one array for each component of the light, a
+        spectral band or a fixed spectrum
     """
 
     cells: Array
@@ -95,20 +100,26 @@ class NodeLight:
     """Light interpolated between nodes, from tables that are passed to each call.
 
     nodes: nodes at which the light is known
-    components: number of components of light
+    components: number of components of the light, which are spectral bands or fixed spectra
     """
 
     def __init__(self, nodes: LightNodes, components: int) -> None:
         self._nodes, self._components = nodes, components
 
     def on_floor(self, patch: Patch, tables: NodeTables) -> list[Array]:
-        """Return the irradiance of a patch of the floor due to reflected light, per component."""
+        """Return the irradiance of a patch of the floor due to reflected light.
+
+        There is one array for each component of the light, a spectral band or a fixed spectrum.
+        """
         cell, x, y = self._nodes.grid.locate(patch.point, tables.cells)
         n = self._nodes.across
         return self._interpolate(tables.floor, cell * (n * n), (x, n), (y, n))
 
     def on_wall(self, patch: Patch, tables: NodeTables) -> list[Array]:
-        """Return the irradiance of a patch of a wall due to reflected light, per component."""
+        """Return the irradiance of a patch of a wall due to reflected light.
+
+        There is one array for each component of the light, a spectral band or a fixed spectrum.
+        """
         normal = patch.normal
         cell, x, y = self._nodes.grid.locate(patch.point + normal * MARGIN, tables.cells)
         along_y = dr.abs(normal.x) > 0.5
@@ -119,7 +130,10 @@ class NodeLight:
         return self._interpolate(tables.walls, first, (across, self._nodes.across), (z, self._nodes.up))
 
     def on_surface(self, point: Array, normal: Array, tables: NodeTables) -> list[Array]:
-        """Return the irradiance at a point of the floor or of a wall due to reflected light, per component."""
+        """Return the irradiance at a point of the floor or of a wall due to reflected light.
+
+        There is one array for each component of the light, a spectral band or a fixed spectrum.
+        """
         nothing = mi.Vector3f(0)
         patch = Patch(point, normal, nothing, nothing)
         either = zip(self.on_floor(patch, tables), self.on_wall(patch, tables), strict=True)
@@ -132,10 +146,12 @@ class NodeLight:
 
 
 def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
-    """Yield index and weight of the four nodes around a position.
+    """Yield index and weight, for bilinear interpolation, of the four nodes around a position on a rectangle.
 
-    first: index of the first node of this cell, or of this floor or wall in the cell
-    axes: x and y in [0, 1], each with its number of nodes
+    The rectangle, such as the floor or one wall of a cell, has a regular grid of nodes.
+
+    first: index of the rectangle's first node
+    axes: the position's x and y on the rectangle, in [0, 1], each with the number of nodes along this axis
     """
     (x, nx), (y, ny) = axes
     x, y = dr.clip(x, 0, 1) * (nx - 1), dr.clip(y, 0, 1) * (ny - 1)

@@ -1,7 +1,7 @@
 """A disk cache for tables of reflected light, because the computation of a world's tables takes seconds.
 
-A file is used only if it has the expected names, shapes and number types, finite numbers, and a checksum that includes
-the world. Otherwise the tables are baked again.
+A file is used only if its tables have the expected names, shapes and number types, if all numbers are finite, and if
+the checksum of the tables and of their world is correct. Otherwise the tables are computed again.
 """
 
 from __future__ import annotations
@@ -43,7 +43,10 @@ def write_error() -> str | None:
 
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:
-    """Return the tables, from the cache if possible. If it cannot be written to, each call bakes missing tables."""
+    """Return the tables, from the cache if possible. Tables that are not in the cache are computed and stored there.
+
+    If nothing can be written to the cache, they are computed at every call.
+    """
     world = _digest(baking.ingredients)
     path = cache_folder() / f"{world}.npz"
     found = _read(path, baking.layout, world)
@@ -92,10 +95,12 @@ def _read(path: Path, layout: dict[str, int], world: str) -> dict[str, np.ndarra
 
 
 def _table(archive: zipfile.ZipFile, name: str, dtype: np.dtype, size: int) -> np.ndarray:
-    """Return a flat table of an archive. Memory is allocated for the expected size, not for the size in its header.
+    """Return a flat table of an archive.
+
+    Memory is allocated for the expected size, not for the size that the table's header states.
 
     Raises:
-        ValueError: the table does not have this number type and size.
+        ValueError: the table does not have the number type `dtype` and the size `size`.
     """
     header = io.BytesIO()
     written = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": (size,)}

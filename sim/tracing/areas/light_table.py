@@ -1,4 +1,4 @@
-"""Light that the walls and the floor of a world reflect to each other, looked up in precomputed tables.
+"""Tables, computed in advance, of the light that the walls and the floor of a world reflect to each other.
 
 Every free cell of the walls' grid has a table for its floor, and one for each of its four sides, where walls may stand.
 Another table contains the light that arrives from all sides on the surface of bodies in the cell
@@ -25,10 +25,10 @@ from sim.tracing.closed_form_tracer import ClosedForm
 
 @dataclass(frozen=True)
 class LightTables(NodeTables):
-    """Reflected light at the nodes and on bodies.
+    """Reflected light at nodes, which are points of floor and walls, and on moving bodies.
 
-    bodies: coefficients of spherical harmonics of the light on bodies, for each combination of radius and height of the
-        centre, one array per component
+    bodies: spherical harmonics of the light on bodies: their coefficients for each combination of a body's radius and
+        the height of its centre, one array for each component of the light (a spectral band or a fixed spectrum)
     """
 
     bodies: list[Array]
@@ -37,12 +37,13 @@ class LightTables(NodeTables):
 class LightTable(NodeLight):
     """Lookup of reflected light on floor, walls and bodies of one world.
 
-    tracer: tracer of rays through the same world; the tables have its components of light
+    tracer: tracer of rays through the same world. Each of its components of light, spectral bands or fixed spectra,
+        has its own tables
     radii, heights: radii of the bodies, and heights of their centres [m]
-    tables: attribute, the tables in the form in which the kernel receives them
+    tables: the tables as Dr.Jit arrays, which are passed to the kernel (an attribute)
 
     Raises:
-        NoClosedForm: there are no walls, they lie on no grid or overlap, or there are too many cells for the tables.
+        NoClosedForm: the world has no walls, some walls overlap or do not fit a grid, or the tables would be too large.
     """
 
     def __init__(self, tracer: ClosedForm, radii: np.ndarray, heights: np.ndarray) -> None:
@@ -56,12 +57,13 @@ class LightTable(NodeLight):
         self._body_nodes = int(nodes.grid.free.sum()) * nodes.places**2
 
     def on_body(self, body: Array, four: Array, centre: Array, tables: LightTables) -> list[Array]:
-        """Return one group of four harmonics of the light that arrives on a body, per component (Vector4f).
+        """Return four coefficients (Vector4f) of the spherical harmonics of the light that arrives on a body.
 
-        All groups together are the coefficients for `sum_of`.
+        There is one Vector4f for each component of the light, a spectral band or a fixed spectrum. From all groups of
+        four coefficients, `sum_of` computes the light that arrives at a point of the body's surface.
 
         body: index of the body
-        four: index of the group of four harmonics
+        four: index of the group of four coefficients
         centre: centre of the body
         """
         cell, x, y = self._nodes.grid.locate(centre, tables.cells)

@@ -1,4 +1,4 @@
-"""Regions over which light is averaged: an area of the visual field, and the patch of a surface that it shows."""
+"""Regions over which light is averaged: an area of the visual field, and a patch of a surface."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from optics.numerics.autodiff import Array
 class Area:
     """A rectangle on the tangent plane of an upright eye.
 
-    It contains the directions (ahead + a right, up + b height) for |a| and |b| up to 1/2.
+    It contains the directions whose horizontal part is ahead + a · right and whose vertical part is up + b · height,
+    for |a| and |b| up to 1/2.
 
     origin: the pupil (Point3f)
-    ahead, up: horizontal part (Vector2f) and z of the direction to the rectangle's middle
-    right, height: full width as a vector (Vector2f), and full height
+    ahead, up: direction to the rectangle's middle: its horizontal part (Vector2f), and its vertical part
+    right, height: the rectangle's full width as a horizontal vector (Vector2f), and its full height
     """
 
     origin: Array
@@ -28,11 +29,13 @@ class Area:
 
     @classmethod
     def from_extent(cls, middle: Array, axis: Array, extent: tuple[Array, Array]) -> Area:
-        """Return the area around a ray of an upright eye. The area's width is horizontal, and its height is vertical.
+        """Return a rectangle around a ray, on the tangent plane of an eye with a horizontal axis.
 
-        middle: the ray, whose component along the eye's axis is 1
+        The rectangle's width is horizontal, and its height is vertical.
+
+        middle: ray to the middle of the rectangle; its direction has the component 1 along the eye's axis
         axis: horizontal axis of the eye, a unit vector (Vector2f)
-        extent: width and height on the tangent plane
+        extent: width and height on the plane tangent at the distance 1
         """
         width, height = extent
         right = mi.Vector2f(axis.y, -axis.x) * width

@@ -25,7 +25,7 @@ NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
 
 
 def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, radius: Array) -> list[Array]:
-    """Return the fraction of a patch on which a sphere casts no shadow, for each light.
+    """Return the fraction of a patch that lies outside a sphere's shadow, for each light.
 
     directions: unit vectors towards the lights
     """
@@ -42,10 +42,11 @@ def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, 
 
 
 def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: Array) -> Array:
-    """Return the fraction of a patch that one light reaches past a sphere.
+    """Return the fraction of a patch of a surface that lies outside a sphere's shadow, for one light.
 
-    On small patches, the rim of the shadow is treated as one straight line, or as two. On large patches, the shadow is
-    treated as a disk within the patch.
+    The fraction in the shadow is the smaller of two estimates. The first estimate treats the shadow as a strip between
+    two parallel straight lines that touch its rim on opposite sides. It suits patches much smaller than the shadow. The
+    second estimate treats the shadow as a disk that lies wholly within the patch. It suits large patches.
 
     direction: unit vector towards the light
     way: vector from the middle of the patch to the centre of the sphere
@@ -63,17 +64,19 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: A
 
 
 class WallShadows:
-    """Shadows of walls of one height. The shadows reach at most into the next cell of the walls' grid.
+    """Shadows of walls of one height. A shadow must not be longer than a cell, a square of the walls' grid.
 
-    Below the walls' tops, a ray from a point in a free cell to a light enters at most the next cell along x or the next
-    cell along y, and from there the cell across the corner. A table states for each cell which of these neighbours are
-    walls. Three straight lines across the patch separate points whose rays enter different neighbours, or pass above
-    the wall there.
+    Below the walls' tops, a ray towards a light therefore crosses at most one border of cells along x and one along y.
+    It enters the neighbouring cell along x or the one along y, and then possibly their common neighbour, the diagonal
+    one. A table states which neighbours of each cell are walls. A patch of a surface is divided by three straight
+    lines. Two lines, one for the neighbour along x and one for the neighbour along y, separate points whose rays pass
+    above the walls' height there from points whose rays do not. The third line separates points whose rays enter the
+    neighbour along x first from points whose rays enter the neighbour along y first.
 
     around: table for the kernel that states, for each cell, which of its neighbours are walls; None without walls
 
     Raises:
-        NoClosedForm: the walls lie on no grid or overlap, or shadows are longer than a cell.
+        NoClosedForm: some walls overlap or do not fit a grid, or shadows are longer than a cell.
     """
 
     def __init__(self, walls: Walls, directions: list[list[float]]) -> None:
@@ -118,9 +121,13 @@ class WallShadows:
         return only_where(concerns, lit, [1.0] * len(directions))
 
     def _lit_from(self, patch: Patch, direction: list[float], row: Array, column: Array, around: Array) -> Array:
-        """Return the fraction of a patch that no neighbouring wall shades.
+        """Return the fraction of a patch of a surface that lies outside the shadows of walls in neighbouring cells.
 
-        The neighbours are the cells that a ray to the light enters along x, along y, or through the corner.
+        Rays to the light may enter three neighbours: the one along x, the one along y, and the diagonal one.
+
+        direction: unit vector towards the light
+        row, column: cell in front of the patch
+        around: bits that state which of the nine cells around are walls, in the order of `NEIGHBOURS`
         """
         dx, dy = (math.copysign(max(abs(d), NEVER_ZERO), d) for d in direction[:2])
         dz = direction[2]
@@ -147,7 +154,13 @@ def _share(value: Array, patch: Patch, gradient: tuple[float, float, float]) -> 
 
 
 def _behind(direction: list[float]) -> tuple[tuple[int, int], ...]:
-    """Return the neighbours (row, column) that light from a direction crosses: along x, along y, through the corner."""
+    """Return the three neighbouring cells that a ray may enter on its way from a cell to a light.
+
+    They are the neighbour along x, the neighbour along y and the diagonal neighbour, each as its offset in rows and
+    columns from the cell.
+
+    direction: vector towards the light
+    """
     x, y = (1 if d > 0 else -1 for d in direction[:2])
     return (0, x), (y, 0), (y, x)
 

@@ -1,7 +1,8 @@
-"""The fraction of an area that a sphere fills, and the patch of the sphere that is visible there.
+"""The fraction of an area of the visual field (`patch.Area`) that a sphere fills, and the surface visible there.
 
-A sphere's outline on the tangent plane is a conic. Strips of its inside are treated as parallelograms. Their length is
-that of the mean chord for ellipses (exact areas, unless they are clipped), and of the middle chord for other outlines.
+A sphere's outline on the tangent plane is a conic. Strips of its inside are treated as parallelograms. In an ellipse,
+the parallelogram is as long as the mean chord of the strip. It then has exactly the strip's size, unless the area's
+border cuts the chord. In other outlines, the parallelogram is as long as the middle chord of the strip.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ NEARLY_OPEN = 1e-4  # chosen: outlines whose length exceeds about 100 times thei
 
 @dataclass(frozen=True)
 class SphereTexture:
-    """A texture that changes along one axis.
+    """A sphere's texture, which changes along one axis.
 
-    texture: place of the texture in the tables
+    texture: index of its first texel in the tables of all textures (`StripeTables`), and its number of columns
     to_column: map from texture coordinates to a column of the texture: column = to_column @ (u, v, 1)
     frame: rotation from the sphere's axes to the world's, (3, 3)
     """
@@ -44,11 +45,10 @@ class SphereTexture:
 
 @dataclass(frozen=True)
 class Slice:
-    """A slice of a sphere's visible part in an area.
+    """A slice of a sphere, as the eye sees it in one area. The area is a rectangle on the eye's tangent plane.
 
-    share: fraction of the area that the slice fills
-    seen: direction of its middle
-    along, across: sides of the slice on the area's plane
+    share, seen: fraction of the area that the slice fills, and direction from the eye to the slice's middle
+    along, across: sides of the slice on the tangent plane
     patch: part of the sphere's surface in the slice
     """
 
@@ -68,16 +68,16 @@ class Slice:
 class Strip(Slice):
     """A strip of a sphere's visible part: a row of slices, treated as one slice.
 
-    part: part of the area that the strip fills, approximately
+    part: rectangle that is approximately the strip, in units of the area's sides
     """
 
     part: Rectangle
 
 
 class SphereView:
-    """The visible part of a sphere in an area, divided into strips, and each strip into slices.
+    """The part of a sphere that is visible in an area. It is divided into strips, which are divided into slices.
 
-    sides: number of strips, and of slices in each strip
+    sides: number of strips, which is also the number of slices in each strip
     """
 
     def __init__(self, area: Area, centre: Array, radius: float) -> None:
@@ -107,7 +107,7 @@ class SphereView:
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
     def _between(self, low: Array, high: Array) -> Strip:
-        """Return the strip between two edges, given by numbers from 0 to 1, see `_Outline.edge`."""
+        """Return the strip between two edges; 0 is the first edge of the sphere's visible part, and 1 is its last."""
         outline = self._outline
         one, other = outline.edge(low), outline.edge(high)
         place, width = (one.place + other.place) / 2, other.place - one.place
@@ -120,7 +120,7 @@ class SphereView:
         return Strip(length * width, seen, *sides, self._patch(seen, *sides), dr.select(self._upright, *upright))
 
     def slice(self, strip: Strip, number: Array) -> Slice:
-        """Return the slice with this index of a strip."""
+        """Return one slice of a strip, given the index of the slice."""
         per = dr.rcp(mi.Float(self.sides))
         seen = strip.seen + strip.along * ((mi.Float(number) + 0.5) * per - 0.5)
         sides = strip.along * per, strip.across
@@ -132,10 +132,10 @@ class SphereView:
 
 @dataclass(frozen=True)
 class _Edge:
-    """An edge of a strip.
+    """An edge of a strip: a straight line across an area, the rectangle in which a sphere is seen.
 
-    place: position across the area, from -1/2 to 1/2
-    angle, sine: parameter of a closed outline, and its sine: place = middle[0] + half[0] · sine, see `_Outline`
+    place: position of the line in the area, from -1/2 at one border to 1/2 at the opposite one
+    angle, sine: for an ellipse (`_Outline`), its parameter, and sin(angle) = (place - middle[0]) / half[0]
     """
 
     place: Array
@@ -145,13 +145,13 @@ class _Edge:
 
 @dataclass(frozen=True)
 class _Outline:
-    """A sphere's outline on an area's tangent plane, in units of the area's sides.
+    """A sphere's outline in an area, a rectangle on the eye's tangent plane. Lengths are relative to its sides.
 
     closed: True if the outline is an ellipse, which the other fields describe
     middle: middle of the ellipse, across and along the area
     half: half of the ellipse's width across the area, and half of the chord through its middle along the area
-    slant: shift of the ellipse's middle along the area per unit of position across it (0: the ellipse is not tilted)
-    low, high: values of the ellipse's parameter, an angle, at which the area's edges cut the ellipse off
+    slant: slope of the line through the middles of all chords along the area (0: the ellipse is not tilted)
+    low, high: angles, the ellipse's parameter, at the area's two borders, or at the ellipse's ends if these are inside
     """
 
     closed: Array
@@ -162,16 +162,19 @@ class _Outline:
     high: Array
 
     def edge(self, share: Array) -> _Edge:
-        """Return the edge at `share`, from 0 to 1. The angle of an ellipse is linear in it, or else the place is."""
+        """Return an edge of the strips that divide a sphere's visible part; `share`: 0 is the first edge, 1 the last.
+
+        If the outline is an ellipse, the edge's `angle` is linear in `share`. Otherwise, the edge's `place` is.
+        """
         angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
         place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), share - 0.5)
         return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
 
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
-        """Return length and middle of the average chord between two edges, clipped to the area.
+        """Return length and middle of the ellipse's average chord in a strip, cut off at the area's border.
 
-        Unless the chord is clipped, the areas of ellipses are exact with this length.
+        If nothing is cut off, length times the strip's width is exactly the size of the ellipse's part in the strip.
         """
         double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
         mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
@@ -183,8 +186,8 @@ class _Outline:
 def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Array) -> _Outline:
     """Return the outline of the sphere with its centre at `way` from the eye.
 
-    A direction v = ahead + x across + y along, with |x| and |y| up to 1/2 in the area, hits the sphere if
-    |way × v|² < radius² |v|² and way · v > 0.
+    A direction v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|² and way · v > 0. The outline
+    is in units of x and y, which are from -1/2 to 1/2 in the area in which the sphere is seen.
     """
     x, y, z = (dr.cross(way, v) for v in (across, along, ahead))
     square = radius * radius
@@ -207,7 +210,7 @@ def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Arra
 
 
 def may_see(area: Area, centre: Array, radius: float) -> Array:
-    """Return whether a sphere may be visible in an area; False only if it certainly is not."""
+    """Return whether a sphere may be visible in an area of the visual field; False only if it certainly is not."""
     way = centre - area.origin
     ahead = area.direction(0, 0)
     beside = dr.cross(way, ahead)
@@ -219,7 +222,7 @@ def may_see(area: Area, centre: Array, radius: float) -> Array:
 
 
 def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Array, tuple[Array, Array]]:
-    """Return the texture column at the patch's middle, and the number of columns that each of its two sides spans."""
+    """Return the texture column at a patch's middle, and how many columns each of the patch's two sides spans."""
     to_local = mi.Matrix3f(texture.frame.T.tolist())
     n, along, across = (to_local @ mi.Vector3f(v) for v in (patch.normal, patch.along, patch.across))
     per_u, per_v, at = map(float, texture.to_column)
@@ -238,11 +241,9 @@ def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arr
 
 
 def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
-    """Return the fraction of a slice that another sphere hides.
+    """Return the fraction of a slice that a second sphere hides. The second sphere's outline is treated as straight.
 
-    The sphere's outline is approximated by a straight line in the slice.
-
-    way: vector from the eye to the sphere's centre
+    way, radius: vector from the eye to the second sphere's centre, and radius of the second sphere [m]
     """
     seen, sides = slice_.seen, (slice_.along, slice_.across)
     length, moment = dr.norm(seen), dr.cross(way, seen)
@@ -252,13 +253,12 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 
 
 def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
-    """Return length and middle, in units of `side`, of the chord on which start + x side hits the sphere.
+    """Return the chord of a sphere's outline on a line on the tangent plane: length and middle in units of the line.
 
-    On the chord, q2 x² + 2 q1 x + q0 > 0 with the coefficients in the code, |x| is at most 1/2, and points lie ahead of
-    the eye.
+    The sphere covers v = start + x · side if it is ahead and (way · v)² - tangent |v|² = q2 x² + 2 q1 x + q0 > 0.
 
-    way: vector from the eye to the sphere's centre
-    tangent: squared length of the tangents from the eye to the sphere
+    way, tangent: vector from the eye to the sphere's centre, and squared length of the tangents from the eye to it
+    start, side: vectors from the eye to the line's middle, and along the whole line; x is from -1/2 to 1/2
     """
     a, b = dr.dot(way, start), dr.dot(way, side)
     q2 = b * b - dr.squared_norm(side) * tangent
@@ -281,11 +281,11 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
-    """Return the patch around the point at which a ray in the direction `seen` hits the sphere.
+    """Return the patch of a sphere around the point where the ray from the pupil along `seen` meets the sphere.
 
-    way, tangent: see `_chord`
-    along, across: sides of the patch on the area's plane
-    origin, centre: the pupil, and the centre of the sphere
+    way, tangent: vector from the eye to the sphere's centre, and squared length of the tangents from the eye to it
+    along, across: sides of the parallelogram that the patch covers on the eye's tangent plane
+    origin, centre: positions of the pupil and of the sphere's centre
     """
     length = dr.squared_norm(seen)
     ahead = dr.dot(way, seen)

@@ -33,7 +33,8 @@ class Texture:
 
     first: index of the first texel
     columns: number of columns
-    least_side: shorter sides of parallelograms are treated as this long [texels], see `Stripes.texture`
+    least_side: shortest side [texels] of a parallelogram over which the texture is averaged. `Stripes.mean_over`
+        lengthens shorter sides to this length
     """
 
     first: Array
@@ -43,10 +44,10 @@ class Texture:
 
 @dataclass(frozen=True)
 class StripeTables:
-    """Tables of all textures, one array per component.
+    """Tables of all textures, one array for each component of the light, a spectral band or a fixed spectrum.
 
-    rows: four numbers for each texel: the second and the first integral up to the texel's centre, and the deviations of
-        this texel and of the next one from the texture's mean
+    rows: four numbers for each texel: the second and the first integral of the texture's deviation from its mean, at
+        the texel's centre, and the deviations of this texel and of the next one
     means: for each texel, the mean of its texture
     """
 
@@ -57,9 +58,9 @@ class StripeTables:
 class Stripes:
     """Averages of textures along one axis.
 
-    reflectance: (texel, component)
-    places: index of the first texel, and number of columns of each texture, (texture, 2)
-    tables: attribute, the tables in the form in which the kernel receives them
+    reflectance: reflectance of the texels of all textures for each component of the light, (texel, component)
+    places: for each texture, the index of its first texel and its number of columns, (texture, 2)
+    tables: the tables as Dr.Jit arrays, which are passed to the kernel (an attribute)
     """
 
     def __init__(self, reflectance: np.ndarray, places: np.ndarray) -> None:
@@ -85,7 +86,9 @@ class Stripes:
         return Texture(mi.Float(first), mi.Float(columns), self._least_sides[int(first)])
 
     def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
-        """Return the mean reflectance, per component, over consecutive stretches of a texture, which have equal weight.
+        """Return the average of the mean reflectances of consecutive stretches of a texture.
+
+        There is one array for each component of the light, a spectral band or a fixed spectrum.
 
         ends: ends of the stretches, in columns; texel centres are at whole numbers
         spread: additional width of each stretch, half of it on either side
@@ -102,10 +105,12 @@ class Stripes:
     def mean_over(
         self, texture: Texture, middle: Array, sides: tuple[Array, Array], tables: StripeTables
     ) -> list[Array]:
-        """Return the mean reflectance, per component, over a parallelogram.
+        """Return a texture's mean reflectance over a parallelogram.
 
-        middle: column of the parallelogram's middle
-        sides: number of columns that each side spans, with either sign
+        There is one array for each component of the light, a spectral band or a fixed spectrum.
+
+        middle: texture column at the parallelogram's middle
+        sides: number of columns that each side spans; the sign has no effect
         """
         one: Array = dr.maximum(dr.abs(sides[0]), texture.least_side)
         other: Array = dr.maximum(dr.abs(sides[1]), texture.least_side)
@@ -120,20 +125,31 @@ class Stripes:
         return [dr.gather(mi.Float, tables.means[k], mi.UInt32(texture.first)) for k in range(self.components)]
 
     def _once(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the integral over columns of the texture minus its mean, up to the position `middle + beyond`."""
+        """Return the integral of the texture's deviation from its mean, at the column `middle + beyond`.
+
+        The deviation is integrated along the texture's axis, separately for each component of the light. The constant
+        of integration makes the mean of the integral 0.
+        """
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma((row.w - row.z) / 2, past, row.z), past, row.y) for row in rows]
 
     def _twice(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the second integral of the texture minus its mean, up to the position `middle + beyond`."""
+        """Return the second integral of the texture's deviation from its mean, at the column `middle + beyond`.
+
+        The second integral is the integral of the first one (`_once`), separately for each component of the light.
+        """
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
     def _rows(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> tuple[list[Array], Array]:
-        """Return the row of the last texel centre up to middle + beyond, per component, and the distance from it.
+        """Return the rows of one texel in the tables, and the distance [texels] from its centre to a position.
 
-        Whole texels are separated from `middle` before `beyond` is added. A sum with a large column number would be
-        rounded, and such errors would not cancel in differences.
+        The position is the column `middle + beyond`. The texel is the last one whose centre is not beyond the position.
+        It has one row for each component of the light.
+
+        The number of whole texels in `middle` is split off before `beyond` is added to the remainder, because the sum
+        of a large column number and `beyond` would be rounded. A mean is computed from differences of integrals at
+        several positions, which are rounded differently, so that the errors would not cancel.
         """
         whole = dr.floor(middle)
         past = (middle - whole) + beyond
@@ -145,13 +161,14 @@ class Stripes:
 
 
 def _least_side(largest: float) -> float:
-    """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most 0.001.
+    """Return how long a parallelogram's sides must be at least [texels] so that its mean reflectance is precise.
 
-    It is at least one texel, because textures are linear between texels. A mean is a sum of four values of the second
-    integral, divided by the product of the sides. Each value is rounded twice: in the table, and after the polynomial
-    within a texel is added.
+    The error that rounding causes is then at most 0.001. The length is at least one texel, because textures are linear
+    between texels. The mean reflectance over a parallelogram is computed from four values of the second integral of the
+    texture's deviation from its mean. Their sum is divided by the product of the parallelogram's sides. Each value is
+    rounded twice: in the table, and after the polynomial within a texel is added.
 
-    largest: largest value of the second integral
+    largest: largest absolute value of the second integral
     """
     return max(1.0, math.sqrt(8 * HALF_ULP * largest / ROUNDING))
 
