@@ -1,4 +1,4 @@
-"""Times at which an agent comes within reach of objects, and its distance from them."""
+"""Times at which an agent comes within reach of objects, and the agent's distance from the nearest goal."""
 
 from __future__ import annotations
 
