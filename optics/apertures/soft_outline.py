@@ -151,10 +151,10 @@ class _Arc:
         return dr.atan2(cross, dot + TINY) + dr.select(between, 2 * pi, 0)
 
     def _integral(self, x: Array, y: Array, radius: Array, first: Array, last: Array, zero: Array) -> Array:
-        """Return ∫ H(r) (R - x cos t - y sin t) R dt along an arc of radius R, for points (x, y) seen from its centre.
+        """Return ∫ H(r) (R - x cos t - y sin t) R dt along an arc of radius R.
 
-        t is the angle [rad] of a position on the arc, from `first` to `last`, and r the distance of this position from
-        the point. H is the function of `radial_table`.
+        (x, y) is a point relative to the centre of the arc's circle. t is the angle [rad] of a position on the arc,
+        from `first` to `last`, and r the distance of this position from (x, y). H is the function of `radial_table`.
         """
         import drjit as dr
 

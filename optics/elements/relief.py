@@ -124,7 +124,7 @@ class BSplineRelief(Relief):
         exp(-ik medium_n r²/2f). n is the index of the relief, medium_n the index behind it, and object_n the index in
         front of it, as in `Pupil`.
 
-        The control values of x² are X_i² - δ²/3. Here X_i = (2i - 3) a are the Greville abscissae, δ = 2a is the
+        The B-spline coefficients of x² are X_i² - δ²/3. Here X_i = (2i - 3) a are the Greville abscissae, δ = 2a is the
         spacing of the uniform knots, and a is the radius.
 
         Raises:

@@ -205,7 +205,10 @@ class EyeSpec:
 
     @property
     def fovy_deg(self) -> float:
-        """Vertical field of view [degrees]: `vertical_fov_deg` or, if that is None, the field of square receptors."""
+        """Vertical field of view [degrees].
+
+        It is `vertical_fov_deg` or, if that is None, the angle that results if receptors are square.
+        """
         height, _ = self.receptor_size
         return math.degrees(2 * math.atan(self.resolution[0] * height / (2 * number(self.sensor_distance))))
 

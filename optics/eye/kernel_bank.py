@@ -48,9 +48,10 @@ class KernelBank:
     kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
     choices: numbers of nodes along depth and over the field, with the reasons for these numbers.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
-    parallax: p, where p (1/z₁ - 1/z₂) is the shift [cells] of a near point at the distance z₁ [m] relative to a far one
-        at z₂, between views from opposite edges of the pupil. It determines where near surfaces hide far ones. 0:
-        surfaces are hidden only as seen from the middle of the pupil, as in renderers whose rays all pass this point.
+    parallax: factor p [cells m] in the shift p (1/z₁ - 1/z₂) of a near point relative to a far one, between views from
+        opposite edges of the pupil. z₁ and z₂ are the distances [m] of the near and the far point. The shift determines
+        where near surfaces hide far ones. 0: surfaces are hidden only as seen from the middle of the pupil, as in
+        renderers whose rays all pass this point.
     """
 
     inverse_distances: tuple[float, ...]

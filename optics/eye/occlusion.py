@@ -51,9 +51,12 @@ class Layer:
 def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[Layer]:
     """Yield the layers of a depth map from the nearest to the farthest.
 
-    inverse_distance: 1/z [1/m] of the cells, the equal rectangles into which the scene is divided, (Y, X).
-    parallax: p, where p (1/z₁ - 1/z₂) is the shift [cells] of a near point at the distance z₁ [m] relative to a far one
-        at z₂, between views from opposite edges of the pupil. With 0, no surface hides another one.
+    The scene is divided into equal rectangles, called cells.
+
+    inverse_distance: inverse 1/z [1/m] of the distance of each cell, array (Y, X).
+    parallax: factor p [cells m] in the shift p (1/z₁ - 1/z₂) of a near point relative to a far one, between views from
+        opposite edges of the pupil. z₁ and z₂ are the distances [m] of the near and the far point. With 0, no surface
+        hides another one.
     """
     from scipy.ndimage import distance_transform_edt
 

@@ -71,7 +71,7 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """The smaller of `half` and half the side [m] of a square that would hold enough light without diffraction."""
+        """Half the side [m] of a square around `centre` that nearly all undiffracted rays hit; at most `half`."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:

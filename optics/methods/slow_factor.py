@@ -82,15 +82,16 @@ class Path:
 
 
 def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
-    """Return the number of Chebyshev points per axis that interpolate the slow factor, at most `most`.
+    """Return the number of Chebyshev points per axis with which the slow factor can be interpolated in the window.
 
-    The result is None if the slow factor needs more points than that. The slow factor is the factor by which the
-    diffraction kernel differs from a Fourier kernel. Interpolation is tested along a few lines through the window, for
+    The slow factor is the factor by which the diffraction kernel differs from a Fourier kernel. The result is None if
+    more than `most` points are needed. Interpolation is tested along a few lines through the window, for
     light from points on the outer border of the pupil's soft edge.
 
-    half: distance [m] from the window's centre within which the Chebyshev points lie.
-    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c} between points ξ of the pupil and u of the window. This
-        argument is not used for `SineSamples`, which are evenly spaced in their directions from the window's centre.
+    half: half the side [m] of the square around the window's centre in which the Chebyshev points lie.
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c}, where ξ is a point of the pupil and u a point of the
+        window. `scale` is not used if `pupil` is a `SineSamples`, whose Fourier kernel depends on the direction from
+        the window's centre to ξ instead of ξ/c.
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)

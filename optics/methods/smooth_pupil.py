@@ -107,16 +107,16 @@ class _Gaussian(NamedTuple):
     covariance: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def along(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the mean [m] and the variance [m²] of a component of the displacement, the variable of the Gaussians.
+        """Return the mean [m] and the variance [m²] of one component of the displacement from each sample.
 
-        x, y: components of the unit vectors along which the displacement from each sample is taken.
+        x, y: components of the unit vectors along which the component of the displacement is taken.
         """
         return x * self.mean[0] + y * self.mean[1], self.between((x, y), (x, y))
 
     def between(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Return the covariance [m²] between two components of the displacement, the variable of the Gaussians.
+        """Return the covariance [m²] between two components of the displacement from each sample.
 
-        one, other: unit vectors (x, y) along which the two components of the displacement from each sample are taken.
+        one, other: unit vectors (x, y) along which the two components of the displacement are taken.
         """
         xx, xy, yy = self.covariance
         return one[0] * other[0] * xx + (one[0] * other[1] + one[1] * other[0]) * xy + one[1] * other[1] * yy

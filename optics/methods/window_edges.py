@@ -208,7 +208,7 @@ class WindowEdges:
         return self.stack.mask_cycles(np.minimum(self.tolerance, 0.1))
 
     def _reach(self, along: np.ndarray) -> np.ndarray:
-        """Return the highest frequencies [cycles per radius] of all but a negligible share of the rays, (beam,).
+        """Return the frequency [cycles per radius] that only a negligible share of a beam's rays exceeds, (beam,).
 
         along: frequencies of the rays [cycles per radius], (beam, ray).
         """

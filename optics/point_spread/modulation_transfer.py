@@ -177,8 +177,9 @@ class MTF(ReadOnlyArrays):
     def profile(self, frequencies: np.ndarray, with_error: bool = False) -> Any:
         """Return the mean contrast over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
 
-        The frequencies need not lie on the grid. Arrays are flattened. At frequency 0 the contrast is 1. Contrasts
-        count as 0 if |fx| or |fy| is beyond the Nyquist frequency of the PSF's samples (half a cycle per sample).
+        The frequencies need not lie on the grid. If `frequencies` has several axes, it is flattened. At frequency 0 the
+        contrast is 1. Contrasts count as 0 if |fx| or |fy| is beyond the Nyquist frequency of the PSF's samples (half a
+        cycle per sample).
 
         with_error: whether to return (value, predicted error), each (wavelength, frequency).
 

@@ -167,7 +167,7 @@ def _finer_detail(beam: Beam, problem: Problem) -> float:
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return flat indices of the points at which a PSF is checked, and the probability with which each was drawn.
 
-    Points are drawn at equal steps of the cumulative probability: all with a probability above 1/`points` are drawn.
+    A point is drawn each time the sum of the probabilities grows by 1/`points`. No more probable point is missed.
     """
     # If there are few points, each is compared once.
     even = np.full(points, 1 / points)

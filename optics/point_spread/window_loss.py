@@ -1,12 +1,12 @@
 """Errors of a PSF's contrast at each spatial frequency, due to light outside the window.
 
 The contrast at the frequency f is the modulus of ∫ PSF(x) exp(-2πi f·x) dx, divided by the value at f = 0. Light
-outside the window is missing in this integral. Near f = 0, the error is all of this light. At other frequencies, light
-from different places outside the window mostly cancels, and most of the error arises because the samples end abruptly
-at the sides of the window. This error disappears if the samples are multiplied by weights that fall smoothly to 0
-towards the sides. It is therefore estimated as the difference between the spectra of the samples without and with such
-weights. At some frequencies, such as the frequency of the rings in the PSF of an annular aperture, light outside the
-window does not cancel. Its contribution is estimated from the light in the outer parts of the window.
+outside the window is missing in this integral. Near f = 0, the error is the sum of this light. At other frequencies,
+light from different places outside the window mostly cancels, and most of the error arises because the samples end
+abruptly at the sides of the window. This error disappears if the samples are multiplied by weights that fall smoothly
+to 0 towards the sides. It is therefore estimated as the difference between the spectra of the samples without and with
+such weights. At some frequencies, such as the frequency of the rings in the PSF of an annular aperture, light outside
+the window does not cancel. Its contribution is estimated from the light in the outer parts of the window.
 """
 
 from __future__ import annotations

@@ -43,12 +43,14 @@ RIPPLES = 8.0
 
 @dataclass(frozen=True, eq=False)
 class SoftPixels:
-    """Opening and pixels of a pupil, convolved with a kernel. Lengths are in radii R, frequencies in cycles per R.
+    """Convolution of the transmittance of a pupil that consists of pixels with a kernel, which softens all edges.
 
-    edge: kernel along x and along y.
-    aperture: opening, divided into the pixels or into parts of them.
-    across: number of nodes along a pixel.
-    ripple: ripple of the kernel's spectrum.
+    Lengths are in radii R of the pupil, frequencies in cycles per R.
+
+    edge: kernel along one axis; the same kernel is used along x and along y.
+    aperture: opening of the pupil, divided into quadrature cells. A cell is a pixel or a part of one.
+    across: number of quadrature nodes along a side of a cell.
+    ripple: largest deviation of the kernel's spectrum from 1 in the passband and from 0 in the stopband.
     alignment: position of the pupil. If the pupil is tilted, samples are farther apart along the pupil than in a plane
         perpendicular to the axis.
     """

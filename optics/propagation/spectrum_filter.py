@@ -74,9 +74,9 @@ class ScaledPlane:
 def filtered(
     given: np.ndarray, how: TransformSampling, types: Precision, depths: Depths | None = None
 ) -> PropagatedPlane:
-    """Return the field in a window after propagation from another plane, where it is `given` (y, x).
+    """Return the field in a window after propagation from another plane. If `depths` is not None, planes may be tilted.
 
-    If `depths` is given, the two planes may be tilted.
+    given: field in the other plane, (y, x).
     """
     scaled = ScaledPlane.from_plane(given, types)
     plane, total = scaled.u, scaled.power

@@ -79,9 +79,9 @@ class EyesOfKind:
         """Launch the rendering of the frame at the end of an action. The result is the receptors' response to it.
 
         Before that, this method renders the frames at earlier moments of the action, and the receptors respond to each
-        of them in turn. There are no earlier frames if these worlds begin an episode (`fresh`). If only some worlds are
-        rendered, and they do not begin an episode, the last frame in these worlds is rendered again: the receptors
-        first return to their state before that frame.
+        of them in turn. There are no earlier frames if these worlds begin an episode (`fresh`). If `worlds` is given
+        and `fresh` is False, only the last frame of these worlds is rendered again. The receptors then return to their
+        state before that frame and respond to the new rendering.
         """
         light = self._simulation.light(self._wavelengths)
         first, chosen = fresh or worlds is not None, self._everyone if worlds is None else worlds

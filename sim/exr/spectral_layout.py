@@ -84,7 +84,9 @@ def fields_of_views(parts: Sequence[Any], stem: str) -> list[dict[str, Any]]:
 
 
 def _fields_of_view(channels: Mapping[str, np.ndarray], header: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Return the fields of a `View` from one part (sub-image) of an OpenEXR file; {} if no channel is spectral.
+    """Return arguments for the constructor of `View`, by name, from one part (sub-image) of an OpenEXR file.
+
+    The result is {} if no channel is spectral.
 
     Spectral channels of quantities other than radiance and reflectance are left out with an `ExrWarning`.
 

@@ -66,11 +66,14 @@ class Task(TaskSettings):
         raise NotImplementedError
 
     def terminated(self, data: mujoco.MjData) -> bool:
-        """Return whether the episode ends after this action; None counts as False."""
+        """Return whether the episode ends after this action. If a task returns None here, this counts as False."""
         return False
 
     def succeeded(self, data: mujoco.MjData) -> bool:
-        """Return whether the task is accomplished; None counts as False. This is `info["is_success"]`."""
+        """Return whether the task is accomplished. If a task returns None here, this counts as False.
+
+        The result is stored as `info["is_success"]`.
+        """
         return False
 
     def proprioception(self, data: mujoco.MjData) -> np.ndarray:

@@ -145,13 +145,13 @@ class _Edge:
 
 @dataclass(frozen=True)
 class _Outline:
-    """A sphere's outline in an area, a rectangle on the eye's tangent plane. Lengths are relative to the area's sides.
+    """A sphere's outline in a rectangular area of the eye's tangent plane, where x and y are from -1/2 to 1/2.
 
-    closed: True if the outline is an ellipse, which the other fields describe
-    middle: middle of the ellipse, across and along the area
-    half: half of the ellipse's width across the area, and half of the chord through its middle along the area
-    slant: slope of the line through the middles of all chords along the area (0: the ellipse is not tilted)
-    low, high: values of `_Edge.angle` at the two ends of the part of the ellipse between the area's borders
+    closed: True if the outline is an ellipse. The other fields describe this ellipse.
+    middle: x and y of the ellipse's middle
+    half: half of the ellipse's extent along x, and half the length of the chord parallel to y through its middle
+    slant: slope dy/dx of the line on which the middles of all chords parallel to y lie (0: ellipse is not tilted)
+    low, high: values of `_Edge.angle` at the lowest and the highest x of the ellipse's part in the area
     """
 
     closed: Array
